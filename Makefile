@@ -1,0 +1,49 @@
+# Every target makes the virtual environment it needs, once. The system offers Python 3.11 or newer, git and make.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+SEEDS  ?= 20
+OUT    ?= results/paper
+
+DEV   := .venvs/dev
+STUDY := .venvs/study
+
+.PHONY: help paper test check benchmark format clean
+
+help:
+	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
+	@echo "make test            the gate: lint, types, tests with coverage"
+	@echo "make check           lint and types only"
+	@echo "make benchmark       cost of a control step beside the bare physics"
+	@echo "make format          sort imports and format"
+	@echo "make clean           remove environments, builds and caches, never results"
+
+paper: $(STUDY)/installed
+	$(STUDY)/bin/swarm-logistics study run paper --seeds $(SEEDS) --out $(OUT)
+
+test: check
+	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=term
+
+check: $(DEV)/installed
+	$(DEV)/bin/ruff check .
+	$(DEV)/bin/ruff format --check .
+	$(DEV)/bin/mypy
+
+benchmark: $(STUDY)/installed
+	$(STUDY)/bin/python -m benchmarks
+
+format: $(DEV)/installed
+	$(DEV)/bin/ruff check --fix .
+	$(DEV)/bin/ruff format .
+
+clean:
+	rm -rf .venvs build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
+	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
+
+$(DEV)/installed: EXTRAS := dev,study
+$(STUDY)/installed: EXTRAS := study
+
+# The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
+.venvs/%/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venvs/$*
+	.venvs/$*/bin/python -m pip install --constraint constraints.txt --editable ".[$(EXTRAS)]"
+	@touch $@
