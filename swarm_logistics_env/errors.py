@@ -1,0 +1,47 @@
+"""Every error the package raises on purpose: one family, all of them `ValueError`.
+
+A message names the field, the value that was given and what would be right.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class SwarmLogisticsError(ValueError):
+    """Anything this package refuses; catch this to catch all of them."""
+
+
+class ScenarioError(SwarmLogisticsError):
+    """A scenario that is mistyped, out of range, or impossible to build."""
+
+
+class FaultError(SwarmLogisticsError):
+    """A fault whose mode, robots or times cannot be."""
+
+
+class CommandError(SwarmLogisticsError):
+    """Commands of the wrong shape, of the wrong type, or not finite."""
+
+
+class SetupError(SwarmLogisticsError):
+    """An environment, a reward or a wrapper that is set up or called wrongly."""
+
+
+class PolicyError(SwarmLogisticsError):
+    """A policy that cannot be found, built or trusted, or whose output is wrong."""
+
+
+class StudyError(SwarmLogisticsError):
+    """A study whose specification, store or request cannot be."""
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """Return the end of an error message about an unknown `name`.
+
+    Either "; did you mean 'x'?" where one of `known` is close, or the list of what is known.
+    """
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"; did you mean {close[0]!r}?" if close else f"; known: {', '.join(names)}"

@@ -1,0 +1,36 @@
+"""Compilation of the package's kernels, and the random numbers they draw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar, cast
+
+import numba
+import numpy as np
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` with numba.
+
+    Without the interpreter's lock, so that several worlds step in threads; cached on disk, so
+    that a second process starts at once; and without fast-math, so that results are the same
+    bits wherever they run.
+    """
+    return cast("Callable[P, R]", numba.njit(function, cache=True, nogil=True))
+
+
+@kernel
+def uniform(key: np.uint64, counter: int) -> float:
+    """Return number `counter` of the stream `key`, in [0, 1) (SplitMix64).
+
+    Counter-based: a kernel needs no generator's state, so a stream depends on nothing but its
+    key and the count. `streams.row_keys` makes the keys.
+    """
+    value = np.uint64(key) + np.uint64(counter + 1) * np.uint64(0x9E3779B97F4A7C15)
+    value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    value = (value ^ (value >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    value = value ^ (value >> np.uint64(31))
+    return float(value >> np.uint64(11)) * 1.1102230246251565e-16

@@ -1,0 +1,110 @@
+"""The named columns of an observation row: what one robot senses, in its own frame.
+
+A row has the same length for every swarm size. Positions are relative to the robot, x forward
+and y left [m]; there is no place in the warehouse and no compass. Blocks of several things
+(neighbours, items) are sorted by distance, nearest first, and end in absent entries of zeros.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.scenario import Scenario
+
+N_BEAMS = 16
+N_ITEMS_IN_VIEW = 8
+N_NEIGHBOURS = 8
+ITEM_FEATURES = ("present", "x", "y", "requested", "recently_held")
+NEIGHBOUR_FEATURES = ("present", "x", "y", "timer_heard", "timer")
+
+# First columns of the blocks; kernels and scripted policies index with these.
+RANGE_ROBOTS = 0
+RANGE_WALLS = RANGE_ROBOTS + N_BEAMS
+RANGE_ITEMS = RANGE_WALLS + N_BEAMS
+ITEMS = RANGE_ITEMS + N_BEAMS
+NEIGHBOURS = ITEMS + N_ITEMS_IN_VIEW * len(ITEM_FEATURES)
+LOWEST_TIMER = NEIGHBOURS + N_NEIGHBOURS * len(NEIGHBOUR_FEATURES)
+CARRYING = LOWEST_TIMER + 4
+CARRYING_REQUESTED = CARRYING + 1
+IN_DELIVERY_AREA = CARRYING + 2
+TIMER_RUNS = CARRYING + 3
+TIMER = CARRYING + 4
+VELOCITY = CARRYING + 5
+CONTACT = CARRYING + 7
+N_COLUMNS = CONTACT + 1
+
+
+@dataclass(frozen=True)
+class Column:
+    """A named part of an observation row: where it stands, its unit and the range of its values."""
+
+    name: str
+    unit: str
+    columns: slice
+    low: float
+    high: float
+    meaning: str
+
+
+def columns(scenario: Scenario) -> tuple[Column, ...]:
+    """Return the named columns of a row in `scenario`; together they cover it without a gap."""
+    reach, view, limit = scenario.ranger_range, scenario.view_range, scenario.timer_limit
+    far, speed = max(view, scenario.radio_range), scenario.max_speed
+    beam = "beam k looks k * 22.5 degrees left of forward; the full range where it meets nothing"
+    items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)
+    neighbours = _block(NEIGHBOURS, N_NEIGHBOURS, NEIGHBOUR_FEATURES)
+    lowest = _block(LOWEST_TIMER, 1, ("present", "x", "y", "timer"))
+    return (
+        Column("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"robots; {beam}"),
+        Column("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "walls and obstacles"),
+        Column("range_items", "m", _run(RANGE_ITEMS, N_BEAMS), 0, reach, "free items"),
+        Column("item_present", "flag", items["present"], 0, 1, "a free item is in view"),
+        Column("item_x", "m", items["x"], -view, view, "its centre, forward"),
+        Column("item_y", "m", items["y"], -view, view, "its centre, left"),
+        Column("item_requested", "flag", items["requested"], 0, 1, "it is the requested one"),
+        Column("item_recently_held", "flag", items["recently_held"], 0, 1, "it is in the memory"),
+        Column("neighbour_present", "flag", neighbours["present"], 0, 1, "heard, or in view"),
+        Column("neighbour_x", "m", neighbours["x"], -far, far, "its centre, forward"),
+        Column("neighbour_y", "m", neighbours["y"], -far, far, "its centre, left"),
+        Column("neighbour_timer_heard", "flag", neighbours["timer_heard"], 0, 1, "it tells one"),
+        Column("neighbour_timer", "s", neighbours["timer"], 0, limit, "the timer it tells"),
+        Column("lowest_timer_present", "flag", lowest["present"], 0, 1, "any timer was heard"),
+        Column("lowest_timer_x", "m", lowest["x"], -far, far, "teller of the lowest, forward"),
+        Column("lowest_timer_y", "m", lowest["y"], -far, far, "teller of the lowest, left"),
+        Column("lowest_timer", "s", lowest["timer"], 0, limit, "the lowest timer heard"),
+        Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "an item"),
+        Column("carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "the requested"),
+        Column("in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is"),
+        Column("timer_runs", "flag", _run(TIMER_RUNS, 1), 0, 1, "its own timer is not silent"),
+        Column("timer", "s", _run(TIMER, 1), 0, limit, "its own timer; the limit when silent"),
+        Column("velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; saturates"),
+        Column("contact", "flag", _run(CONTACT, 1), 0, 1, "touches a robot, wall or obstacle"),
+    )
+
+
+def bounds(scenario: Scenario) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the lowest and highest possible row, each of shape (N_COLUMNS,)."""
+    low, high = np.zeros(N_COLUMNS, np.float32), np.zeros(N_COLUMNS, np.float32)
+    for column in columns(scenario):
+        low[column.columns], high[column.columns] = column.low, column.high
+    return low, high
+
+
+def unflatten(
+    observation: NDArray[np.float32], scenario: Scenario
+) -> dict[str, NDArray[np.float32]]:
+    """Return the named parts of a row (D,) or of rows (N, D), as views, last axis the part's."""
+    return {column.name: observation[..., column.columns] for column in columns(scenario)}
+
+
+def _run(start: int, length: int) -> slice:
+    return slice(start, start + length, 1)
+
+
+def _block(start: int, length: int, features: tuple[str, ...]) -> dict[str, slice]:
+    width = len(features)
+    stop = start + length * width
+    return {name: slice(start + place, stop, width) for place, name in enumerate(features)}

@@ -1,0 +1,78 @@
+"""The base of every validated record: frozen, no unknown fields, errors in one sentence."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from swarm_logistics_env.errors import SwarmLogisticsError, suggest
+
+
+class Record(BaseModel):
+    """A frozen, hashable set of named values that cannot be wrong.
+
+    Raises:
+        The class's `error_type` (a `ValueError`), naming each bad field, its value and what
+        would be right. An unknown field is an error that suggests the nearest known one.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True
+    )
+    error_type: ClassVar[type[SwarmLogisticsError]] = SwarmLogisticsError
+
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise self.error_type(self._sentence(error)) from None
+
+    def replace(self, **fields: Any) -> Self:
+        """Return a copy with `fields` changed, validated like a new record."""
+        return type(self)(**{**self._given(), **fields})
+
+    def to_json(self) -> str:
+        """Return the record as JSON text; `from_json` reads it back unchanged."""
+        return self.model_dump_json()
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Self:
+        """Return the record that `to_json` wrote.
+
+        Raises:
+            The class's `error_type` if `text` is not JSON or is not such a record.
+        """
+        try:
+            return cls.model_validate_json(text)
+        except ValidationError as error:
+            raise cls.error_type(cls._sentence(error)) from None
+
+    def _given(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in type(self).model_fields}
+
+    @classmethod
+    def _sentence(cls, error: ValidationError) -> str:
+        problems = (cls._problem(dict(problem)) for problem in error.errors())
+        return "; ".join(dict.fromkeys(problems))
+
+    @classmethod
+    def _problem(cls, problem: dict[str, Any]) -> str:
+        # Parts such as "constrained-int" name a branch of a union, not a field.
+        parts = [str(part) for part in problem["loc"]]
+        place = ".".join(part for part in parts if part.isidentifier() or part.isdigit())
+        field = f"{cls.__name__}.{place}" if place else cls.__name__
+        if problem["type"] == "extra_forbidden" and len(problem["loc"]) == 1:
+            return f"{cls.__name__} has no field {place!r}{suggest(place, cls.model_fields)}"
+        message = str(problem["msg"]).removeprefix("Value error, ")
+        if message.startswith(f"{cls.__name__}"):
+            return message
+        if not place or problem["type"] == "missing":
+            return f"{field}: {message}"
+        message = message.replace("Input should", "should")
+        return f"{field} = {_short(problem['input'])}: {message}"
+
+
+def _short(value: object, limit: int = 80) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

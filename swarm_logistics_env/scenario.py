@@ -1,0 +1,176 @@
+"""Scenario: every condition of one run, frozen and validated, each with its unit and source."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+
+from swarm_logistics_env.errors import ScenarioError, SwarmLogisticsError, suggest
+from swarm_logistics_env.records import Record
+
+# The densest that discs are strewn at random: well below random sequential addition's .547.
+DENSEST_COVER = 0.4
+
+
+class Scenario(Record):
+    """Every condition of one run. The defaults are the paper's set-up.
+
+    Sources: "paper" is Milner, Sooriyabandara and Hauert, Swarm Performance Indicators;
+    "DOTS" the robots' developers; "simulator" the paper's author's public early simulator;
+    "measured" means chosen here because it brings the paper's tables closest.
+
+    Raises:
+        ScenarioError: a field is unknown or out of range, or the whole cannot be built (robots
+            or items that do not fit, a delivery area that leaves no storage).
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = ScenarioError
+
+    n_robots: PositiveInt = Field(25, description="swarm size N [robots]; paper")
+    n_items: PositiveInt = Field(60, description="items in storage at the start; paper")
+    warehouse_width: PositiveFloat = Field(10.0, description="along x [m]; paper")
+    warehouse_height: PositiveFloat = Field(10.0, description="along y [m]; paper")
+    delivery_width: PositiveFloat = Field(
+        2.0, description="delivery area: strip along the wall x = warehouse_width [m]; simulator"
+    )
+    duration: PositiveFloat = Field(500.0, description="episode [s]; paper")
+    restock: bool = Field(
+        False, description="a delivered item returns to storage and requests never end; here"
+    )
+    n_obstacles: NonNegativeInt = Field(0, description="static discs; here")
+    obstacle_radius: PositiveFloat = Field(0.3, description="[m]; here")
+
+    robot_radius: PositiveFloat = Field(0.125, description="[m]; DOTS")
+    robot_mass: PositiveFloat = Field(3.0, description="[kg]; DOTS")
+    max_speed: PositiveFloat = Field(2.0, description="[m/s]; simulator (DOTS say 1)")
+    max_acceleration: PositiveFloat = Field(20.0, description="[m/s^2]; simulator, measured")
+    max_turn_rate: PositiveFloat = Field(6.0, description="[rad/s]; DOTS")
+    ranger_range: PositiveFloat = Field(2.0, description="16 laser rangers [m]; DOTS")
+    view_range: PositiveFloat = Field(
+        1.0, description="items and robots in view of the cameras [m]; DOTS"
+    )
+    radio_range: PositiveFloat = Field(4.0, description="[m]; measured")
+    pickup_range: PositiveFloat = Field(
+        0.25, description="lifts an item this near, centre to centre [m]; simulator"
+    )
+    memory_size: Annotated[int, Field(ge=0, le=16)] = Field(
+        2, description="items last put down, not lifted again until a delivery; simulator"
+    )
+    timer_limit: PositiveFloat = Field(
+        10.0, description="timer since the delivery area falls silent at [s]; paper"
+    )
+    relay: Literal["none", "gossip"] = Field(
+        "none", description="robots tell their own timer, or the lowest heard, aged; paper"
+    )
+
+    item_radius: PositiveFloat = Field(0.125, description="[m]; simulator")
+    control_period: PositiveFloat = Field(0.1, description="one command per [s]; measured")
+    physics_period: PositiveFloat = Field(0.02, description="one physics step per [s]; measured")
+
+    @property
+    def storage_width(self) -> float:
+        """Width of the storage, everything left of the delivery area [m]."""
+        return self.warehouse_width - self.delivery_width
+
+    @property
+    def n_steps(self) -> int:
+        """Control steps in an episode."""
+        return math.ceil(self.duration / self.control_period - 1e-9)
+
+    @property
+    def n_substeps(self) -> int:
+        """Physics steps in a control step."""
+        return round(self.control_period / self.physics_period)
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self._check_periods()
+        self._check_storage()
+        area = self.storage_width * self.warehouse_height
+        obstacles = self.n_obstacles * self.obstacle_radius**2
+        for count, name, radius in (
+            (self.n_obstacles, "n_obstacles", self.obstacle_radius),
+            (self.n_robots, "n_robots", self.robot_radius),
+            (self.n_items, "n_items", self.item_radius),
+        ):
+            taken = 0.0 if name == "n_obstacles" else obstacles
+            fit = int((DENSEST_COVER * area / math.pi - taken) / radius**2)
+            if count > fit:
+                raise ValueError(
+                    f"{name} = {count} of radius {radius} m do not fit into a storage of "
+                    f"{self.storage_width:g} x {self.warehouse_height:g} m: should be at most "
+                    f"{max(fit, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
+                )
+        return self
+
+    def _check_periods(self) -> None:
+        ratio = self.control_period / self.physics_period
+        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
+            raise ValueError(
+                f"control_period = {self.control_period} s should be a whole multiple of "
+                f"physics_period = {self.physics_period} s"
+            )
+        if self.max_speed * self.physics_period > self.robot_radius:
+            raise ValueError(
+                f"physics_period = {self.physics_period} s lets a robot cross "
+                f"{self.max_speed * self.physics_period:g} m between two collision checks: should "
+                f"be at most robot_radius / max_speed = {self.robot_radius / self.max_speed:g} s"
+            )
+        if self.duration < self.control_period:
+            raise ValueError(
+                f"duration = {self.duration} s should be at least one control_period "
+                f"({self.control_period} s)"
+            )
+
+    def _check_storage(self) -> None:
+        if self.delivery_width >= self.warehouse_width:
+            raise ValueError(
+                f"delivery_width = {self.delivery_width} m leaves no storage: should be less than "
+                f"warehouse_width = {self.warehouse_width} m"
+            )
+        widest = max(
+            self.robot_radius, self.item_radius, self.obstacle_radius if self.n_obstacles else 0.0
+        )
+        for name, side in (
+            ("warehouse_width - delivery_width", self.storage_width),
+            ("warehouse_height", self.warehouse_height),
+        ):
+            if side < 2 * widest:
+                raise ValueError(
+                    f"{name} = {side:g} m is narrower than what has to stand in it: should be at "
+                    f"least {2 * widest:g} m"
+                )
+
+    @classmethod
+    def preset(cls, name: str) -> Scenario:
+        """Return the scenario of that name in `SCENARIO_PRESETS`.
+
+        Raises:
+            ScenarioError: there is no such preset.
+        """
+        if name not in SCENARIO_PRESETS:
+            raise ScenarioError(f"no scenario preset {name!r}{suggest(name, SCENARIO_PRESETS)}")
+        return SCENARIO_PRESETS[name]
+
+    def sheet(self) -> str:
+        """Return the set-up sheet: one Markdown table of every condition, unit and source."""
+        rows = ["| condition | value | unit, meaning; source |", "|---|---|---|"]
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            mark = "" if value == field.default else f" (default {_shown(field.default)})"
+            rows.append(f"| {name} | {_shown(value)}{mark} | {field.description} |")
+        return "\n".join(rows) + "\n"
+
+
+def _shown(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+SCENARIO_PRESETS: dict[str, Scenario] = {
+    "paper": Scenario(),
+    # Table I delivers 74 of its items, so it cannot have held 60.
+    "paper_scalability": Scenario(n_items=100),
+    "dots": Scenario(max_speed=1.0, max_acceleration=2.0),
+}

@@ -1,0 +1,157 @@
+"""Failure modes as lost capabilities, with onset and recovery."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+
+from swarm_logistics_env.errors import FaultError, SwarmLogisticsError, suggest
+from swarm_logistics_env.records import Record
+from swarm_logistics_env.streams import row_keys
+
+
+@dataclass(frozen=True)
+class FailureMode:
+    """What a robot that fails in this mode has lost.
+
+    `speed` and `view` are factors in [0, 1] on its top speed and its cameras' range; where
+    `factor` names one of them, a fault's own factor replaces it.
+    """
+
+    description: str
+    speed: float = 1.0
+    view: float = 1.0
+    rangers: bool = True
+    lifts: bool = True
+    delivers: bool = True
+    sends: bool = True
+    hears: bool = True
+    honest: bool = True
+    obeys: bool = True
+    present: bool = True
+    factor: str | None = None
+
+
+FAILURE_MODES: dict[str, FailureMode] = {
+    "FM1": FailureMode("always tells timer 0, as if in the delivery area", honest=False),
+    "FM2": FailureMode("never picks up", lifts=False),
+    "FM3": FailureMode("neither sends nor hears", sends=False, hears=False),
+    "FM3_send": FailureMode("does not send", sends=False),
+    "FM3_hear": FailureMode("does not hear", hears=False),
+    "FM4": FailureMode("its entering the delivery area delivers nothing", delivers=False),
+    "motor_slow": FailureMode(
+        "drives and turns at `factor` (default half) of its speed", speed=0.5, factor="speed"
+    ),
+    "motor_dead": FailureMode("stands still", speed=0.0),
+    "view_reduced": FailureMode(
+        "sees `factor` (default half) as far with its cameras", view=0.5, factor="view"
+    ),
+    "rangers_blind": FailureMode("its rangers report nothing near", rangers=False),
+    "dead": FailureMode(
+        "stands still, senses, sends and lifts nothing, keeps what it carries",
+        speed=0.0,
+        view=0.0,
+        rangers=False,
+        lifts=False,
+        delivers=False,
+        sends=False,
+        hears=False,
+        obeys=False,
+    ),
+    "removed": FailureMode(
+        "out of the arena, what it carried is put down where it was", present=False
+    ),
+}
+
+
+class Fault(Record):
+    """A failure mode that befalls some robots, from a time on.
+
+    Args:
+        mode: a key of `FAILURE_MODES`.
+        robots: how many robots fail (1..N), chosen by the seed alone, so that every mode hits the
+            same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
+        onset: when [s], from the start of the episode.
+        duration: for how long [s]; None: for good. A removed robot does not come back.
+        factor: for `motor_slow` and `view_reduced`: what is left, in [0, 1).
+
+    Raises:
+        FaultError: an unknown mode, a factor or a duration that the mode does not have.
+
+    Example:
+        >>> Fault("FM1", 2, onset=200.0).robots
+        2
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = FaultError
+
+    mode: str
+    robots: PositiveInt | tuple[NonNegativeInt, ...] = 1
+    onset: Annotated[float, Field(ge=0)] = 0.0
+    duration: PositiveFloat | None = None
+    factor: Annotated[float, Field(ge=0, lt=1)] | None = None
+
+    def __init__(
+        self,
+        mode: str,
+        robots: int | Sequence[int] = 1,
+        onset: float = 0.0,
+        duration: float | None = None,
+        factor: float | None = None,
+    ) -> None:
+        if isinstance(robots, Sequence) and not isinstance(robots, str):
+            robots = tuple(robots)
+        super().__init__(mode=mode, robots=robots, onset=onset, duration=duration, factor=factor)
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.mode not in FAILURE_MODES:
+            raise ValueError(f"no failure mode {self.mode!r}{suggest(self.mode, FAILURE_MODES)}")
+        if self.factor is not None and FAILURE_MODES[self.mode].factor is None:
+            able = ", ".join(name for name, mode in FAILURE_MODES.items() if mode.factor)
+            raise ValueError(f"{self.mode} takes no factor; modes that do: {able}")
+        if self.mode == "removed" and self.duration is not None:
+            raise ValueError("a removed robot does not come back: duration should be None")
+        if isinstance(self.robots, tuple) and not self.robots:
+            raise ValueError("robots = (): should name at least one robot")
+        return self
+
+    def is_active(self, time: float) -> bool:
+        """Return whether the fault holds at `time` [s]."""
+        # Half a microsecond of grace: times are sums of control periods.
+        started = time >= self.onset - 5e-7
+        ended = self.duration is not None and time >= self.onset + self.duration - 5e-7
+        return started and not ended
+
+    def changes(self) -> tuple[float, ...]:
+        """Return the times [s] at which it begins and, if ever, ends."""
+        if self.duration is None:
+            return (self.onset,)
+        return (self.onset, self.onset + self.duration)
+
+
+def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
+    """Return the numbers of the robots that `fault` befalls, ascending.
+
+    Raises:
+        FaultError: more robots than there are, or a robot that is not there.
+    """
+    if isinstance(fault.robots, tuple):
+        chosen = np.unique(np.array(fault.robots, dtype=np.int64))
+        if chosen[-1] >= n_robots:
+            raise FaultError(
+                f"Fault.robots = {fault.robots}: robots are numbered 0 to {n_robots - 1}"
+            )
+        return chosen
+    if fault.robots > n_robots:
+        raise FaultError(
+            f"Fault.robots = {fault.robots}: should be at most n_robots = {n_robots}"
+        )
+    # Ranked by a key of seed and robot alone: nested in m, the same for every mode and any N.
+    order = np.argsort(row_keys(seed, "faulty robots", n_robots), kind="stable")
+    return np.sort(order[: fault.robots]).astype(np.int64)

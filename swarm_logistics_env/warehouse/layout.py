@@ -1,0 +1,154 @@
+"""Where everything starts and what is asked for, from keyed random streams.
+
+Robot i's place, item j's place and their order depend on the seed and on i or j, not on how many
+there are, as far as the places of those before them leave room.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import ScenarioError
+from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.streams import row_keys
+
+_TRIES = 20_000
+_NO_DISCS = np.zeros((0, 2))
+
+
+def place_obstacles(scenario: Scenario, seed: int) -> NDArray[np.float64]:
+    """Return obstacle centres in the storage [m], shape (n_obstacles, 2)."""
+    return _strewn(
+        scenario, seed, "obstacles", scenario.n_obstacles, scenario.obstacle_radius, _NO_DISCS
+    )
+
+
+def place_items(
+    scenario: Scenario, seed: int, obstacles: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return item centres in the storage [m], shape (n_items, 2), clear of each other."""
+    return _strewn(scenario, seed, "items", scenario.n_items, scenario.item_radius, obstacles)
+
+
+def place_robots(
+    scenario: Scenario, seed: int, obstacles: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return start centres [m] (N, 2), clear of each other, and headings [rad] (N,)."""
+    n = scenario.n_robots
+    centres = _strewn(scenario, seed, "robots", n, scenario.robot_radius, obstacles)
+    return centres, (_first_draws(row_keys(seed, "headings", n)) * 2.0 - 1.0) * np.pi
+
+
+def request_order(scenario: Scenario, seed: int, cycle: int = 0) -> NDArray[np.int64]:
+    """Return item numbers in the order of requests, shape (n_items,).
+
+    With `restock` the requests go on; `cycle` counts how often all items were asked for before.
+    """
+    keys = row_keys(seed, f"requests {cycle}", scenario.n_items)
+    return np.argsort(_first_draws(keys), kind="stable")
+
+
+def place_restocked(
+    scenario: Scenario,
+    seed: int,
+    count: int,
+    taken: NDArray[np.float64],
+    obstacles: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the place [m] (2,) of the `count`-th item that came back to the storage.
+
+    It is clear of the discs of item size at `taken` (n, 2): free items and robots.
+
+    Raises:
+        ScenarioError: there is no room.
+    """
+    keys = row_keys(seed, f"restock {count}", 1)
+    clearance = max(scenario.item_radius, scenario.robot_radius)
+    centres = np.vstack([taken, np.zeros((1, 2))])
+    _place(scenario, "items", keys, scenario.item_radius, clearance, centres, obstacles)
+    return np.asarray(centres[-1])
+
+
+def _strewn(
+    scenario: Scenario,
+    seed: int,
+    what: str,
+    count: int,
+    radius: float,
+    obstacles: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    centres = np.zeros((count, 2))
+    keys = row_keys(seed, f"places of {what}", count)
+    _place(scenario, what, keys, radius, radius, centres, obstacles)
+    return centres
+
+
+def _place(
+    scenario: Scenario,
+    what: str,
+    keys: NDArray[np.uint64],
+    radius: float,
+    clearance: float,
+    centres: NDArray[np.float64],
+    obstacles: NDArray[np.float64],
+) -> None:
+    low = np.array([radius, radius])
+    high = np.array([scenario.storage_width - radius, scenario.warehouse_height - radius])
+    reach = scenario.obstacle_radius + radius
+    placed = strew(keys, centres, low, high, radius + clearance, obstacles, reach)
+    if placed < keys.shape[0]:
+        raise ScenarioError(
+            f"no room for number {placed} of {keys.shape[0]} {what} after {_TRIES} tries: should "
+            f"be fewer {what}, fewer obstacles or a larger warehouse"
+        )
+
+
+@kernel
+def strew(
+    keys: NDArray[np.uint64],
+    centres: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    spacing: float,
+    obstacles: NDArray[np.float64],
+    obstacle_spacing: float,
+) -> int:
+    """Fill the last rows of `centres`, one per key, uniformly in the box, by rejection.
+
+    Returns how many were placed; fewer than there are keys when one found no room.
+    """
+    first = centres.shape[0] - keys.shape[0]
+    for disc in range(keys.shape[0]):
+        for attempt in range(20_000):
+            x = low[0] + (high[0] - low[0]) * uniform(keys[disc], 2 * attempt)
+            y = low[1] + (high[1] - low[1]) * uniform(keys[disc], 2 * attempt + 1)
+            if is_clear(x, y, centres[: first + disc], spacing) and is_clear(
+                x, y, obstacles, obstacle_spacing
+            ):
+                centres[first + disc, 0] = x
+                centres[first + disc, 1] = y
+                break
+        else:
+            return disc
+    return keys.shape[0]
+
+
+@kernel
+def is_clear(x: float, y: float, centres: NDArray[np.float64], spacing: float) -> bool:
+    """Return whether no centre is nearer than `spacing` to (x, y)."""
+    for other in range(centres.shape[0]):
+        dx = centres[other, 0] - x
+        dy = centres[other, 1] - y
+        if dx * dx + dy * dy < spacing * spacing:
+            return False
+    return True
+
+
+@kernel
+def _first_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
+    draws = np.empty(keys.shape[0])
+    for row in range(keys.shape[0]):
+        draws[row] = uniform(keys[row], 0)
+    return draws

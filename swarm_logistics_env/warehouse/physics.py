@@ -1,0 +1,163 @@
+"""Rigid bodies in pymunk: the only file that imports it.
+
+Each robot is a disc that cannot be turned by contacts (infinite moment), tied by a pivot joint to
+a kinematic control body whose velocity is the command. The joint's greatest force is the drive's
+(mass x acceleration), so contacts win where they should: writing a robot's velocity instead would
+discard the contact solution and let robots sink into each other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pymunk
+from numpy.typing import NDArray
+from pymunk import batch
+
+from swarm_logistics_env.scenario import Scenario
+
+_ITERATIONS = 4
+_SLOP = 0.001  # [m]; pymunk's default 0.1 lets robots of this size pass through each other
+_WALL = 0.5  # [m], half the thickness of a wall
+_ROBOT, _SOLID, _ITEM = 1, 2, 4
+
+_NOTHING = pymunk.ShapeFilter(categories=0, mask=0)
+_EMPTY_ROBOT = pymunk.ShapeFilter(categories=_ROBOT, mask=_ROBOT | _SOLID)
+_LADEN_ROBOT = pymunk.ShapeFilter(categories=_ROBOT, mask=_ROBOT | _SOLID | _ITEM)
+_SOLID_THING = pymunk.ShapeFilter(categories=_SOLID, mask=_ROBOT)
+_FREE_ITEM = pymunk.ShapeFilter(categories=_ITEM, mask=_ROBOT)
+
+
+class Physics:
+    """The bodies of one world: robots that move, items, obstacles and walls that do not.
+
+    Unladen robots drive under free items, laden ones collide with them. A robot that is taken out
+    stays as a ghost that touches nothing, so that rows keep their robots.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        robot_position: NDArray[np.float64],
+        item_position: NDArray[np.float64],
+        obstacle_position: NDArray[np.float64],
+    ) -> None:
+        self._n = robot_position.shape[0]
+        self._substeps = scenario.n_substeps
+        self._period = scenario.physics_period
+        self._space = pymunk.Space(threaded=False)
+        self._space.iterations = _ITERATIONS
+        self._space.collision_slop = _SLOP
+        self._add_solids(scenario, obstacle_position)
+        self._robots = self._add_robots(scenario, robot_position)
+        self._items = self._add_items(scenario, item_position)
+        # A batch call reads and writes every body, in order of insertion: N robots, N controls, and
+        # the static body last.
+        self._read = np.zeros((2 * self._n + 1, 4))
+        self._written = np.zeros((2 * self._n + 1, 2))
+        self._reader, self._writer = _buffer(self._read), _buffer(self._written)
+        self.position = self._read[: self._n, 0:2]  # (N, 2) [m], a view, new after each advance
+        self.velocity = self._read[: self._n, 2:4]  # (N, 2) [m/s], likewise
+        self.wanted_velocity = self._written[self._n : -1]  # (N, 2) [m/s], to be filled before it
+        self._kept_velocity = self._written[: self._n]
+        self._fetch()
+
+    def advance(self) -> None:
+        """Move everything by one control period, the robots driven at `wanted_velocity`."""
+        # What was just read, so that writing it back changes nothing for the robots themselves.
+        self._kept_velocity[:] = self.velocity
+        batch.set_space_bodies(self._space, batch.BodyFields.VELOCITY, self._writer)
+        step, period = self._space.step, self._period
+        for _ in range(self._substeps):
+            step(period)
+        self._fetch()
+
+    def lift(self, robot: int, item: int) -> None:
+        """Make `item` no obstacle and `robot` one that free items stop."""
+        self._items[item].filter = _NOTHING
+        self._robots[robot].filter = _LADEN_ROBOT
+
+    def put_down(self, robot: int, item: int, x: float, y: float) -> None:
+        """Make `item` an obstacle at (x, y) [m] for the laden and `robot` an unladen one."""
+        self._robots[robot].filter = _EMPTY_ROBOT
+        self.place(item, x, y)
+
+    def take_away(self, robot: int) -> None:
+        """Make `robot` unladen; what it carried is gone."""
+        self._robots[robot].filter = _EMPTY_ROBOT
+
+    def place(self, item: int, x: float, y: float) -> None:
+        """Make `item` an obstacle at (x, y) [m] for the laden."""
+        shape = self._items[item]
+        shape.unsafe_set_offset((x, y))
+        shape.filter = _FREE_ITEM
+        self._space.reindex_shape(shape)
+
+    def remove(self, robot: int) -> None:
+        """Take `robot` out of everybody's way, for good."""
+        self._robots[robot].filter = _NOTHING
+
+    def _fetch(self) -> None:
+        # Emptied, it is filled from the start; it is just long enough, so it is never grown.
+        self._reader.clear()
+        batch.get_space_bodies(
+            self._space, batch.BodyFields.POSITION | batch.BodyFields.VELOCITY, self._reader
+        )
+
+    def _add_solids(self, scenario: Scenario, obstacles: NDArray[np.float64]) -> None:
+        body = self._space.static_body
+        left, bottom = -_WALL, -_WALL
+        right, top = scenario.warehouse_width + _WALL, scenario.warehouse_height + _WALL
+        corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+        solids: list[pymunk.Shape] = [
+            pymunk.Segment(body, corners[side], corners[(side + 1) % 4], _WALL)
+            for side in range(4)
+        ]
+        solids += [
+            pymunk.Circle(body, scenario.obstacle_radius, (float(x), float(y)))
+            for x, y in obstacles
+        ]
+        for solid in solids:
+            solid.filter = _SOLID_THING
+        self._space.add(*solids)
+
+    def _add_robots(
+        self, scenario: Scenario, position: NDArray[np.float64]
+    ) -> list[pymunk.Circle]:
+        shapes, controls, joints = [], [], []
+        for x, y in position:
+            body = pymunk.Body(scenario.robot_mass, float("inf"))
+            body.position = (float(x), float(y))
+            shape = pymunk.Circle(body, scenario.robot_radius)
+            shape.filter = _EMPTY_ROBOT
+            control = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+            joint = pymunk.PivotJoint(body, control, (0.0, 0.0), (0.0, 0.0))
+            joint.max_bias = 0.0
+            joint.max_force = scenario.robot_mass * scenario.max_acceleration
+            shapes.append(shape)
+            controls.append(control)
+            joints.append(joint)
+        self._space.add(*(shape.body for shape in shapes if shape.body), *controls)
+        self._space.add(*shapes, *joints)
+        return shapes
+
+    def _add_items(
+        self, scenario: Scenario, position: NDArray[np.float64]
+    ) -> list[pymunk.Circle]:
+        # All on the static body, moved by their offset: no body to integrate or to read.
+        shapes = [
+            pymunk.Circle(self._space.static_body, scenario.item_radius, (float(x), float(y)))
+            for x, y in position
+        ]
+        for shape in shapes:
+            shape.filter = _FREE_ITEM
+        self._space.add(*shapes)
+        return shapes
+
+
+def _buffer(array: NDArray[np.float64]) -> batch.Buffer:
+    # pymunk takes any memory for doubles and reads past the end of a wrong one without a word.
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise TypeError(f"a batch buffer should be contiguous float64, not {array.dtype}")
+    buffer = batch.Buffer()
+    buffer.set_float_buf(array)
+    return buffer

@@ -1,0 +1,288 @@
+"""What every robot senses: range scans, items in view, neighbours and the timers they tell.
+
+Compiled, and over cell grids, so that the cost is linear in the number of robots.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.warehouse.grid import cell_along
+from swarm_logistics_env.warehouse.state import NOBODY
+
+_TOUCH = 0.01  # [m], gap below which two things touch
+_ITEM_WIDTH = len(row.ITEM_FEATURES)
+_NEIGHBOUR_WIDTH = len(row.NEIGHBOUR_FEATURES)
+_BEAM_X = np.cos(2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
+_BEAM_Y = np.sin(2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
+_RANGE_ROBOTS, _RANGE_WALLS, _RANGE_ITEMS = row.RANGE_ROBOTS, row.RANGE_WALLS, row.RANGE_ITEMS
+_N_BEAMS, _N_ITEMS, _N_NEIGHBOURS = row.N_BEAMS, row.N_ITEMS_IN_VIEW, row.N_NEIGHBOURS
+_ITEMS, _NEIGHBOURS, _LOWEST = row.ITEMS, row.NEIGHBOURS, row.LOWEST_TIMER
+
+
+@kernel
+def scan_disc(
+    x: float,
+    y: float,
+    square: float,
+    radius: float,
+    scan: NDArray[np.float32],
+) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a disc at (x, y) in robot frame."""
+    clearance = square - radius * radius
+    if clearance <= 0.0:
+        scan[:] = 0.0
+        return
+    for beam in range(scan.shape[0]):
+        along = x * _BEAM_X[beam] + y * _BEAM_Y[beam]
+        if along > 0.0 and along * along > clearance:
+            distance = along - math.sqrt(along * along - clearance)
+            if distance < scan[beam]:
+                scan[beam] = distance
+
+
+@kernel
+def scan_walls(
+    x: float,
+    y: float,
+    cosine: float,
+    sine: float,
+    width: float,
+    height: float,
+    scan: NDArray[np.float32],
+) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall, for a robot at (x, y)."""
+    reach = scan[0]
+    if x > reach and y > reach and width - x > reach and height - y > reach:
+        return
+    for beam in range(scan.shape[0]):
+        along_x = _BEAM_X[beam] * cosine - _BEAM_Y[beam] * sine
+        along_y = _BEAM_X[beam] * sine + _BEAM_Y[beam] * cosine
+        distance = math.inf
+        if along_x != 0.0:
+            distance = ((width if along_x > 0.0 else 0.0) - x) / along_x
+        if along_y != 0.0:
+            distance = min(distance, ((height if along_y > 0.0 else 0.0) - y) / along_y)
+        if distance < scan[beam]:
+            scan[beam] = max(distance, 0.0)
+
+
+@kernel
+def insert_nearest(
+    square: float,
+    index: int,
+    squares: NDArray[np.float64],
+    indices: NDArray[np.int64],
+    count: int,
+) -> int:
+    """Insert into a list kept nearest first, at most its length; returns the new count."""
+    last = squares.shape[0]
+    if count == last and square >= squares[last - 1]:
+        return count
+    place = min(count, last - 1)
+    while place > 0 and squares[place - 1] > square:
+        squares[place] = squares[place - 1]
+        indices[place] = indices[place - 1]
+        place -= 1
+    squares[place] = square
+    indices[place] = index
+    return min(count + 1, last)
+
+
+@kernel
+def sense(
+    width: float,
+    height: float,
+    robot_radius: float,
+    item_radius: float,
+    obstacle_radius: float,
+    radio_range: float,
+    max_speed: float,
+    timer_limit: float,
+    requested: int,
+    present: NDArray[np.bool_],
+    position: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    heading: NDArray[np.float64],
+    robot_item: NDArray[np.int64],
+    memory: NDArray[np.int64],
+    timer: NDArray[np.float64],
+    told: NDArray[np.float64],
+    in_delivery: NDArray[np.bool_],
+    item_position: NDArray[np.float64],
+    obstacle_position: NDArray[np.float64],
+    ranger_range: NDArray[np.float64],
+    view_range: NDArray[np.float64],
+    sends: NDArray[np.bool_],
+    hears: NDArray[np.bool_],
+    failed: NDArray[np.bool_],
+    robot_cell: float,
+    robot_size: NDArray[np.int64],
+    robot_start: NDArray[np.int64],
+    robot_members: NDArray[np.int64],
+    item_cell: float,
+    item_size: NDArray[np.int64],
+    item_start: NDArray[np.int64],
+    item_members: NDArray[np.int64],
+    full_range: float,
+    contact: NDArray[np.bool_],
+    heard: NDArray[np.float64],
+    rows: NDArray[np.float32],
+) -> int:
+    """Fill the observation rows (N, N_COLUMNS), who touches something and what was heard.
+
+    Returns how many robots that have not failed touch one that has.
+    """
+    near_squares = np.empty(_N_NEIGHBOURS)
+    near = np.empty(_N_NEIGHBOURS, np.int64)
+    item_squares = np.empty(_N_ITEMS)
+    items = np.empty(_N_ITEMS, np.int64)
+    rows[:, :] = 0.0
+    n_anchored = 0
+    for me in range(position.shape[0]):
+        contact[me] = False
+        heard[me] = math.nan
+        if not present[me]:
+            continue
+        x, y = position[me, 0], position[me, 1]
+        cosine, sine = math.cos(heading[me]), math.sin(heading[me])
+        out = rows[me]
+        scan_robots = out[_RANGE_ROBOTS : _RANGE_ROBOTS + _N_BEAMS]
+        scan_solid = out[_RANGE_WALLS : _RANGE_WALLS + _N_BEAMS]
+        scan_items = out[_RANGE_ITEMS : _RANGE_ITEMS + _N_BEAMS]
+        sees_ranges = ranger_range[me] > 0.0
+        scan_robots[:] = ranger_range[me] if sees_ranges else full_range
+        scan_solid[:] = scan_robots[0]
+        scan_items[:] = scan_robots[0]
+
+        # Walls and obstacles.
+        touch = robot_radius + _TOUCH
+        touches = min(min(x, width - x), min(y, height - y)) < touch
+        if sees_ranges:
+            scan_walls(x, y, cosine, sine, width, height, scan_solid)
+        for other in range(obstacle_position.shape[0]):
+            dx, dy = obstacle_position[other, 0] - x, obstacle_position[other, 1] - y
+            square = dx * dx + dy * dy
+            touches = touches or square < (touch + obstacle_radius) ** 2
+            if sees_ranges and square < (ranger_range[me] + obstacle_radius) ** 2:
+                scan_disc(
+                    dx * cosine + dy * sine, dy * cosine - dx * sine,
+                    square, obstacle_radius, scan_solid,
+                )  # fmt: skip
+
+        # Robots: in the beams, heard on the radio, in view.
+        scan_square = (ranger_range[me] + robot_radius) ** 2 if sees_ranges else 0.0
+        view_square = view_range[me] ** 2
+        radio_square = radio_range**2
+        touch_square = (robot_radius + touch) ** 2
+        reach = max(max(ranger_range[me] + robot_radius, view_range[me]), radio_range)
+        lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
+        n_near, anchored = 0, False
+        left = cell_along(x - reach, robot_cell, robot_size[0])
+        right = cell_along(x + reach, robot_cell, robot_size[0])
+        for cells in range(
+            cell_along(y - reach, robot_cell, robot_size[1]),
+            cell_along(y + reach, robot_cell, robot_size[1]) + 1,
+        ):
+            first = robot_start[cells * robot_size[0] + left]
+            for index in range(first, robot_start[cells * robot_size[0] + right + 1]):
+                other = robot_members[index]
+                if other == me:
+                    continue
+                dx, dy = position[other, 0] - x, position[other, 1] - y
+                square = dx * dx + dy * dy
+                if square < scan_square:
+                    scan_disc(
+                        dx * cosine + dy * sine, dy * cosine - dx * sine,
+                        square, robot_radius, scan_robots,
+                    )  # fmt: skip
+                    if square < touch_square:
+                        touches = True
+                elif square < touch_square:
+                    touches = True
+                if square < touch_square and failed[other] and not failed[me]:
+                    anchored = True
+                is_heard = square <= radio_square and sends[other] and hears[me]
+                if is_heard and not math.isnan(told[other]):
+                    lower = told[other] < lowest_timer
+                    if lower or (told[other] == lowest_timer and square < lowest_square):
+                        lowest, lowest_square, lowest_timer = other, square, told[other]
+                if is_heard or square <= view_square:
+                    n_near = insert_nearest(square, other, near_squares, near, n_near)
+        n_anchored += anchored
+        for place in range(n_near):
+            other = near[place]
+            dx, dy = position[other, 0] - x, position[other, 1] - y
+            column = _NEIGHBOURS + place * _NEIGHBOUR_WIDTH
+            out[column] = 1.0
+            out[column + 1] = dx * cosine + dy * sine
+            out[column + 2] = dy * cosine - dx * sine
+            is_heard = near_squares[place] <= radio_square and sends[other] and hears[me]
+            tells = is_heard and not math.isnan(told[other])
+            out[column + 3] = 1.0 if tells else 0.0
+            out[column + 4] = told[other] if tells else timer_limit
+        if lowest != NOBODY:
+            dx, dy = position[lowest, 0] - x, position[lowest, 1] - y
+            heard[me] = lowest_timer
+            out[_LOWEST] = 1.0
+            out[_LOWEST + 1] = dx * cosine + dy * sine
+            out[_LOWEST + 2] = dy * cosine - dx * sine
+            out[_LOWEST + 3] = lowest_timer
+
+        # Free items: in the beams, in view, and in the way of a laden robot.
+        scan_square = (ranger_range[me] + item_radius) ** 2 if sees_ranges else 0.0
+        touch_square = (touch + item_radius) ** 2
+        reach = max(ranger_range[me] + item_radius, view_range[me])
+        n_items = 0
+        left = cell_along(x - reach, item_cell, item_size[0])
+        right = cell_along(x + reach, item_cell, item_size[0])
+        for cells in range(
+            cell_along(y - reach, item_cell, item_size[1]),
+            cell_along(y + reach, item_cell, item_size[1]) + 1,
+        ):
+            first = item_start[cells * item_size[0] + left]
+            for index in range(first, item_start[cells * item_size[0] + right + 1]):
+                item = item_members[index]
+                dx, dy = item_position[item, 0] - x, item_position[item, 1] - y
+                square = dx * dx + dy * dy
+                if square < scan_square:
+                    scan_disc(
+                        dx * cosine + dy * sine, dy * cosine - dx * sine,
+                        square, item_radius, scan_items,
+                    )  # fmt: skip
+                if square < touch_square and robot_item[me] != NOBODY:
+                    touches = True
+                if square <= view_square:
+                    n_items = insert_nearest(square, item, item_squares, items, n_items)
+        for place in range(n_items):
+            item = items[place]
+            dx, dy = item_position[item, 0] - x, item_position[item, 1] - y
+            column = _ITEMS + place * _ITEM_WIDTH
+            out[column] = 1.0
+            out[column + 1] = dx * cosine + dy * sine
+            out[column + 2] = dy * cosine - dx * sine
+            out[column + 3] = 1.0 if item == requested else 0.0
+            for held in range(memory.shape[1]):
+                if memory[me, held] == item:
+                    out[column + 4] = 1.0
+
+        # Itself.
+        contact[me] = touches
+        forward = velocity[me, 0] * cosine + velocity[me, 1] * sine
+        leftward = velocity[me, 1] * cosine - velocity[me, 0] * sine
+        runs = not math.isnan(timer[me])
+        carried = robot_item[me]
+        out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
+        out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and carried == requested else 0.0
+        out[row.IN_DELIVERY_AREA] = 1.0 if in_delivery[me] else 0.0
+        out[row.TIMER_RUNS] = 1.0 if runs else 0.0
+        out[row.TIMER] = timer[me] if runs else timer_limit
+        out[row.VELOCITY] = min(max(forward, -max_speed), max_speed)
+        out[row.VELOCITY + 1] = min(max(leftward, -max_speed), max_speed)
+        out[row.CONTACT] = 1.0 if touches else 0.0
+    return n_anchored
