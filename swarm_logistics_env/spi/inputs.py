@@ -1,0 +1,78 @@
+"""Checks of what callers pass in; each raises an IndicatorError that names field and value."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import TYPE_CHECKING, SupportsIndex
+
+import numpy as np
+
+from .errors import IndicatorError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+def performance(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Performance over seeds as a float array (n,): not empty, finite, not negative."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise IndicatorError(f"{name} = {values!r}: should be an array of numbers") from None
+    if array.ndim != 1:
+        raise IndicatorError(
+            f"{name} has shape {array.shape}: should be one performance per seed, shape (n,)"
+        )
+    if array.size == 0:
+        raise IndicatorError(f"{name} is empty: should hold one performance per seed")
+    for seed, value in enumerate(array.tolist()):
+        if not math.isfinite(value):
+            raise IndicatorError(f"{name}[{seed}] = {value}: should be finite")
+        if value < 0:
+            raise IndicatorError(f"{name}[{seed}] = {value:g}: should not be negative")
+    return array
+
+
+def same_seeds(**samples: NDArray[np.float64]) -> None:
+    """Raise unless all samples have one performance for each of the same seeds."""
+    if len({sample.size for sample in samples.values()}) > 1:
+        lengths = ", ".join(f"{name} has {sample.size}" for name, sample in samples.items())
+        raise IndicatorError(
+            f"unequal seed sets ({lengths}): paired samples need the same seeds in the same order; "
+            "pass paired=False for results that share no seeds"
+        )
+
+
+def positive_mean(name: str, sample: NDArray[np.float64]) -> None:
+    """Raise where the mean that the indicator divides by is 0."""
+    if not sample.any():
+        raise IndicatorError(
+            f"mean of {name} = 0: nothing was delivered in the reference, so no change relative "
+            "to it is defined"
+        )
+
+
+def count(name: str, value: SupportsIndex) -> int:
+    """A whole number of at least 1."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise IndicatorError(f"{name} = {value!r}: should be a whole number") from None
+    if number < 1:
+        raise IndicatorError(f"{name} = {number}: should be at least 1")
+    return number
+
+
+def finite(name: str, value: float) -> float:
+    """A finite number."""
+    if not math.isfinite(value):
+        raise IndicatorError(f"{name} = {value}: should be finite")
+    return float(value)
+
+
+def between_0_and_1(name: str, value: float) -> float:
+    """A number strictly between 0 and 1."""
+    if not 0.0 < value < 1.0:
+        raise IndicatorError(f"{name} = {value}: should lie between 0 and 1, both excluded")
+    return float(value)

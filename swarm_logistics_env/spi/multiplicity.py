@@ -1,0 +1,58 @@
+"""Error control over a declared family of verdicts (Holm 1979)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import IndicatorError
+from .estimate import verdict_at
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from .estimate import Estimate, Verdict
+
+
+def holm(p_values: ArrayLike) -> NDArray[np.float64]:
+    """Holm's adjusted p-values, in the order given, shape (k,).
+
+    Rejecting where the adjusted p < alpha keeps the chance of any false rejection in the family
+    below alpha, whatever the dependence.
+
+    Raises:
+        IndicatorError: Not one-dimensional, or a p outside [0, 1].
+    """
+    p = np.asarray(p_values, dtype=np.float64)
+    if p.ndim != 1:
+        raise IndicatorError(f"p_values has shape {p.shape}: should be one p per hypothesis")
+    for value in p.tolist():
+        if not 0.0 <= value <= 1.0:
+            raise IndicatorError(f"p_values holds {value}: should lie in [0, 1]")
+    order = np.argsort(p, kind="stable")
+    stepped = np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1))
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(stepped, 1.0)
+    return adjusted
+
+
+def adjust(estimates: Sequence[Estimate]) -> tuple[Verdict, ...]:
+    """Verdicts of one declared family (all modes x m of one indicator, say) under Holm.
+
+    In the order given. An estimate without a p (one seed) counts in the family and stays
+    inconclusive. The family-wise error is 1 - level.
+
+    Raises:
+        IndicatorError: The estimates' levels differ.
+    """
+    levels = sorted({estimate.level for estimate in estimates})
+    if len(levels) > 1:
+        raise IndicatorError(f"levels {levels} in one family: should be one level")
+    adjusted = holm([1.0 if e.p_value is None else e.p_value for e in estimates])
+    return tuple(
+        verdict_at(1.0 - estimate.level, p, estimate.probability)
+        for estimate, p in zip(estimates, adjusted.tolist(), strict=True)
+    )

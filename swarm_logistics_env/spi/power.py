@@ -1,0 +1,113 @@
+"""What a study of n seeds can find, and how many seeds a named effect needs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from .errors import IndicatorError
+from .inputs import between_0_and_1, finite
+
+if TYPE_CHECKING:
+    from .estimate import Estimate
+
+MAX_SEEDS = 1_000_000
+
+
+def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float | None:
+    """Distance from the threshold that the estimate's own number of seeds finds with `power`.
+
+    In units of the indicator; the same on both sides, by two one-sided tests of (1 - level)/2.
+    None where `no_plan_because` says why.
+
+    Raises:
+        IndicatorError: power outside (0, 1) or not above the tests' own (1 - level)/2.
+    """
+    _check_power(estimate, power)
+    sd, df = estimate.difference_sd, estimate.degrees_of_freedom
+    if not sd or df is None:
+        return None
+    return (
+        _noncentrality(df, estimate.level, power)
+        * sd
+        / math.sqrt(estimate.n_seeds)
+        / estimate.mean_denominator
+    )
+
+
+def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> int | None:
+    """Seeds that a verdict needs if the indicator truly is `effect`.
+
+    The spread is the estimate's; the effect is to be named from elsewhere (the paper's value, or
+    the least one that matters), never the one just observed. Where unpaired: seeds per sample.
+
+    Args:
+        estimate: The pilot, from at least two seeds.
+        effect: Assumed true value of the indicator, in its units, not the distance to threshold.
+        power: Wanted probability of the verdict, in (0, 1).
+
+    Returns:
+        The smallest n >= 2; None where `no_plan_because` says why.
+
+    Raises:
+        IndicatorError: effect not finite; power outside (0, 1) or not above (1 - level)/2.
+    """
+    _check_power(estimate, power)
+    sd, pilot_df = estimate.difference_sd, estimate.degrees_of_freedom
+    if sd is None or pilot_df is None or no_plan_because(estimate, effect) is not None:
+        return None
+    # Noncentrality of one seed; that of n is sqrt(n) times it.
+    shift = abs(effect - estimate.threshold) * estimate.mean_denominator / sd
+
+    def enough(n: int) -> bool:
+        # Welch's degrees of freedom grow with n - 1, as the paired ones do.
+        df = pilot_df * (n - 1) / (estimate.n_seeds - 1)
+        return _power(df, shift * math.sqrt(n), estimate.level) >= power
+
+    high = 2
+    while not enough(high):
+        high *= 2
+    low = high // 2  # one too few, or 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high
+
+
+def no_plan_because(estimate: Estimate, effect: float) -> str | None:
+    """Why no number of seeds can be named for `effect`; None where one can."""
+    finite("effect", effect)
+    if estimate.difference_sd is None:
+        return "one seed shows no spread between seeds"
+    if estimate.difference_sd == 0.0:
+        return "the runs show no spread between seeds"
+    if effect == estimate.threshold:
+        return f"an effect of {effect:g} lies at the threshold: no number of seeds finds it"
+    # Large samples need (z_level + z_power)^2 sd^2 / distance^2 seeds, about 8 at 80 %.
+    distance = abs(effect - estimate.threshold) * estimate.mean_denominator
+    if 8.0 * (estimate.difference_sd / distance) ** 2 > MAX_SEEDS:
+        return f"an effect of {effect:g} needs more than {MAX_SEEDS:,} seeds"
+    return None
+
+
+def _check_power(estimate: Estimate, power: float) -> None:
+    between_0_and_1("power", power)
+    if power <= (1.0 - estimate.level) / 2:
+        raise IndicatorError(
+            f"power = {power}: should exceed the one-sided level {(1.0 - estimate.level) / 2:g}"
+        )
+
+
+def _power(df: float, noncentrality: float, level: float) -> float:
+    """Chance of a verdict on the right side by the one-sided t-test of (1 - level)/2."""
+    from scipy.special import nctdtr, stdtrit
+
+    return 1.0 - float(nctdtr(df, noncentrality, float(stdtrit(df, 0.5 + level / 2))))
+
+
+def _noncentrality(df: float, level: float, power: float) -> float:
+    """Noncentrality at which the one-sided test of (1 - level)/2 has the wanted power."""
+    from scipy.special import nctdtrinc, stdtrit
+
+    critical = float(stdtrit(df, 0.5 + level / 2))
+    return float(nctdtrinc(df, 1.0 - power, critical))

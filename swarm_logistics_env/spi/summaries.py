@@ -1,0 +1,113 @@
+"""Raw performance P over seeds: intervals, robust means, and the comparison of two samples."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .inputs import between_0_and_1, performance, same_seeds
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+class Interval(NamedTuple):
+    """A value and its interval; the limits are None at n = 1, where nothing is known of them."""
+
+    value: float
+    low: float | None
+    high: float | None
+
+
+def mean_interval(p: ArrayLike, level: float = 0.95) -> Interval:
+    """Mean performance with its t-interval [items], n - 1 degrees of freedom.
+
+    Raises:
+        IndicatorError: p empty, negative or not finite; level outside (0, 1).
+    """
+    return _t_interval(p, level, of_one_run=False)
+
+
+def prediction_interval(p: ArrayLike, level: float = 0.95) -> Interval:
+    """Mean performance with the interval of one further run [items]: mean -+ t sd sqrt(1 + 1/n).
+
+    A single published run is to be compared with this one, not with `mean_interval`.
+
+    Raises:
+        IndicatorError: p empty, negative or not finite; level outside (0, 1).
+    """
+    return _t_interval(p, level, of_one_run=True)
+
+
+def interquartile_mean(p: ArrayLike) -> float:
+    """Mean without the lowest and the highest floor(n/4) seeds [items].
+
+    Raises:
+        IndicatorError: p empty, negative or not finite.
+    """
+    ascending = np.sort(performance("p", p))
+    cut = ascending.size // 4
+    return float(ascending[cut : ascending.size - cut].mean())
+
+
+def worst_decile(p: ArrayLike) -> float:
+    """Mean of the worst tenth of the seeds, rounded up to whole seeds [items].
+
+    Raises:
+        IndicatorError: p empty, negative or not finite.
+    """
+    ascending = np.sort(performance("p", p))
+    return float(ascending[: math.ceil(ascending.size / 10)].mean())
+
+
+def probability_of_improvement(p_o: ArrayLike, p_new: ArrayLike, level: float = 0.95) -> Interval:
+    """Share of seeds on which P_new > P_o, ties counting half, with Wilson's interval.
+
+    Raises:
+        IndicatorError: A sample empty, negative or not finite, unequal seed sets; level outside
+            (0, 1).
+    """
+    from scipy.special import ndtri
+
+    between_0_and_1("level", level)
+    before, after = performance("p_o", p_o), performance("p_new", p_new)
+    same_seeds(p_o=before, p_new=after)
+    share = float(np.mean((after > before) + 0.5 * (after == before)))
+    n = before.size
+    if n == 1:
+        return Interval(share, None, None)
+    z2 = float(ndtri(0.5 + level / 2)) ** 2
+    # Ties make the scores less variable than Wilson's 0 or 1: the interval is never too short.
+    centre = (share + z2 / (2 * n)) / (1 + z2 / n)
+    half = math.sqrt(z2 * (share * (1 - share) / n + z2 / (4 * n * n))) / (1 + z2 / n)
+    return Interval(share, max(0.0, centre - half), min(1.0, centre + half))
+
+
+def pairing_correlation(p_a: ArrayLike, p_b: ArrayLike) -> float | None:
+    """Pearson correlation of two samples over shared seeds, in [-1, 1]: what pairing achieved.
+
+    None below three seeds (it is -1 or 1 at two) or where a sample is constant.
+
+    Raises:
+        IndicatorError: A sample empty, negative or not finite, or unequal seed sets.
+    """
+    a, b = performance("p_a", p_a), performance("p_b", p_b)
+    same_seeds(p_a=a, p_b=b)
+    if a.size < 3 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+        return None
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def _t_interval(p: ArrayLike, level: float, *, of_one_run: bool) -> Interval:
+    from scipy.special import stdtrit
+
+    between_0_and_1("level", level)
+    sample = performance("p", p)
+    n, mean = sample.size, float(sample.mean())
+    if n == 1:
+        return Interval(mean, None, None)
+    spread = float(sample.std(ddof=1)) * math.sqrt(1 / n + of_one_run)
+    half = float(stdtrit(n - 1, 0.5 + level / 2)) * spread
+    return Interval(mean, mean - half, mean + half)

@@ -1,0 +1,123 @@
+"""The same ratio from samples that share no seeds: Welch's degrees of freedom, inverted exactly."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .ratio import ROUNDING, RatioTest
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+
+class Term(NamedTuple):
+    """One sample of performances and its weights in numerator and denominator of the ratio."""
+
+    sample: NDArray[np.float64]
+    in_num: float
+    in_den: float
+
+
+class _Difference(NamedTuple):
+    """mean(D), its squared standard error and Welch's degrees of freedom at one value of theta."""
+
+    mean: float
+    variance: float
+    degrees_of_freedom: float
+
+
+def unpaired_ratio(
+    terms: Sequence[Term],
+    *,
+    offset: float = 0.0,
+    threshold: float = 0.0,
+    level: float = 0.95,
+) -> RatioTest:
+    """Interval and test of theta from independent samples of at least two seeds each.
+
+    D = sum over samples of (in_num - theta in_den) mean: the variance of each sample enters once,
+    with its whole weight, which is Fieller's form with cov(num, den) = -var(P_o)/n_o times the
+    numerator's weight (0 for fault tolerance). The interval holds every theta that the Welch test
+    at theta keeps, so that verdict and interval agree at any threshold.
+    """
+    from scipy.special import stdtr
+
+    mean_den = sum(term.in_den * float(term.sample.mean()) for term in terms)
+    value = sum(term.in_num * float(term.sample.mean()) for term in terms) / mean_den
+    null = threshold - offset
+    at_null = _difference(terms, null)
+    scale = sum(
+        (abs(term.in_num) + abs(null * term.in_den)) * float(term.sample.max()) for term in terms
+    )
+    degenerate = math.sqrt(at_null.variance) <= ROUNDING * scale
+    if degenerate:
+        difference = 0.0 if abs(at_null.mean) <= ROUNDING * scale else at_null.mean
+        statistic = math.copysign(math.inf, difference) if difference else 0.0
+        low, high = value, value
+        # No spread leaves no Welch formula; the smallest sample bounds it from below.
+        df = float(min(term.sample.size for term in terms) - 1)
+    else:
+        statistic = at_null.mean / math.sqrt(at_null.variance)
+        df = at_null.degrees_of_freedom
+        low, high = _limits(terms, value, mean_den, 0.5 + level / 2)
+    n = min(term.sample.size for term in terms)
+    return RatioTest(
+        value=np.asarray(value + offset),
+        low=np.asarray(low + offset),
+        high=np.asarray(high + offset),
+        probability=np.asarray(stdtr(df, statistic)),
+        p_value=np.asarray(2.0 * stdtr(df, -abs(statistic))),
+        difference_sd=np.asarray(0.0 if degenerate else math.sqrt(at_null.variance * n)),
+        mean_denominator=np.asarray(mean_den),
+        degrees_of_freedom=df,
+        degenerate=np.asarray(degenerate),
+        unbounded=np.asarray(math.isinf(low)),
+    )
+
+
+def _difference(terms: Sequence[Term], theta: float) -> _Difference:
+    mean, variance, welch = 0.0, 0.0, 0.0
+    for sample, in_num, in_den in terms:
+        weight = in_num - theta * in_den
+        share = weight**2 * float(sample.var(ddof=1)) / sample.size
+        mean += weight * float(sample.mean())
+        variance += share
+        welch += share**2 / (sample.size - 1)
+    return _Difference(mean, variance, variance**2 / welch if welch > 0.0 else math.inf)
+
+
+def _limits(
+    terms: Sequence[Term], value: float, mean_den: float, quantile: float
+) -> tuple[float, float]:
+    from scipy.optimize import brentq
+    from scipy.special import stdtrit
+
+    def outside(theta: float) -> float:
+        """Positive where the test at theta rejects."""
+        mean, variance, df = _difference(terms, theta)
+        if variance == 0.0:
+            return abs(mean)
+        return abs(mean) - float(stdtrit(df, quantile)) * math.sqrt(variance)
+
+    # Far out only the denominator's sample is left; the interval ends if its mean is clear of 0.
+    far = _difference([Term(sample, in_den, 0.0) for sample, _, in_den in terms], 0.0)
+    if far.variance > 0.0 and mean_den <= float(
+        stdtrit(far.degrees_of_freedom, quantile)
+    ) * math.sqrt(far.variance):
+        return -math.inf, math.inf
+    spread = math.sqrt(_difference(terms, value).variance) / mean_den
+    if spread == 0.0:
+        return value, value
+
+    def limit(side: int) -> float:
+        inner, step = value, spread
+        while outside(value + side * step) <= 0.0:
+            inner, step = value + side * step, 2.0 * step
+        return float(brentq(outside, inner, value + side * step, xtol=1e-12))
+
+    return limit(-1), limit(1)
