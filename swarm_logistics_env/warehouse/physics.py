@@ -52,9 +52,8 @@ class Physics:
         self._items = self._add_items(scenario, item_position)
         # A batch call reads and writes every body, in order of insertion: N robots, N controls, and
         # the static body last.
-        self._read = np.zeros((2 * self._n + 1, 4))
-        self._written = np.zeros((2 * self._n + 1, 2))
-        self._reader, self._writer = _buffer(self._read), _buffer(self._written)
+        self._read, self._reader = _buffer(2 * self._n + 1, 4)
+        self._written, self._writer = _buffer(2 * self._n + 1, 2)
         self.position = self._read[: self._n, 0:2]  # (N, 2) [m], a view, new after each advance
         self.velocity = self._read[: self._n, 2:4]  # (N, 2) [m/s], likewise
         self.wanted_velocity = self._written[self._n : -1]  # (N, 2) [m/s], to be filled before it
@@ -97,7 +96,6 @@ class Physics:
         self._robots[robot].filter = _NOTHING
 
     def _fetch(self) -> None:
-        # Emptied, it is filled from the start; it is just long enough, so it is never grown.
         self._reader.clear()
         batch.get_space_bodies(
             self._space, batch.BodyFields.POSITION | batch.BodyFields.VELOCITY, self._reader
@@ -154,10 +152,10 @@ class Physics:
         return shapes
 
 
-def _buffer(array: NDArray[np.float64]) -> batch.Buffer:
-    # pymunk takes any memory for doubles and reads past the end of a wrong one without a word.
-    if array.dtype != np.float64 or not array.flags.c_contiguous:
-        raise TypeError(f"a batch buffer should be contiguous float64, not {array.dtype}")
+def _buffer(rows: int, columns: int) -> tuple[NDArray[np.float64], batch.Buffer]:
+    # pymunk trusts the memory it is given. One number to spare: it replaces, with memory of its
+    # own, a buffer that what it reads would fill.
+    memory = np.zeros(rows * columns + 1)
     buffer = batch.Buffer()
-    buffer.set_float_buf(array)
-    return buffer
+    buffer.set_float_buf(memory)
+    return memory[:-1].reshape(rows, columns), buffer

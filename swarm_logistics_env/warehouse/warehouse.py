@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError
+from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import layout, logistics
@@ -37,7 +37,7 @@ class Warehouse:
 
     def __init__(self, scenario: Scenario | None = None) -> None:
         self.scenario = scenario or Scenario()
-        self.reset(seed=0)
+        self.state = empty_state(self.scenario)
 
     def reset(
         self,
@@ -64,7 +64,7 @@ class Warehouse:
         state.robot_position, state.robot_heading = layout.place_robots(
             scenario, seed, state.obstacle_position
         )
-        self.scenario, self.state, self.seed = scenario, state, seed
+        self.scenario, self.state, self._seed = scenario, state, seed
         self.faults, self._struck = tuple(faults), struck
         self._fault_times = sorted({time for fault in faults for time in fault.changes()})
         self._order = layout.request_order(scenario, seed)
@@ -92,6 +92,8 @@ class Warehouse:
         Raises:
             CommandError: wrong shape, not numbers, or not finite; the world is as it was.
         """
+        if not hasattr(self, "_physics"):
+            raise SetupError("step before reset: call reset(seed) first")
         given = self._checked(commands)
         state, scenario = self.state, self.scenario
         np.logical_and(state.robot_present, state.obeys, out=self._able)
@@ -117,6 +119,11 @@ class Warehouse:
     def observe(self) -> NDArray[np.float32]:
         """Return what every robot senses now: (N, N_COLUMNS) float32, absent robots zeros."""
         return self._rows.copy()
+
+    @property
+    def struck_robots(self) -> tuple[int, ...]:
+        """The robots that any fault of this episode names, ascending."""
+        return tuple(sorted({int(robot) for robots in self._struck for robot in robots}))
 
     @property
     def all_delivered(self) -> bool:
@@ -206,7 +213,7 @@ class Warehouse:
         if place == 0:
             if not self.scenario.restock:
                 return NOBODY
-            self._order = layout.request_order(self.scenario, self.seed, cycle)
+            self._order = layout.request_order(self.scenario, self._seed, cycle)
         return int(self._order[place])
 
     def _restock(self, item: int) -> None:
@@ -218,7 +225,7 @@ class Warehouse:
             ]
         )
         place = layout.place_restocked(
-            self.scenario, self.seed, state.delivered, taken, state.obstacle_position
+            self.scenario, self._seed, state.delivered, taken, state.obstacle_position
         )
         state.item_status[item] = STORED
         state.item_position[item] = place

@@ -1,0 +1,10 @@
+"""Policies: whatever turns observations into commands.
+
+`load(name)` makes one; a class of one's own needs `reset` and `act` (see `Policy`).
+"""
+
+from swarm_logistics_env.policies.loading import NAMES, identity, load
+from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.policies.swarm_dt import SwarmDT, SwarmDTParameters
+
+__all__ = ["NAMES", "Policy", "SwarmDT", "SwarmDTParameters", "identity", "load"]

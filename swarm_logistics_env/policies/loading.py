@@ -1,0 +1,113 @@
+"""Policies by name, and what names a policy's behaviour."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import inspect
+import json
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from swarm_logistics_env.errors import PolicyError, suggest
+from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.records import Record
+
+ENTRY_POINTS = "swarm_logistics_env.policies"
+
+NAMES: dict[str, Callable[..., Policy]] = {
+    "swarm-dt": SwarmDT,
+    "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
+    # Swarm D-T without its taxis: the ablation.
+    "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
+}
+
+
+def load(name: str, **parameters: Any) -> Policy:
+    """Return the policy called `name`.
+
+    Args:
+        name: one of `NAMES`, a name that an installed package declares in the entry-point group
+            `swarm_logistics_env.policies`, or "package.module:Class". Naming a class imports, and
+            so executes, its module.
+        parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
+
+    Raises:
+        PolicyError: there is no such policy, or it does not take these parameters.
+    """
+    make = NAMES.get(name) or _declared(name) or _imported(name)
+    if make is None:
+        known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
+        raise PolicyError(f"no policy {name!r}{suggest(name, known)}, or 'package.module:Class'")
+    try:
+        policy = make(**parameters)
+    except TypeError as error:
+        raise PolicyError(f"policy {name!r} cannot be made: {error}") from None
+    if not isinstance(policy, Policy):
+        raise PolicyError(f"{name!r} is no policy: it should have the methods reset and act")
+    return policy
+
+
+def identity(policy: Policy) -> str:
+    """Return text that changes whenever the policy's behaviour may have changed.
+
+    Its own `identity` where it has one; else its class, its `parameters`, and a digest of the
+    source of its module (of this package's policies together, which build on one another).
+    """
+    own = getattr(policy, "identity", None)
+    if own is not None:
+        return str(own)
+    kind = type(policy)
+    parameters = getattr(policy, "parameters", {})
+    if isinstance(parameters, Record):
+        parameters = parameters.model_dump(mode="json")
+    return json.dumps(
+        {
+            "class": f"{kind.__module__}:{kind.__qualname__}",
+            "parameters": parameters,
+            "source": _source_digest(kind),
+        },
+        sort_keys=True,
+        default=repr,
+    )
+
+
+def _declared(name: str) -> Callable[..., Policy] | None:
+    for point in entry_points(group=ENTRY_POINTS, name=name):
+        made: Callable[..., Policy] = point.load()
+        return made
+    return None
+
+
+def _imported(name: str) -> Callable[..., Policy] | None:
+    module, colon, attribute = name.partition(":")
+    if not colon:
+        return None
+    try:
+        found: Any = importlib.import_module(module)
+        for part in attribute.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise PolicyError(f"policy {name!r} cannot be imported: {error}") from None
+    if not callable(found):
+        raise PolicyError(f"policy {name!r} is a {type(found).__name__}: should be a class")
+    made: Callable[..., Policy] = found
+    return made
+
+
+@functools.cache
+def _source_digest(kind: type) -> str:
+    here = Path(__file__).parent
+    try:
+        file = Path(inspect.getfile(kind))
+    except (TypeError, OSError):
+        return ""
+    files = sorted(here.glob("*.py")) if file.is_relative_to(here) else [file]
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,55 @@
+"""What a policy is: the one interface between whatever decides and the warehouse."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.state import WarehouseState
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """Decides for all robots at once, one row a robot; a class with these two methods is one.
+
+    A policy may also have
+
+    * `needs_state = True`: `act` gets the WarehouseState as a second argument (a central
+      controller that sees everything);
+    * `configure(scenario)`: called before `reset`, for what a robot's maker writes into it, such
+      as its control period;
+    * `identity`: text that names everything its behaviour depends on (see `identity`).
+    """
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode of `n_robots` rows; what is random follows from `seed` and the row."""
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return commands (N, 4) in [-1, 1] for observation rows (N, D)."""
+
+
+def start(policy: Policy, scenario: Scenario, seed: int) -> None:
+    """Tell `policy` of an episode that begins."""
+    configure = getattr(policy, "configure", None)
+    if configure is not None:
+        configure(scenario)
+    policy.reset(scenario.n_robots, seed)
+
+
+def decide(
+    policy: Policy, observations: NDArray[np.float32], state: WarehouseState
+) -> NDArray[np.float64]:
+    """Return the commands of `policy`, with the state for those that need it.
+
+    Raises:
+        PolicyError: it returned something other than finite numbers of shape (N, >= 4).
+    """
+    if getattr(policy, "needs_state", False):
+        commands = policy.act(observations, state)  # type: ignore[call-arg]
+    else:
+        commands = policy.act(observations)
+    return commands

@@ -1,0 +1,198 @@
+"""Swarm Diffusion-Taxis: the scripted swarm of the paper, from observation rows alone.
+
+The paper describes it in a paragraph; its full description and code are not public, so what
+follows beyond that paragraph is inferred, and each parameter says from where.
+
+SEARCH (empty): random walk, avoiding robots and walls, lifting what comes into reach.
+SHUFFLE (another item than the requested one): the same, avoiding items too, and putting it down
+at random moments. DELIVER (the requested item): never puts it down; where a neighbour tells its
+timer, moves towards the one that tells the lowest.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat
+
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
+from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.records import Record
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.streams import row_keys
+
+
+class SwarmDTParameters(Record):
+    """The constants of Swarm D-T.
+
+    Sources: "paper"; "simulator" is the paper's author's public early simulator; "fitted" and
+    "measured": chosen because they bring the paper's tables closest.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+
+    diffusion: NonNegativeFloat = Field(
+        1.39, description="of the stored heading [rad^2/s]: U(+-0.5 rad) each 0.06 s; simulator"
+    )
+    avoidance_gain: NonNegativeFloat = Field(
+        2.0, description="away from each near robot, in top speeds at distance 0; fitted"
+    )
+    avoidance_range: NonNegativeFloat = Field(0.5, description="[m]; fitted")
+    wall_distance: NonNegativeFloat = Field(
+        0.2, description="reflects the stored heading at a wall nearer than this [m]; measured"
+    )
+    taxis_gain: NonNegativeFloat = Field(
+        0.75, description="towards the lowest timer heard, in top speeds; fitted"
+    )
+    drop_rate: NonNegativeFloat = Field(
+        1.5, description="of an item that is not requested [1/s]; simulator"
+    )
+    heading_follows: bool = Field(
+        False, description="whether avoidance and taxis turn the stored heading; inferred: no"
+    )
+
+
+class SwarmDT:
+    """Swarm Diffusion-Taxis with the given parameters (see `SwarmDTParameters`).
+
+    Raises:
+        PolicyError: a parameter is unknown or out of range.
+
+    Example:
+        >>> policy = SwarmDT(taxis_gain=0.5)
+        >>> policy.reset(n_robots=3, seed=0)
+        >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
+        (3, 4)
+    """
+
+    def __init__(self, **parameters: float) -> None:
+        self.parameters = SwarmDTParameters(**parameters)
+        self._control_period = Scenario().control_period
+        self.reset(0, 0)
+
+    def configure(self, scenario: Scenario) -> None:
+        """Take the control period, which a robot's maker knows; nothing of the surroundings."""
+        self._control_period = scenario.control_period
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode with random stored headings."""
+        self._keys = row_keys(seed, "swarm D-T", n_robots)
+        self._heading = np.full(n_robots, np.nan)
+        self._step = 0
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return commands (N, 4) for observation rows (N, D)."""
+        if observations.shape[0] != self._heading.shape[0]:
+            raise PolicyError(
+                f"observations of {observations.shape[0]} robots: reset was told "
+                f"{self._heading.shape[0]}"
+            )
+        commands = np.empty((observations.shape[0], 4))
+        parameters, period = self.parameters, self._control_period
+        decide_swarm_dt(
+            observations,
+            self._keys,
+            self._step,
+            math.sqrt(3.0 * parameters.diffusion * period),
+            -math.expm1(-parameters.drop_rate * period),
+            parameters.avoidance_gain,
+            parameters.avoidance_range,
+            parameters.wall_distance,
+            parameters.taxis_gain,
+            parameters.heading_follows,
+            self._heading,
+            commands,
+        )
+        self._step += 1
+        return commands
+
+
+@kernel
+def decide_swarm_dt(
+    observations: NDArray[np.float32],
+    keys: NDArray[np.uint64],
+    step: int,
+    widest_turn: float,
+    drop_probability: float,
+    avoidance_gain: float,
+    avoidance_range: float,
+    wall_distance: float,
+    taxis_gain: float,
+    heading_follows: bool,
+    heading: NDArray[np.float64],
+    commands: NDArray[np.float64],
+) -> None:
+    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading."""
+    for robot in range(observations.shape[0]):
+        sensed = observations[robot]
+        carries = sensed[row.CARRYING] > 0.5
+        delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+
+        if math.isnan(heading[robot]):
+            heading[robot] = (2.0 * uniform(keys[robot], 0) - 1.0) * math.pi
+        drawn = uniform(keys[robot], 2 * step + 1)
+        heading[robot] += widest_turn * (2.0 * drawn - 1.0)
+        x, y = math.cos(heading[robot]), math.sin(heading[robot])
+
+        walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
+        nearest = np.argmin(walls)
+        if walls[nearest] < wall_distance:
+            towards = 2.0 * math.pi * nearest / row.N_BEAMS
+            wall_x, wall_y = math.cos(towards), math.sin(towards)
+            approach = x * wall_x + y * wall_y
+            if approach > 0.0:
+                x -= 2.0 * approach * wall_x
+                y -= 2.0 * approach * wall_y
+                heading[robot] = math.atan2(y, x)
+
+        push_x, push_y = avoid(
+            sensed, row.NEIGHBOURS, row.N_NEIGHBOURS, avoidance_gain, avoidance_range
+        )
+        x += push_x
+        y += push_y
+        if carries:
+            push_x, push_y = avoid(
+                sensed, row.ITEMS, row.N_ITEMS_IN_VIEW, avoidance_gain, avoidance_range
+            )
+            x += push_x
+            y += push_y
+        if delivers and sensed[row.LOWEST_TIMER] > 0.5:
+            lead_x, lead_y = sensed[row.LOWEST_TIMER + 1], sensed[row.LOWEST_TIMER + 2]
+            distance = math.sqrt(lead_x * lead_x + lead_y * lead_y)
+            if distance > 0.0:
+                x += taxis_gain * lead_x / distance
+                y += taxis_gain * lead_y / distance
+        if heading_follows:
+            heading[robot] = math.atan2(y, x)
+
+        norm = max(math.sqrt(x * x + y * y), 1.0)
+        commands[robot, 0] = x / norm
+        commands[robot, 1] = y / norm
+        commands[robot, 2] = 0.0
+        lets_go = carries and not delivers and uniform(keys[robot], 2 * step + 2) < drop_probability
+        commands[robot, 3] = -1.0 if lets_go else 1.0
+
+
+@kernel
+def avoid(
+    sensed: NDArray[np.float32], first: int, count: int, gain: float, reach: float
+) -> tuple[float, float]:
+    """Return the push away from the things in a block of (present, x, y, ..) columns."""
+    push_x, push_y = 0.0, 0.0
+    for place in range(count):
+        column = first + 5 * place
+        if sensed[column] < 0.5:
+            break
+        x, y = sensed[column + 1], sensed[column + 2]
+        distance = math.sqrt(x * x + y * y)
+        if distance >= reach:
+            break
+        if distance > 0.0:
+            push = gain * (1.0 - distance / reach) / distance
+            push_x -= push * x
+            push_y -= push * y
+    return push_x, push_y
