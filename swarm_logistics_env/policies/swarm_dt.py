@@ -12,7 +12,7 @@ timer, moves towards the one that tells the lowest.
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,7 @@ class SwarmDT:
         (3, 4)
     """
 
-    def __init__(self, **parameters: float) -> None:
+    def __init__(self, **parameters: Any) -> None:
         self.parameters = SwarmDTParameters(**parameters)
         self._control_period = Scenario().control_period
         self.reset(0, 0)

@@ -149,9 +149,7 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
             )
         return chosen
     if fault.robots > n_robots:
-        raise FaultError(
-            f"Fault.robots = {fault.robots}: should be at most n_robots = {n_robots}"
-        )
+        raise FaultError(f"Fault.robots = {fault.robots}: should be at most n_robots = {n_robots}")
     # Ranked by a key of seed and robot alone: nested in m, the same for every mode and any N.
     order = np.argsort(row_keys(seed, "faulty robots", n_robots), kind="stable")
     return np.sort(order[: fault.robots]).astype(np.int64)

@@ -132,7 +132,7 @@ def strew(
                 break
         else:
             return disc
-    return keys.shape[0]
+    return len(keys)
 
 
 @kernel

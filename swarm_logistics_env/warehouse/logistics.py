@@ -199,7 +199,7 @@ def deliver(
     item_status[requested] = DELIVERED
     item_carrier[requested] = NOBODY
     memory[:, :] = NOBODY
-    return robot
+    return int(robot)
 
 
 @kernel
@@ -231,7 +231,9 @@ def run_timers(
                 timer[robot] = elapsed
         value = timer[robot]
         if gossip and heard[robot] + period < limit - 1e-9:
-            value = heard[robot] + period if math.isnan(value) else min(value, heard[robot] + period)
+            value = (
+                heard[robot] + period if math.isnan(value) else min(value, heard[robot] + period)
+            )
         told[robot] = value
         if present[robot] and not honest[robot]:
             told[robot] = 0.0

@@ -107,8 +107,7 @@ class Physics:
         right, top = scenario.warehouse_width + _WALL, scenario.warehouse_height + _WALL
         corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
         solids: list[pymunk.Shape] = [
-            pymunk.Segment(body, corners[side], corners[(side + 1) % 4], _WALL)
-            for side in range(4)
+            pymunk.Segment(body, corners[side], corners[(side + 1) % 4], _WALL) for side in range(4)
         ]
         solids += [
             pymunk.Circle(body, scenario.obstacle_radius, (float(x), float(y)))
@@ -118,9 +117,7 @@ class Physics:
             solid.filter = _SOLID_THING
         self._space.add(*solids)
 
-    def _add_robots(
-        self, scenario: Scenario, position: NDArray[np.float64]
-    ) -> list[pymunk.Circle]:
+    def _add_robots(self, scenario: Scenario, position: NDArray[np.float64]) -> list[pymunk.Circle]:
         shapes, controls, joints = [], [], []
         for x, y in position:
             body = pymunk.Body(scenario.robot_mass, float("inf"))
@@ -138,9 +135,7 @@ class Physics:
         self._space.add(*shapes, *joints)
         return shapes
 
-    def _add_items(
-        self, scenario: Scenario, position: NDArray[np.float64]
-    ) -> list[pymunk.Circle]:
+    def _add_items(self, scenario: Scenario, position: NDArray[np.float64]) -> list[pymunk.Circle]:
         # All on the static body, moved by their offset: no body to integrate or to read.
         shapes = [
             pymunk.Circle(self._space.static_body, scenario.item_radius, (float(x), float(y)))

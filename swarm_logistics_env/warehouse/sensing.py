@@ -91,7 +91,7 @@ def insert_nearest(
         place -= 1
     squares[place] = square
     indices[place] = index
-    return min(count + 1, last)
+    return min(count + 1, len(squares))
 
 
 @kernel

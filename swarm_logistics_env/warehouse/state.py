@@ -53,12 +53,13 @@ class WarehouseState:
     time: float = 0.0  # [s]
     requested: int = 0  # the item asked for now, or NOBODY when all are delivered
     delivery_times: list[float] = field(default_factory=list)  # [s], ascending
+    delivered_by: list[int] = field(default_factory=list)  # robot, one per delivery
     anchoring_seconds: float = 0.0  # robot-seconds of working robots touching failed ones
 
     @property
     def n_robots(self) -> int:
         """Rows of robots, absent ones included."""
-        return self.robot_position.shape[0]
+        return len(self.robot_position)
 
     @property
     def delivered(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -48,7 +47,7 @@ class Warehouse:
         """Begin an episode and return the first observations (N, N_COLUMNS).
 
         Args:
-            seed: decides layout, requests, start poses and which robots fail, and nothing else does.
+            seed: alone decides layout, requests, start poses and which robots fail.
             faults: what will befall whom and when; several may befall one robot.
             scenario: from now on, instead of the one before.
 
@@ -84,7 +83,7 @@ class Warehouse:
         Args:
             commands: (N, 4), columns `COMMAND_COLUMNS`, each in [-1, 1] (beyond is cut): forward
                 and left in fractions of the top speed, turn in fractions of the top turn rate,
-                gripper > 0.5 hold, < -0.5 open, between as it is. Rows of absent robots are ignored.
+                gripper > 0.5 hold, < -0.5 open, between as it is. Absent robots' rows are ignored.
 
         Returns:
             Observations (N, N_COLUMNS) float32, a fresh array.
@@ -204,6 +203,7 @@ class Warehouse:
                 return
             self._physics.take_away(robot)
             state.delivery_times.append(state.time)
+            state.delivered_by.append(robot)
             if self.scenario.restock:
                 self._restock(item)
             state.requested = self._next_request()
