@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from .bootstrap import studentised_bootstrap
+from .efficiency import karp_flatt, marginal_gain, per_robot_efficiency
 from .errors import IndicatorError
 from .estimate import Estimate, Verdict
+from .fault_budget import FaultBudget, fault_budget
 from .indicators import (
     adaptability,
     fault_tolerance,
@@ -14,6 +16,9 @@ from .indicators import (
 )
 from .multiplicity import adjust, holm
 from .power import minimum_detectable_effect, no_plan_because, seeds_for_power
+from .resilience import SelfRepair, resilience_index, self_repair
+from .scaling import ScalingFit, compare_scaling, fit_scaling
+from .sequential import LookVerdict, look_levels, verdict_at_look
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -23,27 +28,44 @@ from .summaries import (
     probability_of_improvement,
     worst_decile,
 )
+from .survival import SurvivalCurve, kaplan_meier
 
 __all__ = [
     "Estimate",
+    "FaultBudget",
     "IndicatorError",
     "Interval",
+    "LookVerdict",
+    "ScalingFit",
+    "SelfRepair",
+    "SurvivalCurve",
     "Verdict",
     "adaptability",
     "adjust",
+    "compare_scaling",
+    "fault_budget",
     "fault_tolerance",
+    "fit_scaling",
     "holm",
     "interquartile_mean",
+    "kaplan_meier",
+    "karp_flatt",
+    "look_levels",
+    "marginal_gain",
     "mean_interval",
     "minimum_detectable_effect",
     "no_plan_because",
     "pairing_correlation",
+    "per_robot_efficiency",
     "prediction_interval",
     "probability_of_improvement",
     "relative_change",
+    "resilience_index",
     "robustness",
     "scalability",
     "seeds_for_power",
+    "self_repair",
     "studentised_bootstrap",
+    "verdict_at_look",
     "worst_decile",
 ]

@@ -62,7 +62,7 @@ def studentised_bootstrap(
     flat = sd <= rounding
     pivot = np.where(
         flat,
-        np.where(np.abs(mean) <= rounding, 0.0, np.sign(mean) * np.inf),
+        np.where(np.abs(mean) <= rounding, 0.0, np.copysign(np.inf, mean)),
         np.sqrt(n) * mean / np.where(flat, 1.0, sd),
     )
     tail = (1.0 - level) / 2

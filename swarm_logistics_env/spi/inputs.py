@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 
 
 def performance(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Performance over seeds as a float array (n,): not empty, finite, not negative."""
+    """Performances as a float array (n,): not empty, finite, not negative."""
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise IndicatorError(f"{name} = {values!r}: should be an array of numbers") from None
     if array.ndim != 1:
         raise IndicatorError(
-            f"{name} has shape {array.shape}: should be one performance per seed, shape (n,)"
+            f"{name} has shape {array.shape}: should be one number per seed (or size), shape (n,)"
         )
     if array.size == 0:
-        raise IndicatorError(f"{name} is empty: should hold one performance per seed")
+        raise IndicatorError(f"{name} is empty: should hold one number per seed (or size)")
     for seed, value in enumerate(array.tolist()):
         if not math.isfinite(value):
             raise IndicatorError(f"{name}[{seed}] = {value}: should be finite")

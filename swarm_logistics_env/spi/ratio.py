@@ -64,10 +64,11 @@ def paired_ratio(
     degenerate = np.ptp(difference, axis=-1) <= rounding
     sd = np.where(degenerate, 0.0, sd)
     # Without spread only the sign of the difference is left, and a difference of rounding is none.
-    sign = np.where(np.abs(mean_difference) <= rounding, 0.0, np.sign(mean_difference))
+    sign_alone = np.where(
+        np.abs(mean_difference) <= rounding, 0.0, np.copysign(np.inf, mean_difference)
+    )
     standard_error = np.where(degenerate, 1.0, sd) / np.sqrt(df + 1)
-    statistic = np.where(degenerate, sign * np.inf, mean_difference / standard_error)
-    statistic = np.where(degenerate & (sign == 0.0), 0.0, statistic)
+    statistic = np.where(degenerate, sign_alone, mean_difference / standard_error)
     return RatioTest(
         value=value + offset,
         low=np.where(degenerate, value, low) + offset,

@@ -1,0 +1,273 @@
+"""Laws of performance against swarm size, and the size N* beyond which robots cost deliveries."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .errors import IndicatorError
+from .inputs import between_0_and_1, performance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Curve = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+Law = Literal["usl", "power_exponential"]
+Weighting = Literal["1/P", "none"]
+
+LAWS: tuple[Law, ...] = ("usl", "power_exponential")
+_FARTHEST = 1e6  # a limit of N* this many times off the estimate is none
+
+
+@dataclass(frozen=True, slots=True)
+class ScalingFit:
+    """One law fitted to performance against swarm size.
+
+    Attributes:
+        law: "usl", P = g N / (1 + a (N-1) + b N (N-1)), or "power_exponential",
+            P = k N^p exp(-q N).
+        parameters: g, a, b or k, p, q; P in items.
+        peak: N* [robots], where P is largest; None where the fitted law has no peak.
+        peak_low: Lower limit of N* from the profile of the residual sum; None without a peak,
+            0 where the data set no lower limit.
+        peak_high: Its upper limit; inf where the data set none.
+        level: Confidence level of that interval.
+        weighting: "1/P" minimises the sum of residual^2 / P, "none" that of residual^2. N* moves
+            with it, so it is never to be quoted without.
+        residual_sum: The sum that was minimised.
+        aicc: Corrected Akaike criterion, comparable between laws on the same data and weighting;
+            None at five sizes or fewer, where the correction is undefined.
+    """
+
+    law: Law
+    parameters: dict[str, float]
+    peak: float | None
+    peak_low: float | None
+    peak_high: float | None
+    level: float
+    weighting: Weighting
+    residual_sum: float
+    aicc: float | None
+
+    def predict(self, sizes: ArrayLike) -> NDArray[np.float64]:
+        """Performance [items] that the law gives at swarm sizes [robots]."""
+        values = np.array(list(self.parameters.values()))
+        return _CURVES[self.law](values, np.asarray(sizes, dtype=np.float64))
+
+
+def fit_scaling(
+    sizes: ArrayLike,
+    p: ArrayLike,
+    *,
+    law: Law = "usl",
+    weighting: Weighting = "1/P",
+    level: float = 0.95,
+) -> ScalingFit:
+    """Fit one law to mean performance at each swarm size (Gunther 2007 for the USL).
+
+    Args:
+        sizes: Swarm sizes N [robots], shape (k,), k >= 4, distinct, positive.
+        p: Performance at each size [items], mean over seeds, shape (k,).
+        law: Which law.
+        weighting: Weight of each squared residual: 1/P (counts: their variance grows with them) or
+            none.
+        level: Confidence level of the interval of N*, in (0, 1).
+
+    Raises:
+        IndicatorError: Unequal lengths, fewer than four sizes, a size not positive or repeated, a P
+            not finite or negative, P = 0 under 1/P, an unknown law or weighting, or no convergence.
+    """
+    between_0_and_1("level", level)
+    if law not in LAWS:
+        raise IndicatorError(f"law = {law!r}: should be one of {', '.join(LAWS)}")
+    n, observed = _checked(sizes, p, weighting)
+    weights = 1.0 / np.sqrt(observed) if weighting == "1/P" else np.ones_like(observed)
+
+    start = (_usl_start if law == "usl" else _power_exponential_start)(n, observed)
+    fitted, residual_sum = _least_squares(_CURVES[law], start, n, observed, weights)
+    peak = _peak(law, fitted)
+    low, high = None, None
+    if peak is not None:
+        low, high = _peak_limits(law, fitted, peak, residual_sum, n, observed, weights, level)
+    names = ("g", "a", "b") if law == "usl" else ("k", "p", "q")
+    return ScalingFit(
+        law=law,
+        parameters=dict(zip(names, fitted.tolist(), strict=True)),
+        peak=peak,
+        peak_low=low,
+        peak_high=high,
+        level=level,
+        weighting=weighting,
+        residual_sum=residual_sum,
+        aicc=_aicc(residual_sum, n.size),
+    )
+
+
+def compare_scaling(
+    sizes: ArrayLike, p: ArrayLike, *, weighting: Weighting = "1/P", level: float = 0.95
+) -> tuple[ScalingFit, ...]:
+    """Both laws on the same data, the one with the smaller AICc (or residual sum) first.
+
+    Raises:
+        IndicatorError: As `fit_scaling`.
+    """
+    fits = [fit_scaling(sizes, p, law=law, weighting=weighting, level=level) for law in LAWS]
+    # Both have three parameters: where AICc is undefined the residual sum gives the same order.
+    return tuple(sorted(fits, key=lambda fit: fit.residual_sum))
+
+
+def _checked(
+    sizes: ArrayLike, p: ArrayLike, weighting: Weighting
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    n, observed = performance("sizes", sizes), performance("p", p)
+    if n.size != observed.size:
+        raise IndicatorError(f"{n.size} sizes, {observed.size} performances: should be as many")
+    if n.size < 4:
+        raise IndicatorError(f"{n.size} sizes: should be at least 4 to fit three parameters")
+    if n.min() <= 0.0 or np.unique(n).size < n.size:
+        raise IndicatorError(f"sizes = {n.tolist()}: should be positive, each once")
+    if weighting not in ("1/P", "none"):
+        raise IndicatorError(f"weighting = {weighting!r}: should be one of 1/P, none")
+    if weighting == "1/P" and observed.min() == 0.0:
+        raise IndicatorError('p holds 0 under weighting "1/P": its weight is infinite; use "none"')
+    if not observed.any():
+        raise IndicatorError("p = 0 at every size: should hold some delivery")
+    return n, observed
+
+
+def _usl(parameters: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.float64]:
+    g, a, b = parameters.tolist()
+    return g * n / (1.0 + a * (n - 1.0) + b * n * (n - 1.0))
+
+
+def _power_exponential(
+    parameters: NDArray[np.float64], n: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    k, p, q = parameters.tolist()
+    return k * n**p * np.exp(-q * n)
+
+
+_CURVES: dict[Law, Curve] = {"usl": _usl, "power_exponential": _power_exponential}
+
+
+def _usl_start(n: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[np.float64]:
+    # N/P is linear in 1/g, a/g, b/g; weighted back to the scale of P.
+    positive = observed > 0.0
+    n, observed = n[positive], observed[positive]
+    design = np.stack([np.ones_like(n), n - 1.0, n * (n - 1.0)], axis=1)
+    weight = observed**1.5 / n
+    inverse, *_ = np.linalg.lstsq(design * weight[:, np.newaxis], n / observed * weight, rcond=None)
+    if inverse[0] <= 0.0:
+        return np.array([observed[0] / n[0], 0.01, 1e-4])
+    scale = float(inverse[0])
+    return np.array([1.0 / scale, inverse[1] / scale, inverse[2] / scale])
+
+
+def _power_exponential_start(
+    n: NDArray[np.float64], observed: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    positive = observed > 0.0
+    n, observed = n[positive], observed[positive]
+    design = np.stack([np.ones_like(n), np.log(n), -n], axis=1)
+    weight = np.sqrt(observed)
+    (log_k, p, q), *_ = np.linalg.lstsq(
+        design * weight[:, np.newaxis], np.log(observed) * weight, rcond=None
+    )
+    return np.array([math.exp(log_k), p, q])
+
+
+def _least_squares(
+    curve: Curve,
+    start: NDArray[np.float64],
+    n: NDArray[np.float64],
+    observed: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], float]:
+    from scipy.optimize import least_squares
+
+    def residuals(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        with np.errstate(all="ignore"):  # the search may step where the law has no value
+            predicted = curve(parameters, n)
+        return np.where(np.isfinite(predicted), (observed - predicted) * weights, 1e6)
+
+    found = least_squares(residuals, start, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    if not found.success:
+        raise IndicatorError(f"no law fits sizes {n.tolist()}, p {observed.tolist()}")
+    return np.asarray(found.x), 2.0 * float(found.cost)
+
+
+def _peak(law: Law, parameters: NDArray[np.float64]) -> float | None:
+    _, second, third = parameters.tolist()
+    if law == "usl":
+        return math.sqrt((1.0 - second) / third) if third > 0.0 and second < 1.0 else None
+    return second / third if third > 0.0 and second > 0.0 else None
+
+
+def _with_peak_at(law: Law, peak: float) -> Curve:
+    """The law with its peak held: the two parameters left are the first, and b or p by its log."""
+
+    def curve(free: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.float64]:
+        first, rest = float(free[0]), float(np.exp(free[1]))
+        if law == "usl":
+            return _usl(np.array([first, 1.0 - rest * peak**2, rest]), n)
+        return _power_exponential(np.array([first, rest, rest / peak]), n)
+
+    return curve
+
+
+def _peak_limits(
+    law: Law,
+    fitted: NDArray[np.float64],
+    peak: float,
+    residual_sum: float,
+    n: NDArray[np.float64],
+    observed: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    level: float,
+) -> tuple[float, float]:
+    """Every N* whose best fit is not worse than the best of all by an F-test at `level`."""
+    from scipy.optimize import brentq
+    from scipy.special import stdtrit
+
+    total = float(np.square(observed * weights).sum())
+    if residual_sum <= 1e-18 * total:  # the law fits exactly
+        return peak, peak
+    df = n.size - 3
+    allowed = residual_sum * (1.0 + float(stdtrit(df, 0.5 + level / 2)) ** 2 / df)
+    shape = float(fitted[2] if law == "usl" else fitted[1])
+
+    def excess(log_peak: float) -> float:
+        held = math.exp(log_peak)
+        curve = _with_peak_at(law, held)
+        # Held elsewhere, b shrinks with the square of N*, so that a keeps its size.
+        rest = shape * (peak / held) ** 2 if law == "usl" else shape
+        start = np.array([float(fitted[0]), math.log(rest)])
+        return _least_squares(curve, start, n, observed, weights)[1] - allowed
+
+    def limit(side: int) -> float:
+        centre, step = math.log(peak), 0.05
+        inner = centre
+        while step < math.log(_FARTHEST):
+            outer = centre + side * step
+            if excess(outer) > 0.0:
+                return math.exp(float(brentq(excess, inner, outer, xtol=1e-6)))
+            inner, step = outer, 2.0 * step
+        return math.inf if side > 0 else 0.0
+
+    return limit(-1), limit(1)
+
+
+def _aicc(residual_sum: float, points: int) -> float | None:
+    parameters = 4  # three of the law and the residual variance
+    if points <= parameters + 1:
+        return None
+    if residual_sum == 0.0:
+        return -math.inf
+    correction = 2.0 * parameters * (parameters + 1) / (points - parameters - 1)
+    return points * math.log(residual_sum / points) + 2.0 * parameters + correction

@@ -1,0 +1,115 @@
+"""Looks at a growing study: levels that keep the declared error (O'Brien-Fleming type spending)."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .errors import IndicatorError
+from .estimate import verdict_at
+from .inputs import between_0_and_1, count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from .estimate import Estimate, Verdict
+
+_REACH = 9.0  # standard deviations that the integration grid covers
+_GRID = 801  # its points: the boundaries are then right to five digits
+
+
+class LookVerdict(NamedTuple):
+    """A verdict at one look: the level it was taken at, and whether that look was declared."""
+
+    verdict: Verdict
+    alpha: float
+    exploratory: bool
+
+
+def look_levels(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
+    """Two-sided p below which to stop at each declared look, in order.
+
+    Lan and DeMets' (1983) spending function of O'Brien-Fleming type, on both sides, with the share
+    of the final number of seeds as information. The levels of a single look are (alpha,).
+
+    Args:
+        looks: Numbers of seeds at which the study is looked at, rising.
+        alpha: Chance of any false verdict over all looks, in (0, 1).
+
+    Raises:
+        IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1).
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    between_0_and_1("alpha", alpha)
+    seeds = [count("look", look) for look in looks]
+    if not seeds or any(later <= earlier for earlier, later in pairwise(seeds)):
+        raise IndicatorError(f"looks = {tuple(looks)}: should be rising numbers of seeds")
+
+    # The sum process is Brownian motion on [0, 1]; `density` is that of paths not stopped so far,
+    # on the points of the last look, where they start.
+    points, density, weights = np.zeros(1), np.ones(1), np.ones(1)
+    levels, information, spent = [], 0.0, 0.0
+    for look in seeds:
+        now = look / seeds[-1]
+        step = math.sqrt(now - information)
+        to_spend = _spent(now, alpha) - spent
+
+        def stopped(
+            boundary: float,
+            to_spend: float = to_spend,
+            step: float = step,
+            start: NDArray[np.float64] = points,
+            mass: NDArray[np.float64] = weights * density,
+        ) -> float:
+            """Chance of a first crossing here, over both sides, less what may be spent."""
+            return 2.0 * float((mass * ndtr((start - boundary) / step)).sum()) - to_spend
+
+        reach = _REACH * math.sqrt(now)
+        boundary = reach if stopped(reach) >= 0.0 else float(brentq(stopped, 0.0, reach))
+        levels.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
+        start, mass = points, weights * density
+        points = np.linspace(-boundary, boundary, _GRID)
+        steps = (points[:, np.newaxis] - start) / step
+        density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
+        weights = _simpson(points)
+        information, spent = now, spent + to_spend
+    return tuple(levels)
+
+
+def verdict_at_look(estimate: Estimate, looks: Sequence[int]) -> LookVerdict:
+    """Judge an estimate at the look that its number of seeds is.
+
+    At a number of seeds that was not declared the verdict is taken at the full level and marked
+    exploratory: nothing bounds the error of stopping where the data please.
+
+    Raises:
+        IndicatorError: Looks as for `look_levels`.
+    """
+    alpha = 1.0 - estimate.level
+    levels = dict(zip(looks, look_levels(looks, alpha), strict=True))
+    declared = levels.get(estimate.n_seeds)
+    at = alpha if declared is None else declared
+    return LookVerdict(
+        verdict_at(at, estimate.p_value, estimate.probability), at, exploratory=declared is None
+    )
+
+
+def _spent(information: float, alpha: float) -> float:
+    """Error spent, over both sides, when `information` in (0, 1] of the seeds are in."""
+    from scipy.special import ndtr, ndtri
+
+    return 4.0 * float(ndtr(ndtri(alpha / 4.0) / math.sqrt(information)))
+
+
+def _simpson(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    weights = np.full(points.size, 2.0)
+    weights[1::2] = 4.0
+    weights[[0, -1]] = 1.0
+    return weights * (float(points[1] - points[0]) / 3.0)
