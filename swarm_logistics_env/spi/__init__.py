@@ -16,8 +16,9 @@ from .indicators import (
 )
 from .multiplicity import adjust, holm
 from .power import minimum_detectable_effect, no_plan_because, seeds_for_power
-from .resilience import SelfRepair, resilience_index, self_repair
+from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
+from .self_repair import SelfRepair, self_repair
 from .sequential import LookVerdict, look_levels, verdict_at_look
 from .summaries import (
     Interval,

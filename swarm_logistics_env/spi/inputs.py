@@ -11,6 +11,8 @@ import numpy as np
 from .errors import IndicatorError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
 
@@ -76,3 +78,18 @@ def between_0_and_1(name: str, value: float) -> float:
     if not 0.0 < value < 1.0:
         raise IndicatorError(f"{name} = {value}: should lie between 0 and 1, both excluded")
     return float(value)
+
+
+def delivery_times(name: str, runs: Sequence[ArrayLike]) -> list[NDArray[np.float64]]:
+    """Delivery times [s] of each seed, ascending: at least one seed, finite, not negative."""
+    if len(runs) == 0:
+        raise IndicatorError(f"{name} is empty: should hold the delivery times of each seed")
+    checked = []
+    for seed, run in enumerate(runs):
+        times = np.asarray(run, dtype=np.float64)
+        if times.ndim != 1 or not np.isfinite(times).all() or (times < 0.0).any():
+            raise IndicatorError(
+                f"{name}[{seed}] = {run!r}: should be delivery times in s, finite, not negative"
+            )
+        checked.append(np.sort(times))
+    return checked

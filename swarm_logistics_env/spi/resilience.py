@@ -1,15 +1,12 @@
-"""Faults that begin during the run: what is delivered afterwards, and how long repair takes."""
+"""Faults that begin during the run: what is delivered afterwards, against a reference."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, finite
+from .inputs import delivery_times, finite
 from .judgement import judge
 from .unpaired import Term
 
@@ -19,12 +16,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .estimate import Estimate
-
-# Pooled curves scatter: asked for the whole reference, no swarm would ever be repaired. With 20
-# seeds of 0.08 deliveries/s this share leaves a null limit of about 300 s; a share of 0.8 would
-# leave 100 s, but call a lasting loss of a quarter repaired in two studies of three.
-RECOVERED = 0.9
-_STEP = 1.0  # s, grid on which the rates are compared
 
 
 def resilience_index(
@@ -56,7 +47,7 @@ def resilience_index(
     finite("onset", onset)
 
     def after_onset(name: str, runs: Sequence[ArrayLike]) -> NDArray[np.float64]:
-        times = _delivery_times(name, runs)
+        times = delivery_times(name, runs)
         return np.array([np.count_nonzero(run > onset) for run in times], dtype=np.float64)
 
     return judge(
@@ -71,151 +62,3 @@ def resilience_index(
         paired=True,
         bootstrap=bootstrap,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class SelfRepair:
-    """Self-repair time over seeds, beside what the same statistic makes of no fault at all.
-
-    Attributes:
-        seconds: From the onset until the rate is back for a whole window [s]; None: censored, it
-            never was within `followed`.
-        low: Lower limit of the bootstrap interval over seeds [s]; inf: resamples never recover.
-        high: Upper limit [s]; inf where the interval reaches into censoring.
-        followed: Longest self-repair time that the runs could have shown [s].
-        null_seconds: The same statistic of the pair without faults [s]; None: censored.
-        null_limit: 95 % quantile of the null over resampled seeds [s]; inf where censored.
-        distinguishable: Whether the time exceeds `null_limit`; where not, it measures noise.
-    """
-
-    seconds: float | None
-    low: float
-    high: float
-    followed: float
-    null_seconds: float | None
-    null_limit: float
-    distinguishable: bool
-
-    @property
-    def censored(self) -> bool:
-        """Whether the rate never came back within the runs."""
-        return self.seconds is None
-
-
-def self_repair(
-    faulty: Sequence[ArrayLike],
-    reference: Sequence[ArrayLike],
-    null_pair: tuple[Sequence[ArrayLike], Sequence[ArrayLike]],
-    *,
-    onset: float,
-    end: float,
-    generator: np.random.Generator,
-    window: float = 100.0,
-    level: float = 0.95,
-    resamples: int = 2_000,
-) -> SelfRepair:
-    """Self-repair time of delivery rates pooled over seeds, against the paired reference.
-
-    The first time after the onset from which the rate in the trailing window stays at or above
-    `RECOVERED` times the reference's for one whole window; 0 where it never falls behind. The
-    trailing window delays every recovery by up to its own length, in the null as well.
-
-    Args:
-        faulty: Delivery times [s] of each seed's run with faults.
-        reference: Delivery times [s] of the same seeds' reference runs.
-        null_pair: Two sets of runs without faults, of shared seeds but for the behaviour.
-        onset: When the faults begin [s].
-        end: When all runs end [s]; they must not run out of items before.
-        generator: Only source of randomness: resamples whole seeds.
-        window: Length of the trailing window [s].
-        level: Confidence level of the bootstrap interval, in (0, 1).
-        resamples: Number of resamples.
-
-    Raises:
-        IndicatorError: Unequal numbers of seeds within a pair, no seeds, no window's time between
-            onset + window and end, or no delivery at all in a reference.
-    """
-    between_0_and_1("level", level)
-    if not (window > 0.0 and onset >= 0.0 and onset + window < end < math.inf):
-        raise IndicatorError(
-            f"onset = {onset}, window = {window}, end = {end}: should leave more than one window "
-            "between onset and end"
-        )
-    grid = np.arange(onset, end + _STEP / 2, _STEP)
-    hold = math.ceil(window / _STEP)
-
-    def observed_and_resampled(
-        runs: Sequence[ArrayLike], others: Sequence[ArrayLike], names: tuple[str, str]
-    ) -> tuple[float, NDArray[np.float64]]:
-        lead = _windowed(names[0], runs, grid, window, end)
-        other = _windowed(names[1], others, grid, window, end)
-        if len(lead) != len(other):
-            raise IndicatorError(
-                f"unequal seed sets ({names[0]} has {len(lead)}, {names[1]} has {len(other)}): "
-                "should be the same seeds in the same order"
-            )
-        if not other.any():
-            raise IndicatorError(f"{names[1]}: should deliver something after the onset")
-        behind = lead - RECOVERED * other
-        n = len(lead)
-        drawn = generator.integers(n, size=(resamples, n))
-        times_drawn = (drawn[:, :, np.newaxis] == np.arange(n)).sum(axis=1)
-        observed = float(_first_hold(behind.sum(axis=0)[np.newaxis], hold)[0])
-        return observed, _first_hold(times_drawn @ behind, hold)
-
-    repair, resampled = observed_and_resampled(faulty, reference, ("faulty", "reference"))
-    null, null_resampled = observed_and_resampled(*null_pair, ("null_pair[0]", "null_pair[1]"))
-    tail = (1.0 - level) / 2
-    low, high = _quantiles(resampled, tail, 1.0 - tail)
-    (null_limit,) = _quantiles(null_resampled, 0.95)
-    return SelfRepair(
-        seconds=None if math.isinf(repair) else repair,
-        low=low,
-        high=high,
-        followed=(grid.size - 1 - hold) * _STEP,
-        null_seconds=None if math.isinf(null) else null,
-        null_limit=null_limit,
-        distinguishable=repair > null_limit,
-    )
-
-
-def _windowed(
-    name: str, runs: Sequence[ArrayLike], grid: NDArray[np.float64], window: float, end: float
-) -> NDArray[np.float64]:
-    """Deliveries in the window that trails each point of the grid, shape (seeds, points)."""
-    rows = []
-    for seed, times in enumerate(_delivery_times(name, runs)):
-        if times.size and times[-1] > end:
-            raise IndicatorError(
-                f"{name}[{seed}] delivers at {times[-1]:g} s: should not be after end = {end:g} s"
-            )
-        until = np.searchsorted(times, grid, side="right")
-        rows.append(until - np.searchsorted(times, grid - window, side="right"))
-    return np.array(rows, dtype=np.float64)
-
-
-def _first_hold(behind: NDArray[np.float64], hold: int) -> NDArray[np.float64]:
-    """Seconds after which each row of (rows, points) stays at or above 0 for `hold` steps."""
-    failures = np.cumsum(behind < -1e-9, axis=1)
-    before = np.concatenate([np.zeros((len(behind), 1), dtype=failures.dtype), failures], axis=1)
-    held = before[:, hold + 1 :] == before[:, : -hold - 1]
-    return np.where(held.any(axis=1), held.argmax(axis=1) * _STEP, np.inf)
-
-
-def _quantiles(seconds: NDArray[np.float64], *shares: float) -> list[float]:
-    # method: no average of a time and an infinite (censored) one
-    return [float(q) for q in np.quantile(seconds, shares, method="inverted_cdf")]
-
-
-def _delivery_times(name: str, runs: Sequence[ArrayLike]) -> list[NDArray[np.float64]]:
-    if len(runs) == 0:
-        raise IndicatorError(f"{name} is empty: should hold the delivery times of each seed")
-    checked = []
-    for seed, run in enumerate(runs):
-        times = np.asarray(run, dtype=np.float64)
-        if times.ndim != 1 or not np.isfinite(times).all() or (times < 0.0).any():
-            raise IndicatorError(
-                f"{name}[{seed}] = {run!r}: should be delivery times in s, finite, not negative"
-            )
-        checked.append(np.sort(times))
-    return checked

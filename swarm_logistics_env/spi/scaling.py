@@ -10,18 +10,16 @@ import numpy as np
 
 from .errors import IndicatorError
 from .inputs import between_0_and_1, performance
+from .scaling_laws import CURVES, peak_of, power_exponential_start, usl_start, with_peak_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
 
-    Curve = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+    from .scaling_laws import Curve, Law
 
-Law = Literal["usl", "power_exponential"]
+
 Weighting = Literal["1/P", "none"]
 
-LAWS: tuple[Law, ...] = ("usl", "power_exponential")
 _FARTHEST = 1e6  # a limit of N* this many times off the estimate is none
 
 
@@ -58,7 +56,7 @@ class ScalingFit:
     def predict(self, sizes: ArrayLike) -> NDArray[np.float64]:
         """Performance [items] that the law gives at swarm sizes [robots]."""
         values = np.array(list(self.parameters.values()))
-        return _CURVES[self.law](values, np.asarray(sizes, dtype=np.float64))
+        return CURVES[self.law](values, np.asarray(sizes, dtype=np.float64))
 
 
 def fit_scaling(
@@ -84,14 +82,14 @@ def fit_scaling(
             not finite or negative, P = 0 under 1/P, an unknown law or weighting, or no convergence.
     """
     between_0_and_1("level", level)
-    if law not in LAWS:
-        raise IndicatorError(f"law = {law!r}: should be one of {', '.join(LAWS)}")
+    if law not in CURVES:
+        raise IndicatorError(f"law = {law!r}: should be one of {', '.join(CURVES)}")
     n, observed = _checked(sizes, p, weighting)
     weights = 1.0 / np.sqrt(observed) if weighting == "1/P" else np.ones_like(observed)
 
-    start = (_usl_start if law == "usl" else _power_exponential_start)(n, observed)
-    fitted, residual_sum = _least_squares(_CURVES[law], start, n, observed, weights)
-    peak = _peak(law, fitted)
+    start = (usl_start if law == "usl" else power_exponential_start)(n, observed)
+    fitted, residual_sum = _least_squares(CURVES[law], start, n, observed, weights)
+    peak = peak_of(law, fitted)
     low, high = None, None
     if peak is not None:
         low, high = _peak_limits(law, fitted, peak, residual_sum, n, observed, weights, level)
@@ -117,7 +115,7 @@ def compare_scaling(
     Raises:
         IndicatorError: As `fit_scaling`.
     """
-    fits = [fit_scaling(sizes, p, law=law, weighting=weighting, level=level) for law in LAWS]
+    fits = [fit_scaling(sizes, p, law=law, weighting=weighting, level=level) for law in CURVES]
     # Both have three parameters: where AICc is undefined the residual sum gives the same order.
     return tuple(sorted(fits, key=lambda fit: fit.residual_sum))
 
@@ -141,47 +139,6 @@ def _checked(
     return n, observed
 
 
-def _usl(parameters: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.float64]:
-    g, a, b = parameters.tolist()
-    return g * n / (1.0 + a * (n - 1.0) + b * n * (n - 1.0))
-
-
-def _power_exponential(
-    parameters: NDArray[np.float64], n: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    k, p, q = parameters.tolist()
-    return k * n**p * np.exp(-q * n)
-
-
-_CURVES: dict[Law, Curve] = {"usl": _usl, "power_exponential": _power_exponential}
-
-
-def _usl_start(n: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[np.float64]:
-    # N/P is linear in 1/g, a/g, b/g; weighted back to the scale of P.
-    positive = observed > 0.0
-    n, observed = n[positive], observed[positive]
-    design = np.stack([np.ones_like(n), n - 1.0, n * (n - 1.0)], axis=1)
-    weight = observed**1.5 / n
-    inverse, *_ = np.linalg.lstsq(design * weight[:, np.newaxis], n / observed * weight, rcond=None)
-    if inverse[0] <= 0.0:
-        return np.array([observed[0] / n[0], 0.01, 1e-4])
-    scale = float(inverse[0])
-    return np.array([1.0 / scale, inverse[1] / scale, inverse[2] / scale])
-
-
-def _power_exponential_start(
-    n: NDArray[np.float64], observed: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    positive = observed > 0.0
-    n, observed = n[positive], observed[positive]
-    design = np.stack([np.ones_like(n), np.log(n), -n], axis=1)
-    weight = np.sqrt(observed)
-    (log_k, p, q), *_ = np.linalg.lstsq(
-        design * weight[:, np.newaxis], np.log(observed) * weight, rcond=None
-    )
-    return np.array([math.exp(log_k), p, q])
-
-
 def _least_squares(
     curve: Curve,
     start: NDArray[np.float64],
@@ -200,25 +157,6 @@ def _least_squares(
     if not found.success:
         raise IndicatorError(f"no law fits sizes {n.tolist()}, p {observed.tolist()}")
     return np.asarray(found.x), 2.0 * float(found.cost)
-
-
-def _peak(law: Law, parameters: NDArray[np.float64]) -> float | None:
-    _, second, third = parameters.tolist()
-    if law == "usl":
-        return math.sqrt((1.0 - second) / third) if third > 0.0 and second < 1.0 else None
-    return second / third if third > 0.0 and second > 0.0 else None
-
-
-def _with_peak_at(law: Law, peak: float) -> Curve:
-    """The law with its peak held: the two parameters left are the first, and b or p by its log."""
-
-    def curve(free: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.float64]:
-        first, rest = float(free[0]), float(np.exp(free[1]))
-        if law == "usl":
-            return _usl(np.array([first, 1.0 - rest * peak**2, rest]), n)
-        return _power_exponential(np.array([first, rest, rest / peak]), n)
-
-    return curve
 
 
 def _peak_limits(
@@ -244,7 +182,7 @@ def _peak_limits(
 
     def excess(log_peak: float) -> float:
         held = math.exp(log_peak)
-        curve = _with_peak_at(law, held)
+        curve = with_peak_at(law, held)
         # Held elsewhere, b shrinks with the square of N*, so that a keeps its size.
         rest = shape * (peak / held) ** 2 if law == "usl" else shape
         start = np.array([float(fitted[0]), math.log(rest)])
