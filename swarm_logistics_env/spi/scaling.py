@@ -10,7 +10,7 @@ import numpy as np
 
 from .errors import IndicatorError
 from .inputs import between_0_and_1, performance
-from .scaling_laws import CURVES, peak_of, power_exponential_start, usl_start, with_peak_at
+from .scaling_laws import CURVES, peak_of, power_exponential_start, shapes_with_peak_at, usl_start
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Weighting = Literal["1/P", "none"]
 
-_FARTHEST = 1e6  # a limit of N* this many times off the estimate is none
+_FARTHEST = 1e6  # an upper limit of N* this many times the estimate is none
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ def fit_scaling(
     peak = peak_of(law, fitted)
     low, high = None, None
     if peak is not None:
-        low, high = _peak_limits(law, fitted, peak, residual_sum, n, observed, weights, level)
+        low, high = _peak_limits(law, peak, residual_sum, n, observed, weights, level)
     names = ("g", "a", "b") if law == "usl" else ("k", "p", "q")
     return ScalingFit(
         law=law,
@@ -153,7 +153,10 @@ def _least_squares(
             predicted = curve(parameters, n)
         return np.where(np.isfinite(predicted), (observed - predicted) * weights, 1e6)
 
-    found = least_squares(residuals, start, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    tight = 1e-12
+    found = least_squares(
+        residuals, start, x_scale="jac", xtol=tight, ftol=tight, gtol=tight, max_nfev=5_000
+    )
     if not found.success:
         raise IndicatorError(f"no law fits sizes {n.tolist()}, p {observed.tolist()}")
     return np.asarray(found.x), 2.0 * float(found.cost)
@@ -161,7 +164,6 @@ def _least_squares(
 
 def _peak_limits(
     law: Law,
-    fitted: NDArray[np.float64],
     peak: float,
     residual_sum: float,
     n: NDArray[np.float64],
@@ -173,32 +175,44 @@ def _peak_limits(
     from scipy.optimize import brentq
     from scipy.special import stdtrit
 
-    total = float(np.square(observed * weights).sum())
-    if residual_sum <= 1e-18 * total:  # the law fits exactly
+    if residual_sum <= 1e-12 * float(np.square(observed * weights).sum()):  # the law fits exactly
         return peak, peak
     df = n.size - 3
     allowed = residual_sum * (1.0 + float(stdtrit(df, 0.5 + level / 2)) ** 2 / df)
-    shape = float(fitted[2] if law == "usl" else fitted[1])
 
     def excess(log_peak: float) -> float:
-        held = math.exp(log_peak)
-        curve = with_peak_at(law, held)
-        # Held elsewhere, b shrinks with the square of N*, so that a keeps its size.
-        rest = shape * (peak / held) ** 2 if law == "usl" else shape
-        start = np.array([float(fitted[0]), math.log(rest)])
-        return _least_squares(curve, start, n, observed, weights)[1] - allowed
+        return _residual_sum_at(law, math.exp(log_peak), n, observed, weights) - allowed
 
-    def limit(side: int) -> float:
-        centre, step = math.log(peak), 0.05
-        inner = centre
-        while step < math.log(_FARTHEST):
-            outer = centre + side * step
+    def limit(side: int, farthest: float) -> float | None:
+        inner, step = math.log(peak), 0.05
+        while abs(farthest - inner) > 1e-9:
+            outer = math.log(peak) + side * min(step, abs(farthest - math.log(peak)))
             if excess(outer) > 0.0:
                 return math.exp(float(brentq(excess, inner, outer, xtol=1e-6)))
             inner, step = outer, 2.0 * step
-        return math.inf if side > 0 else 0.0
+        return None
 
-    return limit(-1), limit(1)
+    low, high = limit(-1, math.log1p(1e-3)), limit(1, math.log(peak * _FARTHEST))
+    return 0.0 if low is None else low, math.inf if high is None else high
+
+
+def _residual_sum_at(
+    law: Law,
+    peak: float,
+    n: NDArray[np.float64],
+    observed: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> float:
+    """Least weighted sum of squares with N* held: the factor in closed form, the rest searched."""
+    low, high = -15.0, 15.0
+    for _ in range(4):  # each grid spans two steps of the one before
+        sharpness = np.linspace(low, high, 121)
+        shapes = shapes_with_peak_at(law, peak, sharpness, n) * weights
+        overlap = shapes @ (observed * weights)
+        sums = np.square(observed * weights).sum() - overlap**2 / np.square(shapes).sum(axis=1)
+        best = int(np.argmin(sums))
+        low, high = sharpness[max(best - 1, 0)], sharpness[min(best + 1, 120)]
+    return float(sums[best])
 
 
 def _aicc(residual_sum: float, points: int) -> float | None:

@@ -16,8 +16,14 @@ Curve: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray
 
 
 def _usl(parameters: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.float64]:
-    g, a, b = (float(value) for value in parameters)
-    return n / (1.0 + a * (n - 1.0) + b * n * (n - 1.0)) * g
+    g, a, b = parameters
+    return np.asarray(g * _shape_usl(a, b, n))
+
+
+def _shape_usl(
+    a: NDArray[np.float64], b: NDArray[np.float64], n: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return n / (1.0 + a * (n - 1.0) + b * n * (n - 1.0))
 
 
 def _power_exponential(
@@ -59,20 +65,26 @@ def power_exponential_start(
 
 
 def peak_of(law: Law, parameters: NDArray[np.float64]) -> float | None:
-    """N* [robots]: sqrt((1-a)/b) or p/q; None where the curve has no maximum."""
+    """N* [robots]: sqrt((1-a)/b) or p/q; None where the curve has no maximum beyond one robot."""
     _, second, third = (float(value) for value in parameters)
+    if third <= 0.0:
+        return None
+    peak = math.sqrt(max(0.0, 1.0 - second) / third) if law == "usl" else second / third
+    return peak if peak > 1.0 else None
+
+
+def shapes_with_peak_at(
+    law: Law, peak: float, sharpness: NDArray[np.float64], n: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The law without its factor g or k at sizes n, one row per sharpness, N* > 1 held.
+
+    With N* held one parameter is left besides the factor. Any real sharpness gives a curve that is
+    positive throughout; the larger, the steeper it falls off on both sides of N*.
+    """
     if law == "usl":
-        return math.sqrt((1.0 - second) / third) if third > 0.0 and second < 1.0 else None
-    return second / third if third > 0.0 and second > 0.0 else None
-
-
-def with_peak_at(law: Law, peak: float) -> Curve:
-    """The law with its peak held: the two parameters left are the first, and b or p by its log."""
-
-    def curve(free: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.float64]:
-        first, rest = float(free[0]), float(np.exp(free[1]))
-        if law == "usl":
-            return _usl(np.array([first, 1.0 - rest * peak**2, rest]), n)
-        return _power_exponential(np.array([first, rest, rest / peak]), n)
-
-    return curve
+        # a = 1 - b N*^2; below this b the denominator has no zero
+        b = 1.0 / (1.0 + np.exp(-sharpness[:, np.newaxis])) / (peak - 1.0) ** 2
+        return _shape_usl(1.0 - b * peak**2, b, n)
+    exponent = np.log(n) - n / peak
+    steepness: NDArray[np.float64] = np.exp(sharpness[:, np.newaxis])
+    return np.exp(steepness * (exponent - exponent.max()))

@@ -1,0 +1,223 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi import IndicatorError
+
+P = [30.0, 40.0, 35.0, 38.0]
+LESS = [28.0, 33.0, 35.0, 30.0]
+
+INDICATORS: dict[str, Callable[..., spi.Estimate]] = {
+    "S": lambda a, b, **more: spi.scalability(a, b, n=10, m=5, **more),
+    "FT": lambda a, b, p_s=LESS, **more: spi.fault_tolerance(a, b, p_s, **more),
+    "R": lambda a, b, **more: spi.robustness(a, b, n=25, m=2, **more),
+    "A": lambda a, b, **more: spi.adaptability(a, b, x_o=10, x_new=15, **more),
+    "change": spi.relative_change,
+}
+over_indicators = pytest.mark.parametrize("name", INDICATORS)
+
+
+def test_values_are_ratios_of_means() -> None:
+    p_o, p_f, p_s = [10.0, 30.0], [20.0, 12.0], [8.0, 18.0]
+    assert spi.scalability(p_o, p_f, n=10, m=5).value == pytest.approx((32 - 40) / 40 * 2)
+    assert spi.fault_tolerance(p_o, p_f, p_s).value == pytest.approx((32 - 26) / 40)
+    assert spi.robustness(p_o, p_f, n=25, m=5).value == pytest.approx((32 - 40) / 40 + 0.2)
+    assert spi.adaptability(p_o, p_f, x_o=4, x_new=5).value == pytest.approx(-0.2 / 0.25 + 1)
+    assert spi.relative_change(p_o, p_f).value == pytest.approx(-0.2)
+
+
+def test_a_run_that_delivers_nothing_is_data() -> None:
+    r = spi.robustness([0, 30, 35], [0, 20, 30], n=25, m=2)
+    assert r.value == pytest.approx(50 / 65 - 1 + 0.08)
+
+
+def test_adaptability_uses_the_size_of_the_change_only() -> None:
+    up = spi.adaptability(P, LESS, x_o=10, x_new=15)
+    down = spi.adaptability(P, LESS, x_o=10, x_new=5)
+    negative = spi.adaptability(P, LESS, x_o=-10, x_new=-15)
+    assert up.value < 1
+    assert (up.value, up.low, up.high) == (down.value, down.low, down.high)
+    assert up == negative
+
+
+def test_robustness_credits_the_share_of_faulty_robots() -> None:
+    one, three = (spi.robustness(P, LESS, n=25, m=m) for m in (1, 3))
+    assert three.value - one.value == pytest.approx(2 / 25)
+    assert three.low is not None
+    assert one.low is not None
+    assert three.low - one.low == pytest.approx(2 / 25)
+
+
+def test_fewer_deliveries_lower_every_indicator() -> None:
+    for name, indicator in INDICATORS.items():
+        assert indicator(P, LESS).value < indicator(P, P).value, name
+
+
+def test_more_removed_deliveries_lower_fault_tolerance() -> None:
+    assert spi.fault_tolerance(P, LESS, P).value < spi.fault_tolerance(P, LESS, LESS).value == 0
+
+
+@over_indicators
+def test_one_seed_gives_the_value_and_nothing_else(name: str) -> None:
+    estimate = INDICATORS[name]([39], [35], **({"p_s": [30]} if name == "FT" else {}))
+    assert estimate.verdict == "inconclusive"
+    assert (estimate.low, estimate.high, estimate.p_value, estimate.probability) == (None,) * 4
+    assert (estimate.difference_sd, estimate.degrees_of_freedom) == (None, None)
+    assert estimate.pairing_correlation is None
+    assert estimate.n_seeds == 1
+    assert estimate.flags == ("single_seed",)
+    assert estimate.mean_denominator == 39
+
+
+def test_an_estimate_describes_its_input() -> None:
+    r = spi.robustness(P, LESS, n=25, m=2, threshold=0.1, level=0.9)
+    assert (r.indicator, r.threshold, r.level, r.n_seeds, r.paired) == ("R", 0.1, 0.9, 4, True)
+    assert r.pairing_correlation == pytest.approx(np.corrcoef(P, LESS)[0, 1])
+    assert r.mean_denominator == np.mean(P)
+    d = np.array(LESS) - P - (0.1 - 2 / 25) * np.array(P)
+    assert r.difference_sd == pytest.approx(d.std(ddof=1))
+    assert r.degrees_of_freedom == 3
+
+
+def test_fault_tolerance_reports_how_faulty_and_removed_pair() -> None:
+    p_f, p_s = [3.0, 5.0, 9.0, 4.0], [4.0, 6.0, 8.0, 1.0]
+    ft = spi.fault_tolerance(P, p_f, p_s)
+    assert ft.pairing_correlation == pytest.approx(np.corrcoef(p_f, p_s)[0, 1])
+
+
+BAD_SAMPLES: list[tuple[Any, str]] = [
+    ([], "is empty"),
+    ([[1.0, 2.0]], r"shape \(1, 2\)"),
+    ([3.0, float("nan"), 1.0, 1.0], r"\[1\] = nan: should be finite"),
+    ([float("inf"), 3.0, 1.0, 1.0], r"\[0\] = inf: should be finite"),
+    ([3.0, 1.0, -2.0, 1.0], r"\[2\] = -2: should not be negative"),
+    (["many", 1, 2, 3], "should be an array of numbers"),
+]
+
+
+@over_indicators
+@pytest.mark.parametrize(("bad", "message"), BAD_SAMPLES)
+def test_bad_samples_are_named(name: str, bad: Any, message: str) -> None:
+    with pytest.raises(IndicatorError, match=r"^p_(o|n)\b.*" + message):
+        INDICATORS[name](bad, P)
+    with pytest.raises(IndicatorError, match=r"^p_(f|nm|new)\b.*" + message):
+        INDICATORS[name](P, bad)
+
+
+def test_bad_removed_sample_is_named() -> None:
+    with pytest.raises(IndicatorError, match=r"p_s\[0\] = -1"):
+        spi.fault_tolerance(P, P, [-1, 2, 3, 4])
+
+
+@over_indicators
+def test_nothing_delivered_in_the_reference_is_an_error(name: str) -> None:
+    for paired in (True, False):
+        with pytest.raises(IndicatorError, match=r"mean of p_(o|n) = 0"):
+            INDICATORS[name]([0.0] * 4, P, paired=paired)
+
+
+@over_indicators
+def test_unequal_seed_sets_need_the_unpaired_mode(name: str) -> None:
+    with pytest.raises(IndicatorError, match=r"unequal seed sets .*paired=False"):
+        INDICATORS[name](P[:3], P)
+    assert INDICATORS[name](P[:3], P, paired=False).n_seeds == 3
+
+
+@pytest.mark.parametrize("indicator", [spi.scalability, spi.robustness])
+@pytest.mark.parametrize(
+    ("n", "m", "message"),
+    [
+        (25, 0, "m = 0: should be at least 1"),
+        (0, 1, "n = 0: should be at least 1"),
+        (25, 1.5, "m = 1.5: should be a whole number"),
+    ],
+)
+def test_counts_are_checked(
+    indicator: Callable[..., spi.Estimate], n: int, m: float, message: str
+) -> None:
+    with pytest.raises(IndicatorError, match=message):
+        indicator(P, P, n=n, m=m)
+
+
+def test_more_faulty_robots_than_robots_are_an_error() -> None:
+    with pytest.raises(IndicatorError, match="m = 26: should be at most n = 25"):
+        spi.robustness(P, P, n=25, m=26)
+    assert spi.robustness(P, P, n=25, m=25).value == 1.0
+
+
+def test_scalability_may_double_the_swarm_and_more() -> None:
+    assert spi.scalability([9], [27], n=5, m=10).value == 1.0
+
+
+def test_fault_tolerance_leaves_a_robot() -> None:
+    with pytest.raises(IndicatorError, match="m = 25 of n = 25"):
+        spi.fault_tolerance(P, P, P, n=25, m=25)
+    with pytest.raises(IndicatorError, match="m = 0"):
+        spi.fault_tolerance(P, P, P, n=25, m=0)
+    with pytest.raises(IndicatorError, match="together"):
+        spi.fault_tolerance(P, P, P, n=25)
+    assert spi.fault_tolerance(P, P, P, n=25, m=24).value == 0
+
+
+@pytest.mark.parametrize(
+    ("x_o", "x_new", "message"),
+    [
+        (0.0, 1.0, "x_o = 0"),
+        (2.0, 2.0, "x_new = 2 = x_o"),
+        (float("nan"), 1.0, "x_o = nan: should be finite"),
+        (1.0, float("inf"), "x_new = inf: should be finite"),
+    ],
+)
+def test_an_undefined_change_of_x_is_an_error(x_o: float, x_new: float, message: str) -> None:
+    with pytest.raises(IndicatorError, match=message):
+        spi.adaptability(P, P, x_o=x_o, x_new=x_new)
+
+
+def test_threshold_and_level_are_checked() -> None:
+    with pytest.raises(IndicatorError, match="threshold = nan"):
+        spi.relative_change(P, P, threshold=float("nan"))
+    for level in (0.0, 1.0, 95.0):
+        with pytest.raises(IndicatorError, match="level"):
+            spi.relative_change(P, P, level=level)
+
+
+def test_an_ablation_that_costs_a_third_refutes_less() -> None:
+    p_o = np.array([36.0, 40, 33, 38, 41, 35])
+    half = spi.relative_change(p_o, p_o / 2 + [1, -1, 0, 1, -1, 0], threshold=-1 / 3)
+    assert half.verdict == "refuted"
+    tenth = spi.relative_change(p_o, p_o * 0.9 + [1, -1, 0, 1, -1, 0], threshold=-1 / 3)
+    assert tenth.verdict == "supported"
+
+
+def test_skewed_differences_are_flagged() -> None:
+    p_o = np.full(20, 40.0) + np.tile([-1.0, 1.0], 10)
+    even = p_o - 5 + np.tile([2.0, -2.0, 1.0, -1.0], 5)
+    lucky = np.where(np.arange(20) == 7, 39.0, p_o - 38)
+    assert "skewed" not in spi.robustness(p_o, even, n=25, m=1).flags
+    assert "skewed" in spi.robustness(p_o, lucky, n=25, m=1).flags
+
+
+counts = st.lists(st.integers(0, 60), min_size=2, max_size=8)
+
+
+@given(p_o=counts, data=st.data())
+def test_nothing_is_nan(p_o: list[int], data: st.DataObject) -> None:
+    p_f = data.draw(st.lists(st.integers(0, 60), min_size=len(p_o), max_size=len(p_o)))
+    if not any(p_o):
+        return
+    for paired in (True, False):
+        r = spi.robustness(p_o, p_f, n=25, m=2, paired=paired)
+        assert r.low is not None
+        assert r.high is not None
+        assert r.low <= r.value <= r.high
+        assert r.p_value is not None
+        assert 0 <= r.p_value <= 1
+        assert r.probability is not None
+        assert min(r.probability, 1 - r.probability) == pytest.approx(r.p_value / 2, abs=1e-12)

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi import IndicatorError
+
+
+def test_holm_by_hand() -> None:
+    # sorted .005 .01 .03 .04 times 4 3 2 1 = .02 .03 .06 .04, made monotone: .02 .03 .06 .06
+    assert spi.holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert spi.holm([0.6, 0.5]) == pytest.approx([1.0, 1.0])
+    assert spi.holm([0.2]) == pytest.approx([0.2])
+    assert spi.holm([]).size == 0
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=20))
+def test_holm_never_helps_and_is_never_worse_than_bonferroni(p: list[float]) -> None:
+    adjusted = spi.holm(p)
+    assert (adjusted >= np.array(p)).all()
+    assert (adjusted <= np.minimum(1.0, np.array(p) * len(p) + 1e-15)).all()
+
+
+@pytest.mark.parametrize("p", [[0.5, 1.1], [-0.1], [float("nan")], [[0.1, 0.2]]])
+def test_holm_names_what_is_no_p(p: list[float]) -> None:
+    with pytest.raises(IndicatorError, match="p_values"):
+        spi.holm(p)
+
+
+def estimate(p_value: float | None, probability: float | None = None) -> spi.Estimate:
+    blank = spi.robustness([39], [35], n=25, m=1)
+    return dataclasses.replace(blank, p_value=p_value, probability=probability)
+
+
+def test_adjusted_verdicts_keep_their_direction() -> None:
+    family = [estimate(0.001, 0.9995), estimate(0.02, 0.01), estimate(0.03, 0.985)]
+    assert spi.adjust(family) == ("supported", "refuted", "supported")
+    assert spi.adjust([*family, estimate(0.9, 0.55)]) == (
+        "supported", "inconclusive", "inconclusive", "inconclusive",
+    )  # fmt: skip
+
+
+def test_an_untested_member_counts_in_the_family() -> None:
+    assert spi.adjust([estimate(0.04, 0.98)]) == ("supported",)
+    assert spi.adjust([estimate(0.04, 0.98), estimate(None)]) == ("inconclusive", "inconclusive")
+
+
+def test_one_family_has_one_level() -> None:
+    other = dataclasses.replace(estimate(0.01, 0.99), level=0.9)
+    with pytest.raises(IndicatorError, match="levels"):
+        spi.adjust([estimate(0.01, 0.99), other])
+    assert spi.adjust([]) == ()
+
+
+def test_holm_bounds_the_family_of_true_nulls() -> None:
+    rng = np.random.default_rng(5)
+    p = rng.uniform(size=(4_000, 12))
+    any_false = np.mean([(spi.holm(row) < 0.05).any() for row in p])
+    assert any_false == pytest.approx(0.05, abs=0.01)
+    assert np.mean((p < 0.05).any(axis=1)) > 0.4  # what the family would risk unadjusted

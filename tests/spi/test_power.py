@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi import IndicatorError
+from swarm_logistics_env.spi.ratio import paired_ratio
+
+rng = np.random.default_rng(11)
+P_O = rng.poisson(39, 10)
+PILOT = spi.robustness(P_O, rng.poisson(36, 10), n=25, m=2)
+
+
+def share_supported(pilot: spi.Estimate, effect: float, n: int) -> float:
+    """Share of simulated studies of n seeds, with the pilot's spread, that find the effect."""
+    assert pilot.difference_sd is not None
+    draws = np.random.default_rng(1).normal(
+        (effect - pilot.threshold) * pilot.mean_denominator, pilot.difference_sd, (20_000, n)
+    )
+    test = paired_ratio(draws, np.full_like(draws, pilot.mean_denominator))
+    supported = (test.p_value < 0.05) & (test.probability > 0.5)
+    return float(supported.mean())
+
+
+@pytest.mark.parametrize("effect", [0.08, 0.146, 0.3, 0.6])
+def test_planned_seeds_reach_80_percent_and_one_fewer_does_not(effect: float) -> None:
+    n = spi.seeds_for_power(PILOT, effect)
+    assert n is not None
+    assert share_supported(PILOT, effect, n) > 0.79
+    if n > 2:
+        assert share_supported(PILOT, effect, n - 1) < 0.81
+
+
+def test_minimum_detectable_effect_is_found_in_80_percent() -> None:
+    effect = spi.minimum_detectable_effect(PILOT)
+    assert effect is not None
+    assert share_supported(PILOT, effect, 10) == pytest.approx(0.8, abs=0.01)
+    assert spi.seeds_for_power(PILOT, effect * 1.001) == 10
+    assert spi.seeds_for_power(PILOT, -effect * 1.001) == 10
+
+
+def test_effects_are_counted_from_the_threshold() -> None:
+    moved = dataclasses.replace(PILOT, threshold=1.0)
+    assert spi.seeds_for_power(moved, 1.2) == spi.seeds_for_power(PILOT, 0.2)
+    assert spi.minimum_detectable_effect(moved) == spi.minimum_detectable_effect(PILOT)
+
+
+def test_more_power_and_smaller_effects_need_more_seeds() -> None:
+    plan = [spi.seeds_for_power(PILOT, effect) or 0 for effect in (0.4, 0.2, 0.1, 0.01)]
+    assert plan == sorted(plan)
+    assert plan[0] >= 2
+    assert (spi.seeds_for_power(PILOT, 0.2, power=0.95) or 0) > plan[1]
+
+
+def test_two_seeds_are_the_least() -> None:
+    assert spi.seeds_for_power(PILOT, 1_000.0) == 2
+
+
+def test_textbook_sample_size() -> None:
+    # d = 0.5, two-sided .05, power .8: 34 pairs (Cohen 1988; G*Power)
+    pilot = dataclasses.replace(PILOT, difference_sd=1.0, mean_denominator=1.0)
+    assert spi.seeds_for_power(pilot, 0.5) == 34
+
+
+@pytest.mark.parametrize(
+    ("pilot", "effect", "reason"),
+    [
+        (PILOT, 0.0, "lies at the threshold"),
+        (dataclasses.replace(PILOT, threshold=0.05), 0.05, "lies at the threshold"),
+        (PILOT, 1e-6, "more than 1,000,000 seeds"),
+        (spi.robustness([39], [38], n=25, m=1), 0.1, "one seed"),
+        (spi.robustness([39, 39], [38, 38], n=25, m=1), 0.1, "no spread"),
+    ],
+)
+def test_no_number_comes_with_a_reason(pilot: spi.Estimate, effect: float, reason: str) -> None:
+    assert spi.seeds_for_power(pilot, effect) is None
+    assert reason in (spi.no_plan_because(pilot, effect) or "")
+
+
+def test_a_plan_needs_no_reason() -> None:
+    assert spi.no_plan_because(PILOT, 0.1) is None
+
+
+@pytest.mark.parametrize("samples", [([39], [38]), ([39, 39], [38, 38])])
+def test_no_spread_detects_nothing(samples: tuple[list[int], list[int]]) -> None:
+    assert spi.minimum_detectable_effect(spi.robustness(*samples, n=25, m=1)) is None
+
+
+def test_unpaired_plan_reaches_80_percent() -> None:
+    pilot = spi.robustness(P_O, rng.poisson(36, 8), n=25, m=2, paired=False)
+    n = spi.seeds_for_power(pilot, 0.15)
+    assert n is not None
+    assert pilot.difference_sd is not None
+    # Large-sample check: (1.96 + 0.84)^2 sd^2 / distance^2, a little more for Student's t.
+    normal = 7.849 * (pilot.difference_sd / (0.15 * pilot.mean_denominator)) ** 2
+    assert normal < n < normal + 4
+
+
+@pytest.mark.parametrize("power", [0.0, 1.0, 0.02])
+def test_power_out_of_range(power: float) -> None:
+    with pytest.raises(IndicatorError, match="power"):
+        spi.seeds_for_power(PILOT, 0.1, power=power)
+    with pytest.raises(IndicatorError, match="power"):
+        spi.minimum_detectable_effect(PILOT, power=power)
+
+
+def test_effect_must_be_finite() -> None:
+    with pytest.raises(IndicatorError, match="effect = nan"):
+        spi.seeds_for_power(PILOT, float("nan"))
