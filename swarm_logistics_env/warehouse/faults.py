@@ -12,7 +12,9 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_va
 
 from swarm_logistics_env.errors import FaultError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.warehouse.state import WarehouseState
 
 
 @dataclass(frozen=True)
@@ -153,3 +155,50 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
     # Ranked by a key of seed and robot alone: nested in m, the same for every mode and any N.
     order = np.argsort(row_keys(seed, "faulty robots", n_robots), kind="stable")
     return np.sort(order[: fault.robots]).astype(np.int64)
+
+
+def apply_faults(
+    state: WarehouseState,
+    scenario: Scenario,
+    faults: Sequence[Fault],
+    struck: Sequence[NDArray[np.int64]],
+) -> NDArray[np.bool_]:
+    """Give every robot what the faults that hold at `state.time` leave it.
+
+    Args:
+        struck: per fault, the robots it befalls.
+
+    Returns:
+        Which robots a fault takes out of the arena, (N,).
+    """
+    state.max_speed[:] = scenario.max_speed
+    state.max_turn_rate[:] = scenario.max_turn_rate
+    state.ranger_range[:] = scenario.ranger_range
+    state.view_range[:] = scenario.view_range
+    for able in (state.lifts, state.delivers, state.sends, state.hears, state.honest, state.obeys):
+        able[:] = True
+    gone = np.zeros(state.n_robots, np.bool_)
+    modes: list[tuple[str, ...]] = [()] * state.n_robots
+    for fault, robots in zip(faults, struck, strict=True):
+        if not fault.is_active(state.time):
+            continue
+        mode = FAILURE_MODES[fault.mode]
+        left = {"speed": mode.speed, "view": mode.view}
+        if mode.factor is not None and fault.factor is not None:
+            left[mode.factor] = fault.factor
+        state.max_speed[robots] *= left["speed"]
+        state.max_turn_rate[robots] *= left["speed"]
+        state.view_range[robots] *= left["view"]
+        state.ranger_range[robots] *= mode.rangers
+        state.lifts[robots] &= mode.lifts
+        state.delivers[robots] &= mode.delivers
+        state.sends[robots] &= mode.sends
+        state.hears[robots] &= mode.hears
+        state.honest[robots] &= mode.honest
+        state.obeys[robots] &= mode.obeys
+        gone[robots] |= not mode.present
+        for robot in robots.tolist():
+            modes[robot] = (*modes[robot], fault.mode)
+    state.failure_modes = tuple(modes)
+    state.failed = np.array([bool(names) for names in modes])
+    return gone

@@ -41,7 +41,7 @@ class Physics:
         item_position: NDArray[np.float64],
         obstacle_position: NDArray[np.float64],
     ) -> None:
-        self._n = robot_position.shape[0]
+        n = len(robot_position)
         self._substeps = scenario.n_substeps
         self._period = scenario.physics_period
         self._space = pymunk.Space(threaded=False)
@@ -52,18 +52,15 @@ class Physics:
         self._items = self._add_items(scenario, item_position)
         # A batch call reads and writes every body, in order of insertion: N robots, N controls, and
         # the static body last.
-        self._read, self._reader = _buffer(2 * self._n + 1, 4)
-        self._written, self._writer = _buffer(2 * self._n + 1, 2)
-        self.position = self._read[: self._n, 0:2]  # (N, 2) [m], a view, new after each advance
-        self.velocity = self._read[: self._n, 2:4]  # (N, 2) [m/s], likewise
-        self.wanted_velocity = self._written[self._n : -1]  # (N, 2) [m/s], to be filled before it
-        self._kept_velocity = self._written[: self._n]
+        self.bodies, self._reader = _buffer(2 * n + 1, 4)  # x, y [m], and velocity [m/s], as read
+        self.velocities, self._writer = _buffer(2 * n + 1, 2)  # [m/s], to be written
         self._fetch()
 
     def advance(self) -> None:
-        """Move everything by one control period, the robots driven at `wanted_velocity`."""
-        # What was just read, so that writing it back changes nothing for the robots themselves.
-        self._kept_velocity[:] = self.velocity
+        """Move everything by one control period, as `velocities` say, and fill `bodies`.
+
+        Rows 0 to N-1 of `velocities` have to be those just read, rows N to 2N-1 the wanted ones.
+        """
         batch.set_space_bodies(self._space, batch.BodyFields.VELOCITY, self._writer)
         step, period = self._space.step, self._period
         for _ in range(self._substeps):

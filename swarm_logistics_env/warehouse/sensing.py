@@ -20,6 +20,8 @@ _ITEM_WIDTH = len(row.ITEM_FEATURES)
 _NEIGHBOUR_WIDTH = len(row.NEIGHBOUR_FEATURES)
 _BEAM_X = np.cos(2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
 _BEAM_Y = np.sin(2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
+# Tangents of the angles half-way between the beams of the first quarter.
+_BORDERS = tuple(math.tan((beam + 0.5) * 2.0 * math.pi / row.N_BEAMS) for beam in range(4))
 _RANGE_ROBOTS, _RANGE_WALLS, _RANGE_ITEMS = row.RANGE_ROBOTS, row.RANGE_WALLS, row.RANGE_ITEMS
 _N_BEAMS, _N_ITEMS, _N_NEIGHBOURS = row.N_BEAMS, row.N_ITEMS_IN_VIEW, row.N_NEIGHBOURS
 _ITEMS, _NEIGHBOURS, _LOWEST = row.ITEMS, row.NEIGHBOURS, row.LOWEST_TIMER
@@ -38,12 +40,31 @@ def scan_disc(
     if clearance <= 0.0:
         scan[:] = 0.0
         return
-    for beam in range(scan.shape[0]):
-        along = x * _BEAM_X[beam] + y * _BEAM_Y[beam]
-        if along > 0.0 and along * along > clearance:
+    # Outwards from the beam that looks nearest to its centre: if that one misses, all do.
+    middle = nearest_beam(x, y)
+    for way in (1, -1):
+        for turned in range(_N_BEAMS // 2):
+            beam = (middle + way * (turned if way > 0 else turned + 1)) % _N_BEAMS
+            along = x * _BEAM_X[beam] + y * _BEAM_Y[beam]
+            if along <= 0.0 or along * along <= clearance:
+                break
             distance = along - math.sqrt(along * along - clearance)
             if distance < scan[beam]:
                 scan[beam] = distance
+
+
+@kernel
+def nearest_beam(x: float, y: float) -> int:
+    """Return the number of the beam that looks nearest to the direction (x, y) in robot frame."""
+    across, ahead = abs(y), abs(x)
+    beam = 0
+    for border in _BORDERS:
+        beam += across > border * ahead
+    if x < 0.0:
+        beam = _N_BEAMS // 2 - beam
+    if y < 0.0:
+        beam = _N_BEAMS - beam
+    return beam % _N_BEAMS
 
 
 @kernel

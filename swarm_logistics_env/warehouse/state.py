@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,49 +12,93 @@ from swarm_logistics_env.scenario import Scenario
 STORED, CARRIED, DELIVERED = 0, 1, 2
 NOBODY = -1
 
+# Rows of the tables.
+HEADING, TIMER, TOLD, HEARD, MAX_SPEED, MAX_TURN_RATE, RANGER_RANGE, VIEW_RANGE = range(8)
+PRESENT, IN_DELIVERY, CONTACT, LIFTS, DELIVERS, SENDS, HEARS, HONEST, OBEYS, FAILED = range(10)
+ITEM, LAST_IN_DELIVERY = range(2)
+STATUS, CARRIER = range(2)
 
-@dataclass
+T = TypeVar("T", bound=np.generic)
+
+
+class Column(Generic[T]):
+    """One named quantity in a table of several, each a contiguous run of the table's memory.
+
+    Tables rather than single arrays, because every array handed to a kernel costs time.
+    """
+
+    def __init__(self, table: str, index: int) -> None:
+        self.table, self.index = table, index
+
+    def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> NDArray[T]:
+        """Return the quantity as a view."""
+        column: NDArray[T] = state.__dict__[self.table][self.index]
+        return column
+
+    def __set__(self, state: WarehouseState, values: NDArray[T]) -> None:
+        """Copy `values` into the table."""
+        state.__dict__[self.table][self.index] = values
+
+
 class WarehouseState:
     """What is true in the warehouse now. N robots, I items; a row is one robot or item for good.
 
     The row of a robot that is absent holds zeros and `NOBODY`.
     """
 
-    robot_present: NDArray[np.bool_]  # (N,)
-    robot_position: NDArray[np.float64]  # (N, 2) [m]
-    robot_velocity: NDArray[np.float64]  # (N, 2) [m/s]
-    robot_heading: NDArray[np.float64]  # (N,) [rad], counterclockwise from +x, in (-pi, pi]
-    robot_item: NDArray[np.int64]  # (N,) item carried, or NOBODY
-    robot_memory: NDArray[np.int64]  # (N, memory_size) items last put down, newest first
-    robot_timer: NDArray[np.float64]  # (N,) [s] since the delivery area, NaN when silent
-    robot_told: NDArray[np.float64]  # (N,) [s] the timer it broadcasts, NaN when silent
-    robot_in_delivery: NDArray[np.bool_]  # (N,) its centre is in the delivery area
-    robot_contact: NDArray[np.bool_]  # (N,) touches a robot, a wall, an obstacle or, laden, an item
-    item_status: NDArray[np.int64]  # (I,) STORED, CARRIED or DELIVERED
-    item_position: NDArray[np.float64]  # (I, 2) [m], its carrier's while carried
-    item_carrier: NDArray[np.int64]  # (I,) robot, or NOBODY
-    obstacle_position: NDArray[np.float64]  # (n_obstacles, 2) [m]
+    robot_heading = Column[np.float64]("numbers", HEADING)  # (N,) [rad] from +x to the left, +-pi
+    robot_timer = Column[np.float64]("numbers", TIMER)  # (N,) [s] since the area, NaN when silent
+    robot_told = Column[np.float64]("numbers", TOLD)  # (N,) [s] the timer it tells, NaN when silent
+    robot_heard = Column[np.float64](
+        "numbers", HEARD
+    )  # (N,) [s] the lowest it hears, NaN when none
+    max_speed = Column[np.float64]("numbers", MAX_SPEED)  # (N,) [m/s]
+    max_turn_rate = Column[np.float64]("numbers", MAX_TURN_RATE)  # (N,) [rad/s]
+    ranger_range = Column[np.float64]("numbers", RANGER_RANGE)  # (N,) [m], 0 when blind
+    view_range = Column[np.float64]("numbers", VIEW_RANGE)  # (N,) [m]
 
-    # What each robot can do now; failures take from it.
-    max_speed: NDArray[np.float64]  # (N,) [m/s]
-    max_turn_rate: NDArray[np.float64]  # (N,) [rad/s]
-    ranger_range: NDArray[np.float64]  # (N,) [m], 0 when blind
-    view_range: NDArray[np.float64]  # (N,) [m]
-    lifts: NDArray[np.bool_]  # (N,)
-    delivers: NDArray[np.bool_]  # (N,)
-    sends: NDArray[np.bool_]  # (N,)
-    hears: NDArray[np.bool_]  # (N,)
-    honest: NDArray[np.bool_]  # (N,) False: tells timer 0 always
-    obeys: NDArray[np.bool_]  # (N,) False: ignores its commands, the gripper's too
-    failed: NDArray[np.bool_]  # (N,) any failure mode holds
-    failure_modes: tuple[tuple[str, ...], ...]  # per robot, the modes that hold
+    robot_present = Column[np.bool_]("flags", PRESENT)  # (N,)
+    robot_in_delivery = Column[np.bool_](
+        "flags", IN_DELIVERY
+    )  # (N,) its centre is in the delivery area
+    robot_contact = Column[np.bool_]("flags", CONTACT)  # (N,) touches something solid to it
+    # What each robot can do now; failures take from it, as from the ranges and speeds above.
+    lifts = Column[np.bool_]("flags", LIFTS)  # (N,)
+    delivers = Column[np.bool_]("flags", DELIVERS)  # (N,)
+    sends = Column[np.bool_]("flags", SENDS)  # (N,)
+    hears = Column[np.bool_]("flags", HEARS)  # (N,)
+    honest = Column[np.bool_]("flags", HONEST)  # (N,) False: tells timer 0 always
+    obeys = Column[np.bool_]("flags", OBEYS)  # (N,) False: ignores its commands, the gripper's too
+    failed = Column[np.bool_]("flags", FAILED)  # (N,) any failure mode holds
 
-    step: int = 0  # control steps since the start
-    time: float = 0.0  # [s]
-    requested: int = 0  # the item asked for now, or NOBODY when all are delivered
-    delivery_times: list[float] = field(default_factory=list)  # [s], ascending
-    delivered_by: list[int] = field(default_factory=list)  # robot, one per delivery
-    anchoring_seconds: float = 0.0  # robot-seconds of working robots touching failed ones
+    robot_item = Column[np.int64]("links", ITEM)  # (N,) item carried, or NOBODY
+    last_in_delivery = Column[np.int64](
+        "links", LAST_IN_DELIVERY
+    )  # (N,) step, or NOBODY when never
+    item_status = Column[np.int64]("item_links", STATUS)  # (I,) STORED, CARRIED or DELIVERED
+    item_carrier = Column[np.int64]("item_links", CARRIER)  # (I,) robot, or NOBODY
+
+    def __init__(self, scenario: Scenario) -> None:
+        n, items = scenario.n_robots, scenario.n_items
+        self.numbers = np.full((8, n), np.nan)
+        self.numbers[HEADING] = 0.0
+        self.flags = np.ones((10, n), np.bool_)
+        self.flags[[IN_DELIVERY, CONTACT, FAILED]] = False
+        self.links = np.full((2, n), NOBODY)
+        self.item_links = np.full((2, items), NOBODY)
+        self.robot_position = np.zeros((n, 2))  # [m]
+        self.robot_velocity = np.zeros((n, 2))  # [m/s]
+        self.robot_memory = np.full((n, scenario.memory_size), NOBODY)  # put down, newest first
+        self.item_position = np.zeros((items, 2))  # [m], its carrier's while carried
+        self.item_status[:] = STORED
+        self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
+        self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * n  # per robot, those that hold
+        self.step = 0  # control steps since the start
+        self.time = 0.0  # [s]
+        self.requested = 0  # the item asked for now, or NOBODY when all are delivered
+        self.delivery_times: list[float] = []  # [s], ascending
+        self.delivered_by: list[int] = []  # robot, one per delivery
+        self.anchoring_seconds = 0.0  # robot-seconds of working robots touching failed ones
 
     @property
     def n_robots(self) -> int:
@@ -65,36 +109,3 @@ class WarehouseState:
     def delivered(self) -> int:
         """Items delivered so far: the paper's performance P."""
         return len(self.delivery_times)
-
-
-def empty_state(scenario: Scenario) -> WarehouseState:
-    """Return a state of the right shapes: everybody able and present, nobody placed."""
-    n, items = scenario.n_robots, scenario.n_items
-    return WarehouseState(
-        robot_present=np.ones(n, np.bool_),
-        robot_position=np.zeros((n, 2)),
-        robot_velocity=np.zeros((n, 2)),
-        robot_heading=np.zeros(n),
-        robot_item=np.full(n, NOBODY),
-        robot_memory=np.full((n, scenario.memory_size), NOBODY),
-        robot_timer=np.full(n, np.nan),
-        robot_told=np.full(n, np.nan),
-        robot_in_delivery=np.zeros(n, np.bool_),
-        robot_contact=np.zeros(n, np.bool_),
-        item_status=np.full(items, STORED),
-        item_position=np.zeros((items, 2)),
-        item_carrier=np.full(items, NOBODY),
-        obstacle_position=np.zeros((scenario.n_obstacles, 2)),
-        max_speed=np.full(n, scenario.max_speed),
-        max_turn_rate=np.full(n, scenario.max_turn_rate),
-        ranger_range=np.full(n, scenario.ranger_range),
-        view_range=np.full(n, scenario.view_range),
-        lifts=np.ones(n, np.bool_),
-        delivers=np.ones(n, np.bool_),
-        sends=np.ones(n, np.bool_),
-        hears=np.ones(n, np.bool_),
-        honest=np.ones(n, np.bool_),
-        obeys=np.ones(n, np.bool_),
-        failed=np.zeros(n, np.bool_),
-        failure_modes=((),) * n,
-    )

@@ -1,0 +1,156 @@
+"""What a control step does apart from moving bodies, in three compiled calls.
+
+Each takes whole tables of the state and hands their rows to the kernels that know the rules:
+calling a kernel from Python costs as much as most of them do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.warehouse import state as at
+from swarm_logistics_env.warehouse.driving import drive
+from swarm_logistics_env.warehouse.grid import fill
+from swarm_logistics_env.warehouse.logistics import (
+    carry_along,
+    close_grippers,
+    deliver,
+    open_grippers,
+    run_timers,
+)
+from swarm_logistics_env.warehouse.sensing import sense
+
+# Rows of the constants, one number each.
+(
+    WIDTH, HEIGHT, ROBOT_RADIUS, ITEM_RADIUS, OBSTACLE_RADIUS, RANGER_RANGE, RADIO_RANGE,
+    PICKUP_RANGE, MAX_SPEED, TIMER_LIMIT, CONTROL_PERIOD, STORAGE_WIDTH, GOSSIP,
+    ROBOT_CELL, ITEM_CELL, N_CONSTANTS,
+) = range(16)  # fmt: skip
+
+
+@kernel
+def set_out(
+    commands: NDArray[np.float64],
+    constants: NDArray[np.float64],
+    numbers: NDArray[np.float64],
+    flags: NDArray[np.bool_],
+    bodies: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> bool:
+    """Turn commands into the velocities to be written to the bodies; False if one is not finite.
+
+    `bodies` (2N + 1, 4) is what was read of them, `velocities` (2N + 1, 2) what will be written.
+    """
+    n = len(commands)
+    able = flags[at.PRESENT] & flags[at.OBEYS]
+    # What was just read, so that writing it back changes nothing for the robots themselves.
+    velocities[:n] = bodies[:n, 2:4]
+    return drive(
+        commands, able, numbers[at.MAX_SPEED], numbers[at.MAX_TURN_RATE],
+        constants[CONTROL_PERIOD], numbers[at.HEADING], velocities[n : 2 * n],
+    )  # fmt: skip
+
+
+@kernel
+def handle_items(
+    commands: NDArray[np.float64],
+    requested: int,
+    constants: NDArray[np.float64],
+    bodies: NDArray[np.float64],
+    position: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    flags: NDArray[np.bool_],
+    links: NDArray[np.int64],
+    memory: NDArray[np.int64],
+    item_position: NDArray[np.float64],
+    item_links: NDArray[np.int64],
+    claim: NDArray[np.int64],
+    claim_square: NDArray[np.float64],
+    size: NDArray[np.int64],
+    start: NDArray[np.int64],
+    members: NDArray[np.int64],
+    events: NDArray[np.int64],
+) -> int:
+    """Take over where the bodies are, then let go and lift; returns the number of events."""
+    for robot in range(len(position)):
+        is_there = 1.0 if flags[at.PRESENT, robot] else 0.0
+        for axis in range(2):
+            position[robot, axis] = bodies[robot, axis] * is_there
+            velocity[robot, axis] = bodies[robot, 2 + axis] * is_there
+    carry_along(
+        position, flags[at.PRESENT], constants[STORAGE_WIDTH],
+        links[at.ITEM], item_position, flags[at.IN_DELIVERY],
+    )  # fmt: skip
+    able = flags[at.PRESENT] & flags[at.OBEYS]
+    n_events = open_grippers(
+        commands[:, 3], able, flags[at.IN_DELIVERY], requested, links[at.ITEM], memory,
+        item_links[at.STATUS], item_links[at.CARRIER], events,
+    )  # fmt: skip
+    return close_grippers(
+        commands[:, 3], able & flags[at.LIFTS], position, requested, constants[PICKUP_RANGE],
+        links[at.ITEM], memory, item_position, item_links[at.STATUS], item_links[at.CARRIER],
+        claim, claim_square, constants[ITEM_CELL], size, start, members, events, n_events,
+    )  # fmt: skip
+
+
+@kernel
+def deliver_requested(
+    requested: int,
+    flags: NDArray[np.bool_],
+    links: NDArray[np.int64],
+    memory: NDArray[np.int64],
+    item_links: NDArray[np.int64],
+) -> int:
+    """Deliver the requested item if its carrier can; returns that robot, or NOBODY."""
+    return deliver(
+        requested, flags[at.IN_DELIVERY], flags[at.DELIVERS], links[at.ITEM], memory,
+        item_links[at.STATUS], item_links[at.CARRIER],
+    )  # fmt: skip
+
+
+@kernel
+def perceive(
+    step: int,
+    requested: int,
+    constants: NDArray[np.float64],
+    position: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    numbers: NDArray[np.float64],
+    flags: NDArray[np.bool_],
+    links: NDArray[np.int64],
+    memory: NDArray[np.int64],
+    item_position: NDArray[np.float64],
+    item_links: NDArray[np.int64],
+    obstacle_position: NDArray[np.float64],
+    robot_size: NDArray[np.int64],
+    robot_start: NDArray[np.int64],
+    robot_members: NDArray[np.int64],
+    item_size: NDArray[np.int64],
+    item_start: NDArray[np.int64],
+    item_members: NDArray[np.int64],
+    rows: NDArray[np.float32],
+) -> int:
+    """Run the timers and fill the observation rows; returns how many robots are anchored."""
+    run_timers(
+        step, constants[CONTROL_PERIOD], constants[TIMER_LIMIT], constants[GOSSIP] > 0.0,
+        flags[at.IN_DELIVERY], flags[at.PRESENT], flags[at.HONEST], numbers[at.HEARD],
+        links[at.LAST_IN_DELIVERY], numbers[at.TIMER], numbers[at.TOLD],
+    )  # fmt: skip
+    fill(position, flags[at.PRESENT], constants[ROBOT_CELL], robot_size, robot_start, robot_members)
+    fill(
+        item_position, item_links[at.STATUS] == at.STORED,
+        constants[ITEM_CELL], item_size, item_start, item_members,
+    )  # fmt: skip
+    return sense(
+        constants[WIDTH], constants[HEIGHT], constants[ROBOT_RADIUS], constants[ITEM_RADIUS],
+        constants[OBSTACLE_RADIUS], constants[RADIO_RANGE], constants[MAX_SPEED],
+        constants[TIMER_LIMIT], requested, flags[at.PRESENT], position, velocity,
+        numbers[at.HEADING], links[at.ITEM], memory, numbers[at.TIMER], numbers[at.TOLD],
+        flags[at.IN_DELIVERY], item_position, obstacle_position, numbers[at.RANGER_RANGE],
+        numbers[at.VIEW_RANGE], flags[at.SENDS], flags[at.HEARS], flags[at.FAILED],
+        constants[ROBOT_CELL], robot_size, robot_start, robot_members,
+        constants[ITEM_CELL], item_size, item_start, item_members,
+        constants[RANGER_RANGE], flags[at.CONTACT], numbers[at.HEARD], rows,
+    )  # fmt: skip
