@@ -135,8 +135,8 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         world = self.warehouse
         was_present = world.state.robot_present.copy()
         observations = world.step(commands)
-        rewards = self._rewards.pay(world)
-        terminations = was_present & ~world.state.robot_present
+        rewards = self._rewards.pay(world) * was_present
+        terminations = was_present ^ world.state.robot_present
         if world.all_delivered:
             terminations |= was_present
         is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles

@@ -31,72 +31,92 @@ class RewardTerms:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
             if isinstance(weight, str) or not np.isfinite(weight):
                 raise SetupError(f"rewards[{name!r}] = {weight!r}: should be a finite number")
+        self._terms = [(REWARD_TERMS[name], weight) for name, weight in self.weights.items()]
 
     def begin(self, world: Warehouse) -> None:
         """Note how an episode starts."""
-        self._note(world)
+        self._before = Before(world)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
-        """Return what the step just taken earns each robot, (N,); an absent robot earns 0."""
+        """Return what the step just taken earns each robot, (N,)."""
         total = np.zeros(world.state.n_robots)
-        for name, weight in self.weights.items():
-            total += weight * REWARD_TERMS[name](self, world)
-        self._note(world)
-        return np.where(self._was_present, total, 0.0)
-
-    def _note(self, world: Warehouse) -> None:
-        state = world.state
-        self._delivered = state.delivered
-        self._carrier = carrier_of_requested(world)
-        self._requested = state.requested
-        self._carrier_x = state.robot_position[self._carrier, 0] if self._carrier >= 0 else 0.0
-        self._was_present = state.robot_present.copy()
-
-    def delivery(self, world: Warehouse) -> NDArray[np.float64]:
-        """Items delivered in this step, to every robot of the team."""
-        new = world.state.delivered - self._delivered
-        return np.full(world.state.n_robots, float(new))
-
-    def own_delivery(self, world: Warehouse) -> NDArray[np.float64]:
-        """Items that the robot itself delivered in this step."""
-        new = world.state.delivered_by[self._delivered :]
-        return np.bincount(new, minlength=world.state.n_robots).astype(np.float64)
-
-    def lift_requested(self, world: Warehouse) -> NDArray[np.float64]:
-        """1 to the robot that took up the requested item, -1 to the one that let go of it."""
-        paid = np.zeros(world.state.n_robots)
-        carrier = carrier_of_requested(world)
-        if world.state.requested == self._requested and carrier != self._carrier:
-            if carrier != NOBODY:
-                paid[carrier] += 1.0
-            if self._carrier != NOBODY:
-                paid[self._carrier] -= 1.0
-        return paid
-
-    def approach(self, world: Warehouse) -> NDArray[np.float64]:
-        """Metres that the requested item's carrier came nearer to the delivery area.
-
-        Privileged: no robot can sense it, so it may shape a reward but not an observation.
-        """
-        paid = np.zeros(world.state.n_robots)
-        carrier = carrier_of_requested(world)
-        if carrier != NOBODY and carrier == self._carrier:
-            edge = world.scenario.storage_width
-            x = world.state.robot_position[carrier, 0]
-            paid[carrier] = min(x, edge) - min(self._carrier_x, edge)
-        return paid
-
-    def contact(self, world: Warehouse) -> NDArray[np.float64]:
-        """Seconds that the robot touched a robot, a wall or an obstacle; weigh it negatively."""
-        return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
+        for term, weight in self._terms:
+            earned = term(world, self._before)
+            if earned is not None:
+                total += weight * earned
+        self._before = Before(world)
+        return total
 
 
-REWARD_TERMS: dict[str, Callable[[RewardTerms, Warehouse], NDArray[np.float64]]] = {
-    "delivery": RewardTerms.delivery,
-    "own_delivery": RewardTerms.own_delivery,
-    "lift_requested": RewardTerms.lift_requested,
-    "approach": RewardTerms.approach,
-    "contact": RewardTerms.contact,
+class Before:
+    """What the terms compare a step's outcome with: how things stood before it."""
+
+    __slots__ = ("carrier", "carrier_x", "delivered", "requested")
+
+    def __init__(self, world: Warehouse) -> None:
+        self.delivered = world.state.delivered
+        self.requested = world.state.requested
+        self.carrier = carrier_of_requested(world)
+        self.carrier_x = 0.0
+        if self.carrier != NOBODY:
+            self.carrier_x = float(world.state.robot_position[self.carrier, 0])
+
+
+Earned = NDArray[np.float64] | float | None  # per robot, the same for all, or nothing
+
+
+def delivery(world: Warehouse, before: Before) -> Earned:
+    """Items delivered in this step, to every robot of the team."""
+    return float(world.state.delivered - before.delivered) or None
+
+
+def own_delivery(world: Warehouse, before: Before) -> Earned:
+    """Items that the robot itself delivered in this step."""
+    new = world.state.delivered_by[before.delivered :]
+    if not new:
+        return None
+    return np.bincount(new, minlength=world.state.n_robots).astype(np.float64)
+
+
+def lift_requested(world: Warehouse, before: Before) -> Earned:
+    """1 to the robot that took up the requested item, -1 to the one that let go of it."""
+    carrier = carrier_of_requested(world)
+    if world.state.requested != before.requested or carrier == before.carrier:
+        return None
+    paid = np.zeros(world.state.n_robots)
+    if carrier != NOBODY:
+        paid[carrier] += 1.0
+    if before.carrier != NOBODY:
+        paid[before.carrier] -= 1.0
+    return paid
+
+
+def approach(world: Warehouse, before: Before) -> Earned:
+    """Metres that the requested item's carrier came nearer to the delivery area.
+
+    Privileged: no robot can sense it, so it may shape a reward but not an observation.
+    """
+    carrier = carrier_of_requested(world)
+    if carrier == NOBODY or carrier != before.carrier or before.requested != world.state.requested:
+        return None
+    paid = np.zeros(world.state.n_robots)
+    edge = world.scenario.storage_width
+    x = world.state.robot_position[carrier, 0]
+    paid[carrier] = min(x, edge) - min(before.carrier_x, edge)
+    return paid
+
+
+def contact(world: Warehouse, before: Before) -> Earned:
+    """Seconds that the robot touched a robot, a wall or an obstacle; weigh it negatively."""
+    return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
+
+
+REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
+    "delivery": delivery,
+    "own_delivery": own_delivery,
+    "lift_requested": lift_requested,
+    "approach": approach,
+    "contact": contact,
 }
 
 

@@ -48,10 +48,10 @@ class WarehouseState:
 
     robot_heading = Column[np.float64]("numbers", HEADING)  # (N,) [rad] from +x to the left, +-pi
     robot_timer = Column[np.float64]("numbers", TIMER)  # (N,) [s] since the area, NaN when silent
-    robot_told = Column[np.float64]("numbers", TOLD)  # (N,) [s] the timer it tells, NaN when silent
+    robot_told = Column[np.float64]("numbers", TOLD)  # (N,) [s] told, NaN when silent
     robot_heard = Column[np.float64](
         "numbers", HEARD
-    )  # (N,) [s] the lowest it hears, NaN when none
+    )  # (N,) [s] lowest heard, NaN when none
     max_speed = Column[np.float64]("numbers", MAX_SPEED)  # (N,) [m/s]
     max_turn_rate = Column[np.float64]("numbers", MAX_TURN_RATE)  # (N,) [rad/s]
     ranger_range = Column[np.float64]("numbers", RANGER_RANGE)  # (N,) [m], 0 when blind
@@ -60,7 +60,7 @@ class WarehouseState:
     robot_present = Column[np.bool_]("flags", PRESENT)  # (N,)
     robot_in_delivery = Column[np.bool_](
         "flags", IN_DELIVERY
-    )  # (N,) its centre is in the delivery area
+    )  # (N,) its centre is in the area
     robot_contact = Column[np.bool_]("flags", CONTACT)  # (N,) touches something solid to it
     # What each robot can do now; failures take from it, as from the ranges and speeds above.
     lifts = Column[np.bool_]("flags", LIFTS)  # (N,)
@@ -74,7 +74,7 @@ class WarehouseState:
     robot_item = Column[np.int64]("links", ITEM)  # (N,) item carried, or NOBODY
     last_in_delivery = Column[np.int64](
         "links", LAST_IN_DELIVERY
-    )  # (N,) step, or NOBODY when never
+    )  # (N,) step, or NOBODY
     item_status = Column[np.int64]("item_links", STATUS)  # (I,) STORED, CARRIED or DELIVERED
     item_carrier = Column[np.int64]("item_links", CARRIER)  # (I,) robot, or NOBODY
 
