@@ -1,0 +1,138 @@
+"""Comparisons: which conditions an indicator sets against each other, and its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.estimate import Estimate, Indicator
+from swarm_logistics_env.studies.conditions import Condition
+
+Performance = Callable[["Arm"], NDArray[np.float64]]
+
+
+class Level(NamedTuple):
+    """One level of a factor: a swarm size, a fault, a parameter's value, or another policy."""
+
+    kind: Literal["size", "fault", "parameter", "policy"]
+    name: str
+    value: float
+    onset: float = 0.0
+
+    def __str__(self) -> str:
+        if self.kind == "size":
+            return f"N = {self.value:g}"
+        if self.kind == "parameter":
+            return f"{self.name} = {self.value:g}"
+        if self.kind == "policy":
+            return f"{self.name}, N = {self.value:g}"
+        if self == NO_FAULT:
+            return "no fault"
+        start = f" from {self.onset:g} s" if self.onset else ""
+        return f"{self.name}, m = {self.value:g}{start}"
+
+
+NO_FAULT = Level("fault", "none", 0)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A condition in the part that it plays in a comparison."""
+
+    level: Level
+    condition: Condition
+
+
+class Question(NamedTuple):
+    """What a comparison asks, whichever policy it is asked of."""
+
+    indicator: Indicator
+    original: Level
+    changed: Level
+    threshold: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One indicator between conditions: is it above `threshold`?
+
+    Attributes:
+        table: heading of the report's table that it stands in.
+        indicator: "S", "FT", "R", "A" or "change".
+        original: the arm of P_o (P_N for S).
+        changed: the arm of P_F, P_new or P_(N+m).
+        removed: the arm of P_S, for FT alone.
+        threshold: that the indicator is tested against.
+        claim: whether the study claims that it is above; None: the study claims nothing.
+    """
+
+    table: str
+    indicator: Indicator
+    original: Arm
+    changed: Arm
+    removed: Arm | None = None
+    threshold: float = 0.0
+    claim: bool | None = None
+
+    @property
+    def policy(self) -> str:
+        """Label of the policy that is judged."""
+        return self.original.condition.policy.label
+
+    @property
+    def question(self) -> Question:
+        """The comparison without its policy."""
+        return Question(self.indicator, self.original.level, self.changed.level, self.threshold)
+
+    @property
+    def family(self) -> tuple[str, Indicator]:
+        """Holm's family: all comparisons of one indicator for one policy."""
+        return self.policy, self.indicator
+
+    @property
+    def arms(self) -> tuple[Arm, ...]:
+        """The two or three arms whose P it needs."""
+        return (self.original, *([self.removed] if self.removed else []), self.changed)
+
+    @property
+    def label(self) -> str:
+        """The step in words, e.g. "N 5 -> 10" or "FM1, m = 2"."""
+        before, after = self.original.level, self.changed.level
+        if after.kind == "size":
+            return f"N {before.value:g} -> {after.value:g}"
+        if after.kind == "parameter":
+            return f"{after.name} {before.value:g} -> {after.value:g}"
+        return str(after)
+
+    def estimate(self, performance: Performance) -> Estimate:
+        """Return the indicator over paired seeds.
+
+        Args:
+            performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
+
+        Raises:
+            IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
+        """
+        before, after = self.original.level.value, self.changed.level.value
+        p_o, p_new = performance(self.original), performance(self.changed)
+        swarm = self.original.condition.scenario.n_robots
+        if self.indicator == "S":
+            return spi.scalability(
+                p_o, p_new, n=int(before), m=int(after - before), threshold=self.threshold
+            )
+        if self.indicator == "FT":
+            assert self.removed is not None
+            p_s = performance(self.removed)
+            return spi.fault_tolerance(
+                p_o, p_new, p_s, n=swarm, m=int(after), threshold=self.threshold
+            )
+        if self.indicator == "R":
+            return spi.robustness(p_o, p_new, n=swarm, m=int(after), threshold=self.threshold)
+        if self.indicator == "A":
+            return spi.adaptability(p_o, p_new, x_o=before, x_new=after, threshold=self.threshold)
+        return spi.relative_change(p_o, p_new, threshold=self.threshold)

@@ -1,0 +1,75 @@
+"""Conditions, known by their content, and the runs that one condition needs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.faults import Fault
+
+
+@dataclass(frozen=True)
+class StudiedPolicy:
+    """A policy as a study knows it.
+
+    Attributes:
+        label: how the report calls it.
+        identity: stable text of its class, parameters and weights; two of one identity are one.
+        source: what makes it: a name for `policies.load`, or the object itself.
+    """
+
+    label: str
+    identity: str
+    source: object = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """All of a run but its seed. Conditions of equal content have equal keys and share runs."""
+
+    policy: StudiedPolicy
+    scenario: Scenario
+    faults: tuple[Fault, ...] = ()
+
+    @cached_property
+    def scenario_json(self) -> str:
+        """The scenario as canonical JSON."""
+        return _canonical(self.scenario.model_dump(mode="json"))
+
+    @cached_property
+    def faults_json(self) -> str:
+        """The faults as canonical JSON, in the order in which they were given."""
+        return _canonical([fault.model_dump(mode="json") for fault in self.faults])
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of scenario, faults and policy identity, 64 hexadecimal digits."""
+        return _digest(self.scenario_json, self.faults_json, self.policy.identity)
+
+    def run(self, code: str, seed: int) -> Run:
+        """Return the run of this condition at one seed, under one version of the code."""
+        run_key = _digest(
+            self.scenario_json, self.faults_json, self.policy.identity, code, str(seed)
+        )
+        return Run(run_key, self, code, seed)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One episode to play. `key` is the digest of everything that decides its outcome."""
+
+    key: str
+    condition: Condition
+    code: str
+    seed: int
+
+
+def _canonical(value: object) -> str:
+    return json.dumps(value, sort_keys=True, separators=(",", ":"))
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256(_canonical(parts).encode()).hexdigest()

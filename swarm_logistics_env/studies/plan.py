@@ -1,0 +1,206 @@
+"""Plan: the conditions and comparisons that follow from a specification, shared ones once."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from swarm_logistics_env import policies
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.studies.code_version import code_version
+from swarm_logistics_env.studies.comparisons import NO_FAULT, Arm, Comparison, Level
+from swarm_logistics_env.studies.conditions import Condition, Run, StudiedPolicy
+from swarm_logistics_env.studies.specification import (
+    Ablation,
+    Factor,
+    Faults,
+    Parameter,
+    Sizes,
+    Specification,
+    policy_label,
+    vary,
+)
+from swarm_logistics_env.warehouse.faults import Fault
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study will run and what it will ask of the results.
+
+    Attributes:
+        specification: what it was made from.
+        comparisons: in the order of the report.
+        code: version of the code that decides what a run gives.
+    """
+
+    specification: Specification
+    comparisons: tuple[Comparison, ...]
+    code: str
+
+    @property
+    def seeds(self) -> range:
+        """The seeds of every condition."""
+        return range(self.specification.seeds)
+
+    @cached_property
+    def cells(self) -> tuple[tuple[str, str, Arm], ...]:
+        """Every (policy label, table, arm) whose P the report shows, each once."""
+        cells = (
+            (comparison.policy, comparison.table, arm)
+            for comparison in self.comparisons
+            for arm in comparison.arms
+        )
+        return tuple(dict.fromkeys(cells))
+
+    @cached_property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The conditions to run, each once however many comparisons share it."""
+        by_key = {arm.condition.key: arm.condition for _, _, arm in self.cells}
+        return tuple(by_key.values())
+
+    def runs(self) -> Iterator[Run]:
+        """Yield every run, seed by seed, so that a study cut short has whole seeds."""
+        for seed in self.seeds:
+            for condition in self.conditions:
+                yield condition.run(self.code, seed)
+
+    def __str__(self) -> str:
+        asked, run = len(self.cells), len(self.conditions)
+        return (
+            f"{self.specification.name}: {len(self.comparisons)} comparisons of {asked} cells; "
+            f"{run} conditions ({asked - run} shared) x {len(self.seeds)} seeds = "
+            f"{run * len(self.seeds)} runs"
+        )
+
+
+def make_plan(specification: Specification) -> Plan:
+    """Return the plan of a study.
+
+    Raises:
+        StudyError: the specification varies nothing, or a step of it cannot be.
+        ScenarioError, FaultError, PolicyError: a condition that cannot be built.
+    """
+    comparisons: list[Comparison] = []
+    for source in specification.policies:
+        policy = studied(source)
+        for sizes in specification.sizes:
+            comparisons += _scalability(specification.scenario, sizes, policy)
+        for faults in specification.faults:
+            comparisons += _faults(specification.scenario, faults, policy)
+        for parameter in specification.parameters:
+            comparisons += _adaptability(specification.scenario, parameter, policy)
+        for ablation in specification.ablations:
+            lesser = studied(ablation.policy)
+            if lesser.identity != policy.identity:
+                comparisons.append(_ablation(specification.scenario, ablation, policy, lesser))
+    if not comparisons:
+        raise StudyError("the study compares nothing: give sizes, faults, parameters or ablations")
+    return Plan(specification, tuple(comparisons), code_version())
+
+
+def studied(source: object) -> StudiedPolicy:
+    """Return the policy that `source` makes, with its identity.
+
+    Raises:
+        PolicyError: it cannot be found or built.
+    """
+    # A copy: what an object of the user's did before must not leak into its first run.
+    policy: Any = policies.load(source) if isinstance(source, str) else copy.deepcopy(source)
+    return StudiedPolicy(policy_label(source), policies.identity(policy), source)
+
+
+def _title(factor: Factor, general: str) -> str:
+    changes = ", ".join(f"{name} = {value}" for name, value in factor.scenario.items())
+    return factor.title or (f"{general} ({changes})" if changes else general)
+
+
+def _scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
+    scenario = vary(base, sizes.scenario)
+    table = _title(sizes, "Scalability")
+    arms = {
+        size: Arm(Level("size", "n_robots", size), _condition(policy, scenario, n_robots=size))
+        for size in sizes.values
+    }
+    steps = list(zip(sizes.values, sizes.values[1:]))
+    for small, large in steps:
+        yield Comparison(table, "S", arms[small], arms[large])
+    for small, large in sizes.superlinear:
+        if (small, large) not in steps:
+            raise StudyError(
+                f"superlinear = ({small}, {large}): should be a step between neighbouring "
+                f"sizes of {sizes.values}"
+            )
+        yield Comparison(table, "S", arms[small], arms[large], threshold=1.0)
+
+
+def _faults(base: Scenario, faults: Faults, policy: StudiedPolicy) -> Iterator[Comparison]:
+    scenario = vary(base, faults.scenario)
+    table = _title(faults, "Fault tolerance and robustness")
+    for m in faults.robots:
+        if m >= scenario.n_robots:
+            raise StudyError(
+                f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, "
+                "or no working robot is left"
+            )
+    for onset in faults.onsets:
+        if onset >= scenario.duration:
+            raise StudyError(
+                f"faults.onsets = {onset:g} s: should be less than duration = "
+                f"{scenario.duration:g} s, or nothing fails"
+            )
+    original = Arm(NO_FAULT, _condition(policy, scenario))
+
+    def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
+        fault = Fault(mode, m, onset=onset, duration=duration)
+        return Arm(Level("fault", mode, m, onset), Condition(policy, scenario, (fault,)))
+
+    for onset in faults.onsets:
+        for mode in faults.modes:
+            for m in faults.robots:
+                failed = arm(mode, m, onset, faults.duration)
+                removed = arm("removed", m, onset, None)
+                yield Comparison(table, "FT", original, failed, removed)
+                yield Comparison(table, "R", original, failed)
+
+
+def _adaptability(
+    base: Scenario, parameter: Parameter, policy: StudiedPolicy
+) -> Iterator[Comparison]:
+    scenario = vary(base, parameter.scenario)
+    table = _title(parameter, f"Adaptability to {parameter.name}")
+    original, *changed = (
+        Arm(
+            Level("parameter", parameter.name, value),
+            _condition(policy, scenario, **{parameter.name: value}),
+        )
+        for value in parameter.values
+    )
+    for arm in changed:
+        yield Comparison(table, "A", original, arm)
+
+
+def _ablation(
+    base: Scenario, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy
+) -> Comparison:
+    scenario = vary(base, ablation.scenario)
+    whole, part = (
+        Arm(Level("policy", label.label, scenario.n_robots), _condition(label, scenario))
+        for label in (policy, lesser)
+    )
+    # "P falls by more than a share" is the opposite of "the change is above minus that share".
+    return Comparison(
+        _title(ablation, "Ablation"),
+        "change",
+        whole,
+        part,
+        threshold=-ablation.fall if ablation.fall else 0.0,
+        claim=False,
+    )
+
+
+def _condition(policy: StudiedPolicy, scenario: Scenario, **fields: float) -> Condition:
+    return Condition(policy, scenario.replace(**fields))

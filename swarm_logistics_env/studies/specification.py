@@ -1,0 +1,199 @@
+"""Specification: what a study asks, as one validated record (TOML, JSON or Python)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, ClassVar
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    NonNegativeFloat,
+    PlainSerializer,
+    PositiveFloat,
+    PositiveInt,
+    field_validator,
+)
+
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.records import Record
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.faults import FAILURE_MODES
+
+ScenarioFields = dict[str, Any]
+
+
+def vary(base: Scenario, fields: ScenarioFields) -> Scenario:
+    """Return `base` with `fields` changed; the field "preset" starts from that preset instead."""
+    changes = dict(fields)
+    if "preset" in changes:
+        base = Scenario.preset(str(changes.pop("preset")))
+    return base.replace(**changes)
+
+
+def policy_label(source: object) -> str:
+    """Return how a study calls a policy: the name it was asked for, or its class's name."""
+    return source if isinstance(source, str) else type(source).__name__
+
+
+def _policy(value: object) -> object:
+    if isinstance(value, str) or (hasattr(value, "reset") and hasattr(value, "act")):
+        return value
+    raise ValueError("should be a policy's name, its path, or an object with reset and act")
+
+
+def _scenario(value: object) -> object:
+    return vary(Scenario(), value) if isinstance(value, dict) else value
+
+
+def _each(record: type[Record]) -> Callable[[object], object]:
+    # Through the record's own constructor, whose errors suggest the field that was meant.
+    def build(values: object) -> object:
+        if not isinstance(values, list | tuple):
+            return values
+        return tuple(record(**value) if isinstance(value, dict) else value for value in values)
+
+    return build
+
+
+PolicySource = Annotated[Any, BeforeValidator(_policy), PlainSerializer(policy_label)]
+
+
+class _Part(Record):
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+
+class Factor(_Part):
+    """What is varied, from which scenario.
+
+    Args:
+        title: heading in the report; empty: made from the factor.
+        scenario: fields that differ from the study's base scenario; "preset" is one of them.
+    """
+
+    title: str = ""
+    scenario: ScenarioFields = Field(default_factory=dict)
+
+
+class Sizes(Factor):
+    """Swarm sizes N, ascending: scalability S of every step.
+
+    Args:
+        values: swarm sizes [robots].
+        superlinear: steps (N, N + m) of which S > 1 is asked as well.
+    """
+
+    values: Annotated[tuple[PositiveInt, ...], Field(min_length=2)]
+    superlinear: tuple[tuple[PositiveInt, PositiveInt], ...] = ()
+
+    @field_validator("values")
+    @classmethod
+    def _ascending(cls, values: tuple[int, ...]) -> tuple[int, ...]:
+        if list(values) != sorted(set(values)):
+            raise ValueError("should be ascending, each size once")
+        return values
+
+
+class Faults(Factor):
+    """Failure modes x numbers of faulty robots x onsets: fault tolerance FT and robustness R.
+
+    Args:
+        modes: keys of `FAILURE_MODES` other than "removed", which is the reference P_S.
+        robots: numbers m of faulty robots, each below the swarm size.
+        onsets: when they fail [s].
+        duration: for how long [s]; None: for good.
+    """
+
+    modes: Annotated[tuple[str, ...], Field(min_length=1)]
+    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
+    onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1)] = (0.0,)
+    duration: PositiveFloat | None = None
+
+    @field_validator("modes")
+    @classmethod
+    def _known(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
+        known = set(FAILURE_MODES) - {"removed"}
+        for mode in modes:
+            if mode not in known:
+                raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
+        return modes
+
+
+class Parameter(Factor):
+    """Values of one field of the scenario: adaptability A from the first value to each other.
+
+    Args:
+        name: a numeric field of `Scenario`.
+        values: x_o first, then every x_new, in the field's unit.
+    """
+
+    name: str
+    values: Annotated[tuple[PositiveFloat, ...], Field(min_length=2)]
+
+    @field_validator("name")
+    @classmethod
+    def _numeric(cls, name: str) -> str:
+        known = {
+            field
+            for field, value in Scenario().model_dump().items()
+            if isinstance(value, int | float) and not isinstance(value, bool)
+        } - {"n_robots"}
+        if name == "n_robots":
+            raise ValueError("swarm sizes belong in `sizes`, where S judges them")
+        if name not in known:
+            raise ValueError(f"no numeric scenario field {name!r}{suggest(name, known)}")
+        return name
+
+    @field_validator("values")
+    @classmethod
+    def _distinct(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if len(set(values)) < len(values):
+            raise ValueError("should hold each value once")
+        return values
+
+
+class Ablation(Factor):
+    """A second policy that lacks a part of the studied one: does P fall without it?
+
+    Args:
+        policy: the policy without the part.
+        fall: P is claimed to fall by more than this share of P, in [0, 1).
+    """
+
+    policy: PolicySource
+    fall: Annotated[float, Field(ge=0, lt=1)] = 0.0
+
+
+class Specification(_Part):
+    """All that a study asks: which policies, under which conditions, over how many seeds.
+
+    Args:
+        name: of the study.
+        policies: names, paths or objects with `reset` and `act`.
+        seeds: number of seeds; 0 .. seeds - 1, the same for every condition.
+        scenario: the base; a dict of fields, "preset" among them, makes one.
+        sizes, faults, parameters, ablations: what is varied.
+        reference: published results that the report sets beside ours.
+
+    Raises:
+        StudyError: an unknown field or a value that cannot be, each named.
+    """
+
+    name: str = "study"
+    policies: Annotated[tuple[PolicySource, ...], Field(min_length=1)] = ("swarm-dt",)
+    seeds: PositiveInt = 20
+    scenario: Annotated[Scenario, BeforeValidator(_scenario)] = Scenario()
+    sizes: Annotated[tuple[Sizes, ...], BeforeValidator(_each(Sizes))] = ()
+    faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
+    parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
+    ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
+    reference: str | None = None
+
+    @field_validator("policies")
+    @classmethod
+    def _once(cls, policies: tuple[object, ...]) -> tuple[object, ...]:
+        labels = [policy_label(policy) for policy in policies]
+        for label in labels:
+            if labels.count(label) > 1:
+                raise ValueError(f"policy {label!r} is given twice")
+        return policies

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.conditions import Condition, StudiedPolicy
+from swarm_logistics_env.warehouse import Fault
+
+
+def test_paper_counted_by_hand() -> None:
+    plan = Study.preset("paper").plan()
+    # 9 sizes; no fault, 3 removed, 4 modes x 3; widths 5, 15, 20 (10 is the base); delivery 1.5,
+    # 1, .5 (2 is the base); 70 items (60 is the base); random walk at N = 25 and N = 100.
+    assert len(plan.conditions) == 9 + (1 + 3 + 12) + 3 + 3 + 1 + 2
+    # 8 steps and 2 questions of superlinearity; FT and R of 12; 3 + 3 + 1 of A; 2 ablations.
+    assert len(plan.comparisons) == 10 + 2 * 12 + 7 + 2
+    assert len(list(plan.runs())) == 34 * 20
+
+
+def test_second_policy_doubles_all_but_the_ablation_it_is() -> None:
+    plan = Study.preset("paper", policies=("swarm-dt", "random-walk")).plan()
+    # The two ablation conditions of the first policy are conditions of the second one anyway.
+    assert len(plan.conditions) == 2 * 32
+    assert {c.policy for c in plan.comparisons if c.indicator == "change"} == {"swarm-dt"}
+
+
+def test_removed_robots_are_those_that_fail(small: dict[str, Any]) -> None:
+    plan = Study(**small).plan()
+    for comparison in plan.comparisons:
+        if comparison.indicator == "FT":
+            assert comparison.removed is not None
+            (removed,) = comparison.removed.condition.faults
+            (failed,) = comparison.changed.condition.faults
+            assert (removed.mode, removed.robots, removed.onset) == (
+                "removed",
+                failed.robots,
+                failed.onset,
+            )
+            assert comparison.removed.condition.scenario == comparison.original.condition.scenario
+
+
+def test_conditions_are_known_by_content() -> None:
+    one = StudiedPolicy("one", "same", "swarm-dt")
+    other_name = StudiedPolicy("other", "same", "swarm-dt")
+    other_policy = StudiedPolicy("one", "different", "swarm-dt")
+    base = Condition(one, Scenario(), (Fault("FM1", 2),))
+    assert base.key == Condition(other_name, Scenario(n_robots=25), (Fault("FM1", 2),)).key
+    others = [
+        Condition(other_policy, Scenario(), (Fault("FM1", 2),)),
+        Condition(one, Scenario(n_robots=26), (Fault("FM1", 2),)),
+        Condition(one, Scenario(), (Fault("FM1", 1),)),
+        Condition(one, Scenario(), (Fault("FM1", 2, onset=1.0),)),
+        Condition(one, Scenario()),
+    ]
+    assert len({base.key, *(other.key for other in others)}) == 6
+    runs = {base.run("a", 0).key, base.run("a", 1).key, base.run("b", 0).key}
+    assert len(runs) == 3
+
+
+def test_policy_parameters_make_another_condition() -> None:
+    fields: dict[str, Any] = {"sizes": [{"values": [2, 3]}], "scenario": {"n_items": 5}}
+    named = Study(policies=["swarm-dt"], **fields).plan()
+    built = Study(policies=[SwarmDT()], **fields).plan()
+    other = Study(policies=[SwarmDT(taxis_gain=0.1)], **fields).plan()
+    assert {c.key for c in named.conditions} == {c.key for c in built.conditions}
+    assert not {c.key for c in named.conditions} & {c.key for c in other.conditions}
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"sizes": [{"valeus": [2, 3]}]}, "Sizes has no field 'valeus'; did you mean 'values'?"),
+        ({"seedz": 3}, "did you mean 'seeds'?"),
+        ({"seeds": 0}, "Specification.seeds = 0: should be greater than 0"),
+        ({"scenario": {"n_robot": 3}}, "did you mean 'n_robots'?"),
+        ({"scenario": {"preset": "papr"}}, "did you mean 'paper'?"),
+        ({"sizes": [{"values": [5, 5]}]}, "ascending"),
+        ({"sizes": [{"values": [5, 9], "superlinear": [[5, 8]]}]}, "neighbouring sizes"),
+        ({"faults": [{"modes": ["FM9"]}]}, "no failure mode 'FM9'; did you mean"),
+        ({"faults": [{"modes": ["removed"]}]}, "no failure mode 'removed'"),
+        ({"faults": [{"modes": ["FM1"], "robots": [25]}]}, "no working robot is left"),
+        ({"faults": [{"modes": ["FM1"], "onsets": [500]}]}, "or nothing fails"),
+        ({"parameters": [{"name": "relay", "values": [1, 2]}]}, "no numeric scenario field"),
+        ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
+        ({"parameters": [{"name": "n_items", "values": [60.5, 70]}]}, "60.5"),
+        ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
+        ({"policies": [3]}, "an object with reset and act"),
+        ({}, "compares nothing"),
+    ],
+)
+def test_bad_specification_is_refused_in_words(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(SwarmLogisticsError) as caught:
+        Study(**fields).plan()
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_policy_is_refused_before_any_run() -> None:
+    with pytest.raises(PolicyError, match="swarm-dt"):
+        Study.preset("paper", policies=("swarm-td",)).plan()
+
+
+def test_unknown_preset() -> None:
+    with pytest.raises(StudyError, match="did you mean 'paper'"):
+        Study.preset("papr")
