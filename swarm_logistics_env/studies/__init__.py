@@ -1,0 +1,7 @@
+"""Studies: from a specification to runs, a store, verdicts and a report."""
+
+from __future__ import annotations
+
+from swarm_logistics_env.studies.study import Study
+
+__all__ = ["Study"]

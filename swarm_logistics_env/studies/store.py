@@ -1,0 +1,246 @@
+"""Store: one SQLite file per study, one transaction per finished run."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies.conditions import Run
+from swarm_logistics_env.studies.execution import Outcome
+
+FILE_NAME = "study.sqlite"
+SCHEMA_VERSION = 1
+APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
+
+_SCHEMA = """
+CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE conditions (
+    condition TEXT PRIMARY KEY,
+    policy TEXT NOT NULL,
+    policy_identity TEXT NOT NULL,
+    scenario TEXT NOT NULL,  -- JSON
+    faults TEXT NOT NULL     -- JSON
+) WITHOUT ROWID;
+CREATE TABLE runs (
+    run TEXT PRIMARY KEY,
+    condition TEXT NOT NULL REFERENCES conditions,
+    code TEXT NOT NULL,
+    seed INTEGER NOT NULL,
+    delivered INTEGER,           -- NULL, like all of the result, where the run failed
+    delivery_times BLOB,         -- float64, little-endian [s]
+    ended_at REAL,               -- [s]
+    all_delivered INTEGER,
+    failed_robots TEXT,          -- JSON
+    anchoring_seconds REAL,
+    error TEXT,                  -- traceback
+    wall_seconds REAL NOT NULL,
+    UNIQUE (condition, code, seed)
+) WITHOUT ROWID;
+"""
+
+_ROWS = """
+SELECT run, condition, policy, policy_identity, code, seed, delivered, ended_at, all_delivered,
+       anchoring_seconds, failed_robots, delivery_times, scenario, faults, error
+FROM runs JOIN conditions USING (condition) ORDER BY run
+"""
+
+
+class Store:
+    """The finished runs of a study. A run is kept from the moment that `add` returns.
+
+    Args:
+        path: the file, made where it is missing; None: kept in memory only.
+
+    Raises:
+        StudyError: the file is not a store, or its schema is not this version's.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        with self._explained():
+            # Autocommit: transactions are opened by hand, one per run.
+            self._database = sqlite3.connect(path or ":memory:", timeout=60.0, isolation_level=None)
+            try:
+                self._prepare()
+            except BaseException:
+                self._database.close()
+                raise
+
+    @classmethod
+    def existing(cls, directory: Path) -> Self:
+        """Open the store of a study that was run before.
+
+        Raises:
+            StudyError: there is none.
+        """
+        path = directory / FILE_NAME
+        if not path.is_file():
+            raise StudyError(f"no study in {directory}: there is no file {path}")
+        return cls(path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._database.close()
+
+    def add(self, run: Run, outcome: Outcome) -> None:
+        """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
+        condition = run.condition
+        failed = outcome.error is not None
+        times = outcome.delivery_times.astype("<f8").tobytes()
+        result: tuple[object, ...] = (
+            outcome.delivered,
+            times,
+            outcome.ended_at,
+            int(outcome.all_delivered),
+            json.dumps(outcome.failed_robots),
+            outcome.anchoring_seconds,
+        )
+        with self._transaction():
+            self._database.execute(
+                "INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?)",
+                (
+                    condition.key,
+                    condition.policy.label,
+                    condition.policy.identity,
+                    condition.scenario_json,
+                    condition.faults_json,
+                ),
+            )
+            self._database.execute(
+                "DELETE FROM runs WHERE run = ? AND error IS NOT NULL", (run.key,)
+            )
+            self._database.execute(
+                "INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (
+                    run.key,
+                    condition.key,
+                    run.code,
+                    run.seed,
+                    *((None,) * len(result) if failed else result),
+                    outcome.error,
+                    outcome.wall_seconds,
+                ),
+            )
+
+    def succeeded(self) -> set[str]:
+        """Return the keys of the runs that need not run again."""
+        with self._explained():
+            rows = self._database.execute("SELECT run FROM runs WHERE error IS NULL")
+            return {run for (run,) in rows}
+
+    def outcomes(self, runs: Iterable[Run]) -> dict[str, Outcome]:
+        """Return the outcomes of those of `runs` that finished, by key."""
+        wanted = {run.key for run in runs}
+        found = {}
+        with self._explained():
+            rows = self._database.execute(
+                "SELECT run, delivery_times, ended_at, all_delivered, failed_robots,"
+                " anchoring_seconds, error, wall_seconds FROM runs"
+            )
+            for run, times, ended_at, all_delivered, robots, anchoring, error, wall in rows:
+                if run not in wanted:
+                    continue
+                if error is not None:
+                    found[run] = Outcome(run, error=error, wall_seconds=wall)
+                    continue
+                found[run] = Outcome(
+                    run,
+                    delivery_times=np.frombuffer(times, dtype="<f8"),
+                    ended_at=ended_at,
+                    all_delivered=bool(all_delivered),
+                    failed_robots=tuple(json.loads(robots)),
+                    anchoring_seconds=anchoring,
+                    wall_seconds=wall,
+                )
+        return found
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield every stored run as one flat row, sorted by key, without wall times.
+
+        `delivery_times` is a list [s]; the fields of a result are None where the run failed.
+        """
+        with self._explained():
+            cursor = self._database.execute(_ROWS)
+            names = [column[0] for column in cursor.description]
+            for values in cursor:
+                row = dict(zip(names, values))
+                if row["delivery_times"] is not None:
+                    row["delivery_times"] = np.frombuffer(row["delivery_times"], "<f8").tolist()
+                yield row
+
+    def note(self, name: str) -> str | None:
+        """Return what was noted under `name`."""
+        with self._explained():
+            row = self._database.execute(
+                "SELECT value FROM notes WHERE name = ?", (name,)
+            ).fetchone()
+            return None if row is None else str(row[0])
+
+    def set_note(self, name: str, value: str) -> None:
+        """Note a fact about the study."""
+        with self._transaction():
+            self._database.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
+
+    def _prepare(self) -> None:
+        (version,) = self._database.execute("PRAGMA user_version").fetchone()
+        (application,) = self._database.execute("PRAGMA application_id").fetchone()
+        (tables,) = self._database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if application != APPLICATION_ID and tables:
+            raise StudyError(f"{self.path} is a database, but not the store of a study")
+        if application == APPLICATION_ID and version != SCHEMA_VERSION:
+            raise StudyError(
+                f"{self.path} has store schema {version}, this version of the package reads "
+                f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
+            )
+        # A process that is killed loses nothing; a power cut at most the latest runs.
+        self._database.execute("PRAGMA journal_mode = WAL")
+        self._database.execute("PRAGMA synchronous = NORMAL")
+        if application == APPLICATION_ID:
+            return
+        with self._transaction():
+            # Another process may have made the tables since: two shards start at once.
+            (tables,) = self._database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+            if tables:
+                return
+            for statement in _SCHEMA.split(";\n"):
+                self._database.execute(statement)
+            self._database.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            self._database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with self._explained():
+            self._database.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+            except BaseException:
+                if self._database.in_transaction:
+                    self._database.execute("ROLLBACK")
+                raise
+            self._database.execute("COMMIT")
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise StudyError(f"cannot use the store {self.path}: {error}") from error

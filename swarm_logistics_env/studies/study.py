@@ -1,0 +1,187 @@
+"""Study: plan it, run it, ask it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.studies.engines import Engine, serial
+from swarm_logistics_env.studies.judgement import Findings, judge
+from swarm_logistics_env.studies.plan import Plan, make_plan
+from swarm_logistics_env.studies.progress import Progress
+from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.store import FILE_NAME, Store
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_DECLARED_SEEDS = "declared_seeds"
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What one call of `Study.run` did.
+
+    Attributes:
+        played: runs played now; failed: those of them that failed; kept: found in the store.
+        seconds: wall-clock time [s].
+    """
+
+    played: int
+    failed: int
+    kept: int
+    seconds: float
+
+
+class Study:
+    """A study of how a swarm copes: conditions, paired seeds, indicators with their verdicts.
+
+    Args:
+        out: directory of the store and the report; None: kept in memory.
+        fields: those of `Specification`, e.g. `policies=["swarm-dt"]`, `seeds=20`,
+            `faults=[{"modes": ["FM1"], "robots": [1, 2]}]`.
+
+    Raises:
+        StudyError: a field is unknown or cannot be.
+
+    Example:
+        >>> study = Study(
+        ...     seeds=2, scenario={"duration": 5.0}, faults=[{"modes": ["FM1"], "robots": [1]}]
+        ... )
+        >>> len(study.plan().conditions)
+        3
+    """
+
+    def __init__(self, *, out: str | Path | None = None, **fields: Any) -> None:
+        self.specification = Specification(**fields)
+        self.out = None if out is None else Path(out)
+        self._plan: Plan | None = None
+        self._memory: Store | None = None
+
+    @classmethod
+    def preset(cls, name: str, *, out: str | Path | None = None, **fields: Any) -> Self:
+        """Return the preset study of that name, with some fields changed.
+
+        Raises:
+            StudyError: there is no such preset, or a field cannot be.
+        """
+        known = presets()
+        if name not in known:
+            raise StudyError(f"no study preset {name!r}{suggest(name, known)}")
+        study = cls(out=out)
+        study.specification = known[name].replace(**fields)
+        return study
+
+    def plan(self) -> Plan:
+        """Return the conditions and comparisons, shared conditions once; nothing is run."""
+        if self._plan is None:
+            self._plan = make_plan(self.specification)
+        return self._plan
+
+    def run(self, engine: Engine | None = None, processes: int = 1) -> Tally:
+        """Play the runs that are missing, and those that failed before; each is kept at once.
+
+        Args:
+            engine: what plays them; None: this process, or `processes` of them. More than one need
+                the caller to stand under `if __name__ == "__main__":`.
+
+        Raises:
+            StudyError: the store or the engine cannot be used.
+        """
+        plan = self.plan()
+        if engine is None and processes > 1:
+            from swarm_logistics_env.studies.engines.processes import Processes
+
+            engine = Processes(processes)
+        with self._store() as store:
+            if store.note(_DECLARED_SEEDS) is None:
+                store.set_note(_DECLARED_SEEDS, str(len(plan.seeds)))
+            store.set_note("specification", self.specification.to_json())
+            done = store.succeeded()
+            runs = [run for run in plan.runs() if run.key not in done]
+            kept = len(plan.conditions) * len(plan.seeds) - len(runs)
+            finished = (engine or serial)(runs)
+            # Closed at once where this stops early, so that no worker outlives it.
+            with closing(finished), Progress(len(runs), self.specification.name) as progress:
+                for run, outcome in finished:
+                    store.add(run, outcome)
+                    progress.advance(outcome)
+                return Tally(progress.done, progress.failed, kept, progress.seconds)
+
+    def findings(self) -> Findings:
+        """Return every cell and every verdict, from the runs that are there.
+
+        Raises:
+            StudyError: nothing has been run.
+        """
+        plan = self.plan()
+        with self._store(existing=True) as store:
+            declared = store.note(_DECLARED_SEEDS)
+            return judge(
+                plan,
+                store.outcomes(plan.runs()),
+                len(plan.seeds) if declared is None else int(declared),
+            )
+
+    def results(self) -> pd.DataFrame:
+        """Return one row per finished run: condition, seed, P, delivery times [s], error."""
+        import pandas as pd
+
+        wanted = {run.key for run in self.plan().runs()}
+        with self._store(existing=True) as store:
+            return pd.DataFrame(row for row in store.rows() if row["run"] in wanted)
+
+    def indicators(self) -> pd.DataFrame:
+        """Return one row per comparison: indicator, interval, verdicts, claim."""
+        import pandas as pd
+
+        from swarm_logistics_env.studies.reporting.files import judgement_record
+
+        return pd.DataFrame(judgement_record(j) for j in self.findings().judgements)
+
+    def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
+        """Write report.md, cells.csv and claims.csv into a directory; return their paths.
+
+        Args:
+            path: the directory; None: the study's own.
+
+        Raises:
+            StudyError: nothing has been run, there is no directory, or it cannot be written.
+        """
+        from swarm_logistics_env.studies.reporting.files import write_report
+
+        directory = self.out if path is None else Path(path)
+        if directory is None:
+            raise StudyError("report needs a path: the study is kept in memory")
+        return write_report(self.findings(), directory)
+
+    @contextmanager
+    def _store(self, *, existing: bool = False) -> Iterator[Store]:
+        if self.out is not None:
+            if existing:
+                opened = Store.existing(self.out)
+            else:
+                try:
+                    self.out.mkdir(parents=True, exist_ok=True)
+                except OSError as error:
+                    raise StudyError(f"cannot write to {self.out}: {error.strerror}") from error
+                opened = Store(self.out / FILE_NAME)
+            with opened:
+                yield opened
+            return
+        if self._memory is None:
+            if existing:
+                raise StudyError("nothing has been run: call run() first")
+            self._memory = Store(None)
+        yield self._memory
+
+
+def presets() -> dict[str, Specification]:
+    """Return the studies that come with the package, by name."""
+    from swarm_logistics_env.studies.paper import SPECIFICATION
+
+    return {SPECIFICATION.name: SPECIFICATION}

@@ -1,0 +1,255 @@
+"""A study from end to end: engines agree, failures are kept, a killed study goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.reporting.files import export_rows
+from swarm_logistics_env.studies.store import FILE_NAME, Store
+
+DYING = """
+import os, pathlib, signal
+from swarm_logistics_env.policies import SwarmDT
+
+class Dying(SwarmDT):
+    identity = "dying"
+    def act(self, observations):
+        flag = pathlib.Path(os.environ["DYING_FLAG"])
+        if os.environ["DYING_ALWAYS"] == "yes" or not flag.exists():
+            flag.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().act(observations)
+"""
+
+SCRIPT = """
+import json, sys
+from swarm_logistics_env.studies import Study
+
+if __name__ == "__main__":
+    study = Study(out=sys.argv[1], **json.loads(sys.argv[2]))
+    study.run(processes=2)
+    study.report()
+"""
+
+
+class Failing(SwarmDT):
+    """Swarm D-T that breaks down where it is told to."""
+
+    identity = "failing"
+    broken = True
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        if Failing.broken:
+            raise RuntimeError("a wheel came off")
+        return np.asarray(super().act(observations), dtype=np.float64)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small study, played in this process."""
+    directory = tmp_path_factory.mktemp("undisturbed")
+    study = Study(out=directory, **SMALL)
+    study.run()
+    study.report()
+    return directory
+
+
+SMALL: dict[str, Any] = {
+    "name": "small",
+    "seeds": 3,
+    "scenario": {
+        "n_robots": 4,
+        "n_items": 8,
+        "warehouse_width": 3.0,
+        "warehouse_height": 3.0,
+        "delivery_width": 1.0,
+        "duration": 30.0,
+    },
+    "sizes": [{"values": [2, 4, 6]}],
+    "faults": [{"modes": ["FM1", "FM4"], "robots": [1, 2], "onsets": [0.0, 10.0]}],
+    "parameters": [{"name": "delivery_width", "values": [1.0, 0.5]}],
+    "ablations": [{"policy": "random-walk"}],
+}
+
+
+def export(directory: Path) -> bytes:
+    path = directory / "export.csv"
+    with Store.existing(directory) as store:
+        export_rows(store, path)
+    return path.read_bytes()
+
+
+def reports(directory: Path) -> list[bytes]:
+    return [(directory / name).read_bytes() for name in ("report.md", "cells.csv", "claims.csv")]
+
+
+def test_swarm_delivers_and_rows_are_sound(undisturbed: Path) -> None:
+    with Store.existing(undisturbed) as store:
+        rows = list(store.rows())
+    assert len(rows) == len(list(Study(**SMALL).plan().runs()))
+    assert sum(row["delivered"] for row in rows) > 0
+    assert all(len(row["delivery_times"]) == row["delivered"] for row in rows)
+    assert all(row["error"] is None for row in rows)
+
+
+def test_processes_give_the_same_bytes(undisturbed: Path, tmp_path: Path) -> None:
+    study = Study(out=tmp_path, **SMALL)
+    study.run(processes=2)
+    study.report()
+    assert export(tmp_path) == export(undisturbed)
+    assert reports(tmp_path) == reports(undisturbed)
+
+
+def test_killed_study_goes_on(undisturbed: Path, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    out = tmp_path / "out"
+    command = [sys.executable, str(script), str(out), json.dumps(SMALL)]
+    finished = 0
+    total = len(list(Study(**SMALL).plan().runs()))
+    for goal in (1, total // 2):
+        process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE)
+        while stored(out) < goal:
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.002)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        now = stored(out)
+        assert finished < now < total
+        finished = now
+    subprocess.run(command, check=True)
+    assert export(out) == export(undisturbed)
+    assert reports(out) == reports(undisturbed)
+
+
+def stored(directory: Path) -> int:
+    path = directory / FILE_NAME
+    if not path.is_file():
+        return 0
+    database = sqlite3.connect(path)
+    try:
+        return int(database.execute("SELECT count(*) FROM runs").fetchone()[0])
+    except sqlite3.OperationalError:  # not yet made
+        return 0
+    finally:
+        database.close()
+
+
+def test_finished_runs_are_kept_and_seeds_can_be_added(tmp_path: Path) -> None:
+    fields = {**SMALL, "faults": [], "parameters": [], "ablations": []}
+    first = Study(out=tmp_path, **{**fields, "seeds": 2})
+    assert first.run().played == 3 * 2
+    assert first.run().played == 0
+    assert not first.findings().exploratory
+    more = Study(out=tmp_path, **{**fields, "seeds": 3})
+    tally = more.run()
+    assert (tally.played, tally.kept) == (3, 6)
+    assert more.findings().exploratory
+    assert len(more.results()) == 9
+
+
+def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:
+    fields: dict[str, Any] = {
+        **SMALL,
+        "policies": [Failing()],
+        "faults": [],
+        "parameters": [],
+        "ablations": [],
+    }
+    study = Study(out=tmp_path, **fields)
+    tally = study.run()
+    assert tally.failed == tally.played == 9
+    errors = study.results()["error"]
+    assert errors.str.contains("RuntimeError: a wheel came off").all()
+    assert errors.str.contains("Traceback").all()
+    for judgement in study.findings().judgements:
+        assert judgement.estimate is None
+        assert judgement.adjusted_verdict is None
+        assert "3 of 3 runs failed" in str(judgement.problem)
+    study.report()
+    assert "blocked" in (tmp_path / "report.md").read_text()
+    Failing.broken = False
+    try:
+        assert study.run().failed == 0
+    finally:
+        Failing.broken = True
+    assert study.results()["error"].isna().all()
+    assert all(judgement.estimate for judgement in study.findings().judgements)
+
+
+def test_one_failed_run_blocks_its_family_under_holm(tmp_path: Path) -> None:
+    fields = {**SMALL, "faults": [], "parameters": [], "ablations": []}
+    study = Study(out=tmp_path, **fields)
+    study.run()
+    largest = next(c for c in study.plan().conditions if c.scenario.n_robots == 6)
+    with sqlite3.connect(tmp_path / FILE_NAME) as database:
+        database.execute(
+            "UPDATE runs SET error = 'Traceback', delivered = NULL WHERE run = ?",
+            (largest.run(study.plan().code, 1).key,),
+        )
+    database.close()
+    first, second = study.findings().judgements
+    assert first.estimate is not None
+    assert first.adjusted_verdict is None
+    assert second.problem == "N = 6: 1 of 3 runs failed"
+
+
+@pytest.mark.parametrize("always", ["no", "yes"])
+def test_run_whose_worker_is_killed_is_tried_again_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, always: str
+) -> None:
+    (tmp_path / "dying_policy.py").write_text(DYING)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("DYING_FLAG", str(tmp_path / "flag"))
+    monkeypatch.setenv("DYING_ALWAYS", always)
+    study = Study(
+        out=tmp_path / "out",
+        policies=["dying_policy:Dying"],
+        seeds=1,
+        scenario=SMALL["scenario"],
+        sizes=[{"values": [2, 4]}],
+    )
+    tally = study.run(processes=2)
+    assert tally.played == 2
+    assert tally.failed == (2 if always == "yes" else 0)
+    if always == "yes":
+        assert study.results()["error"].str.contains("SIGKILL").all()
+
+
+def test_policy_that_cannot_travel_is_refused(tmp_path: Path) -> None:
+    class Local(SwarmDT):
+        identity = "local"
+
+    study = Study(
+        out=tmp_path, policies=[Local()], seeds=1, scenario=SMALL["scenario"], sizes=SMALL["sizes"]
+    )
+    with pytest.raises(StudyError, match="use one process"):
+        study.run(processes=2)
+    assert study.run(processes=1).failed == 0
+
+
+def test_study_in_memory() -> None:
+    study = Study(**{**SMALL, "seeds": 2})
+    with pytest.raises(StudyError, match="nothing has been run"):
+        study.results()
+    study.run()
+    table = study.indicators()
+    assert list(table["indicator"].unique()) == ["S", "FT", "R", "A", "change"]
+    assert table["problem"].isna().all()
+    with pytest.raises(StudyError, match="report needs a path"):
+        study.report()
