@@ -1,0 +1,221 @@
+"""Judgement: what the finished runs say about every cell and every comparison of a plan."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.comparisons import Arm, Comparison
+from swarm_logistics_env.studies.conditions import Condition
+from swarm_logistics_env.studies.execution import Outcome
+from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.reference import Reference, load_reference
+
+POWER = 0.8
+
+
+@dataclass(frozen=True)
+class Cell:
+    """P of one arm over the seeds that succeeded.
+
+    Attributes:
+        performance: P [items], shape (n,), seed by seed.
+        problem: why the runs are not complete; None: they are.
+        saturated: whether any seed delivered every item, so that P is capped.
+        published: P of the reference; counted: whether it is one of the reference's cells.
+    """
+
+    policy: str
+    table: str
+    arm: Arm
+    performance: NDArray[np.float64]
+    problem: str | None
+    saturated: bool
+    published: float | None
+    counted: bool
+
+    @property
+    def mean(self) -> Interval | None:
+        """Mean P with its 95 % interval; None without any run."""
+        return spi.mean_interval(self.performance) if self.performance.size else None
+
+    @property
+    def prediction(self) -> Interval | None:
+        """Mean P with the 95 % interval of one further run; None without any run."""
+        return spi.prediction_interval(self.performance) if self.performance.size else None
+
+    @property
+    def published_inside(self) -> bool | None:
+        """Whether the published run lies within the prediction interval; None: cannot be said."""
+        prediction = self.prediction
+        if self.published is None or prediction is None:
+            return None
+        if prediction.low is None or prediction.high is None:
+            return None
+        return prediction.low <= self.published <= prediction.high
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict on one comparison.
+
+    Attributes:
+        estimate: with the unadjusted verdict; None: blocked.
+        adjusted_p, adjusted_verdict: under Holm within the family; None: blocked.
+        problem: why it is blocked, e.g. a failed run.
+        saturated: it rests on a cell whose P is capped.
+        claim: what is claimed: above the threshold (True), not above (False), nothing (None).
+        published: the reference's value of the indicator.
+        seeds_needed: for 80 % power at the published value; else `no_plan` says why there is none.
+    """
+
+    comparison: Comparison
+    estimate: Estimate | None
+    problem: str | None
+    saturated: bool
+    claim: bool | None
+    published: float | None
+    seeds_needed: int | None = None
+    no_plan: str | None = None
+    adjusted_p: float | None = None
+    adjusted_verdict: Verdict | None = None
+
+    def on_claim(self, verdict: Verdict | None) -> Verdict | None:
+        """Turn a verdict on "above the threshold" into one on what is claimed."""
+        if verdict is None or self.claim is None:
+            return None
+        if self.claim or verdict == "inconclusive":
+            return verdict
+        return "supported" if verdict == "refuted" else "refuted"
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All that a report says.
+
+    Attributes:
+        plan: of the study.
+        cells: every P, in the order of the tables.
+        judgements: every comparison, in the order of the tables.
+        exploratory: more seeds than were declared at the study's start, so the verdicts' error
+            level is not the nominal one.
+    """
+
+    plan: Plan
+    reference: Reference | None
+    cells: tuple[Cell, ...]
+    judgements: tuple[Judgement, ...]
+    exploratory: bool
+
+
+def judge(plan: Plan, outcomes: Mapping[str, Outcome], declared_seeds: int) -> Findings:
+    """Judge a plan by the outcomes of its runs, keyed by run.
+
+    A comparison that needs a run which failed or is missing is blocked, and with it the adjusted
+    verdicts of its family, whose size would else be too small.
+    """
+    reference = load_reference(plan.specification.reference)
+    results = {condition.key: _result(condition, plan, outcomes) for condition in plan.conditions}
+    cells = tuple(
+        _cell(policy, table, arm, results[arm.condition.key], reference)
+        for policy, table, arm in plan.cells
+    )
+    judgements = [_judgement(comparison, results, reference) for comparison in plan.comparisons]
+    return Findings(
+        plan,
+        reference,
+        cells,
+        _adjusted(judgements),
+        exploratory=len(plan.seeds) > declared_seeds,
+    )
+
+
+@dataclass(frozen=True)
+class _Result:
+    performance: NDArray[np.float64]
+    problem: str | None
+    saturated: bool
+
+
+def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -> _Result:
+    found = [outcomes.get(condition.run(plan.code, seed).key) for seed in plan.seeds]
+    finished = [outcome for outcome in found if outcome is not None]
+    succeeded = [outcome for outcome in finished if outcome.error is None]
+    failed, missing = len(finished) - len(succeeded), len(found) - len(finished)
+    parts = [
+        f"{count} of {len(found)} runs {what}"
+        for count, what in ((failed, "failed"), (missing, "missing"))
+        if count
+    ]
+    return _Result(
+        np.array([outcome.delivered for outcome in succeeded], dtype=np.float64),
+        ", ".join(parts) or None,
+        any(outcome.all_delivered for outcome in succeeded),
+    )
+
+
+def _cell(policy: str, table: str, arm: Arm, result: _Result, reference: Reference | None) -> Cell:
+    return Cell(
+        policy,
+        table,
+        arm,
+        result.performance,
+        result.problem,
+        result.saturated,
+        published=reference.performance.get(arm.level) if reference else None,
+        counted=reference is not None and arm.level in reference.cells,
+    )
+
+
+def _judgement(
+    comparison: Comparison, results: Mapping[str, _Result], reference: Reference | None
+) -> Judgement:
+    used = {arm: results[arm.condition.key] for arm in comparison.arms}
+    problems = [f"{arm.level}: {used[arm].problem}" for arm in used if used[arm].problem]
+    estimate = None
+    if not problems:
+        try:
+            estimate = comparison.estimate(lambda arm: used[arm].performance)
+        except spi.IndicatorError as error:
+            problems = [str(error)]
+    published = reference.estimate(comparison) if reference else None
+    claim = comparison.claim
+    if claim is None and reference:
+        claim = reference.claims.get(comparison.question)
+    judgement = Judgement(
+        comparison,
+        estimate,
+        "; ".join(problems) or None,
+        any(result.saturated for result in used.values()),
+        claim,
+        published.value if published else None,
+    )
+    if estimate is None or judgement.published is None:
+        return judgement
+    return replace(
+        judgement,
+        seeds_needed=spi.seeds_for_power(estimate, judgement.published, POWER),
+        no_plan=spi.no_plan_because(estimate, judgement.published),
+    )
+
+
+def _adjusted(judgements: list[Judgement]) -> tuple[Judgement, ...]:
+    families: dict[tuple[str, str], list[int]] = defaultdict(list)
+    for index, judgement in enumerate(judgements):
+        families[judgement.comparison.family].append(index)
+    adjusted = list(judgements)
+    for members in families.values():
+        estimates = [e for e in (judgements[index].estimate for index in members) if e is not None]
+        if len(estimates) < len(members):
+            continue
+        p_values = spi.holm([1.0 if e.p_value is None else e.p_value for e in estimates])
+        for index, p, verdict in zip(members, p_values.tolist(), spi.adjust(estimates)):
+            adjusted[index] = replace(judgements[index], adjusted_p=p, adjusted_verdict=verdict)
+    return tuple(adjusted)

@@ -1,0 +1,162 @@
+"""The report as files: Markdown to read, CSV to compute with. Equal rows give equal bytes."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
+from swarm_logistics_env.studies.reporting import wording
+from swarm_logistics_env.studies.reporting.sections import Section, sections
+from swarm_logistics_env.studies.reporting.setup_sheet import setup_sheet
+from swarm_logistics_env.studies.store import Store
+
+Value = str | float | int | bool | list[float] | None
+
+
+def write_report(findings: Findings, directory: Path) -> tuple[Path, ...]:
+    """Write report.md, cells.csv and claims.csv; return their paths.
+
+    Raises:
+        StudyError: a file cannot be written.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    files = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
+    cells = [cell_record(cell) for cell in findings.cells]
+    claims = [judgement_record(judgement) for judgement in findings.judgements]
+    write_text(files[0], markdown(findings))
+    write_csv(files[1], list(cells[0]), (list(cell.values()) for cell in cells))
+    write_csv(files[2], list(claims[0]), (list(claim.values()) for claim in claims))
+    return files
+
+
+def markdown(findings: Findings) -> str:
+    """Return the whole report as Markdown."""
+    parts = [f"# Study {findings.plan.specification.name!r}\n"]
+    if findings.reference:
+        parts.append(f'"paper" is {findings.reference.source}.\n')
+    parts += [section_markdown(section) for section in sections(findings)]
+    parts.append(setup_sheet(findings.plan))
+    return "\n".join(parts)
+
+
+def section_markdown(section: Section) -> str:
+    """Return one section as Markdown."""
+    lines = [f"## {section.title}", ""]
+    if section.columns:
+        lines += [_row(section.columns), _row(["---"] * len(section.columns))]
+        lines += [_row(row) for row in section.rows] + [""]
+    for line in section.lines:
+        lines += [line, ""]
+    return "\n".join(lines)
+
+
+def _row(values: Sequence[str]) -> str:
+    escaped = (value.replace("|", r"\|") for value in values)
+    return f"| {' | '.join(escaped)} |"
+
+
+def cell_record(cell: Cell) -> dict[str, Value]:
+    """Return one cell as a flat record; intervals are at 95 %, P in items."""
+    level, mean, prediction = cell.arm.level, cell.mean, cell.prediction
+    return {
+        "policy": cell.policy,
+        "table": cell.table,
+        "cell": str(level),
+        "factor": level.name,
+        "value": level.value,
+        "onset": level.onset,
+        "published": cell.published,
+        "counted": cell.counted,
+        "n_seeds": len(cell.performance),
+        "mean": mean.value if mean else None,
+        "low": mean.low if mean else None,
+        "high": mean.high if mean else None,
+        "prediction_low": prediction.low if prediction else None,
+        "prediction_high": prediction.high if prediction else None,
+        "published_inside": cell.published_inside,
+        "saturated": cell.saturated,
+        "problem": cell.problem,
+    }
+
+
+def judgement_record(judgement: Judgement) -> dict[str, Value]:
+    """Return one judged comparison as a flat record."""
+    comparison, estimate, claim = judgement.comparison, judgement.estimate, judgement.claim
+    return {
+        "policy": comparison.policy,
+        "table": comparison.table,
+        "indicator": comparison.indicator,
+        "comparison": comparison.label,
+        "threshold": comparison.threshold,
+        "value": estimate.value if estimate else None,
+        "low": estimate.low if estimate else None,
+        "high": estimate.high if estimate else None,
+        "probability": estimate.probability if estimate else None,
+        "p_value": estimate.p_value if estimate else None,
+        "p_holm": judgement.adjusted_p,
+        "verdict": estimate.verdict if estimate else None,
+        "verdict_holm": judgement.adjusted_verdict,
+        "n_seeds": estimate.n_seeds if estimate else None,
+        "pairing_correlation": estimate.pairing_correlation if estimate else None,
+        "flags": " ".join(estimate.flags) if estimate else None,
+        "saturated": judgement.saturated,
+        "claim": None if claim is None else wording.claimed(judgement),
+        "published": judgement.published,
+        "claim_verdict": judgement.on_claim(estimate.verdict) if estimate else None,
+        "claim_verdict_holm": judgement.on_claim(judgement.adjusted_verdict),
+        "seeds_for_power_80": judgement.seeds_needed,
+        "no_plan": judgement.no_plan,
+        "problem": judgement.problem,
+    }
+
+
+def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Value]]) -> None:
+    """Write a CSV file with Unix line ends; floats in shortest exact form.
+
+    Raises:
+        StudyError: the file cannot be written.
+    """
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(_texts(row) for row in rows)
+    except OSError as error:
+        raise StudyError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _texts(row: Sequence[Value]) -> Iterator[str]:
+    for value in row:
+        if isinstance(value, list):
+            yield " ".join(repr(number) for number in value)
+        elif isinstance(value, float):
+            yield repr(value)
+        else:
+            yield "" if value is None else str(value)
+
+
+def export_rows(store: Store, path: Path) -> int:
+    """Write every stored run as CSV, sorted by key, without wall times; return how many.
+
+    Raises:
+        StudyError: the file cannot be written.
+    """
+    rows = list(store.rows())
+    columns = list(rows[0]) if rows else []
+    write_csv(path, columns, (list(row.values()) for row in rows))
+    return len(rows)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file with Unix line ends.
+
+    Raises:
+        StudyError: the file cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise StudyError(f"cannot write {path}: {error.strerror}") from error

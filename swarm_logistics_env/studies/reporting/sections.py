@@ -1,0 +1,218 @@
+"""Sections of a report: tables, claims, reproduction figures and the set-up, as plain text."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
+from swarm_logistics_env.studies.reporting import wording
+from swarm_logistics_env.studies.reproduction import Reproduction, reproductions
+
+NOTHING = wording.NOTHING
+_FLAGS = {
+    "single_seed": "one seed gives a value, no interval and no verdict",
+    "degenerate": "no spread between seeds, so the interval is the point",
+    "unbounded": "mean P_o is not distinguishable from 0 at so few seeds, so the interval is "
+    "infinite; the verdict comes from the test",
+    "skewed": "so skewed that the interval covers less than 95 % at so few seeds",
+}
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with a table, lines of text, or both."""
+
+    title: str
+    columns: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    lines: tuple[str, ...] = ()
+
+
+def sections(findings: Findings) -> Iterator[Section]:
+    """Yield the results of a study, in the order of its report, without the set-up."""
+    policies = tuple(dict.fromkeys(cell.policy for cell in findings.cells))
+    figures = {figure.policy: figure for figure in reproductions(findings)}
+    for policy in policies:
+        for table in dict.fromkeys(cell.table for cell in findings.cells if cell.policy == policy):
+            yield from _tables(findings, policy, table)
+        yield from _claims(findings, policy)
+        if policy in figures:
+            yield _reproduction(figures[policy])
+    warnings = tuple(_warnings(findings))
+    if warnings:
+        yield Section("Warnings", lines=warnings)
+
+
+def _tables(findings: Findings, policy: str, table: str) -> Iterator[Section]:
+    """Yield a table of P and the first indicator, then one of each further indicator."""
+    cells = _grouped(
+        [cell for cell in findings.cells if (cell.policy, cell.table) == (policy, table)]
+    )
+    judgements = [
+        judgement
+        for judgement in findings.judgements
+        if (judgement.comparison.policy, judgement.comparison.table) == (policy, table)
+    ]
+    published = any(cell.published is not None for cell in cells)
+    performance = [_performance(cell, published=published) for cell in cells]
+    columns = ["", *(["P paper"] if published else []), "P ours [95 %]", "one run [95 %]"]
+    title = f"{policy}: {table}"
+    for indicator in dict.fromkeys(judgement.comparison.indicator for judgement in judgements):
+        asked = [j for j in judgements if j.comparison.indicator == indicator]
+        more, answers = _answers(cells, asked, published=published)
+        rows = [tuple(left + right) for left, right in zip(performance, answers)]
+        judged = [row for row in rows if row[-len(more)] != NOTHING]
+        yield Section(title, (*columns, *more), tuple(rows if len(columns) > 1 else judged))
+        # P is printed once: the tables of further indicators start with the level alone.
+        columns, performance = columns[:1], [left[:1] for left in performance]
+        title = f"{policy}: {table}, continued"
+
+
+def _performance(cell: Cell, *, published: bool) -> list[str]:
+    row = [str(cell.arm.level)]
+    if published:
+        row.append(NOTHING if cell.published is None else f"{cell.published:g}")
+    mark = wording.SATURATED if cell.saturated else ""
+    return [*row, wording.items(cell.mean) + mark, wording.limits(cell.prediction)]
+
+
+def _grouped(cells: list[Cell]) -> list[Cell]:
+    """Put the rows of one failure mode (or other factor) together, in order of appearance."""
+    names = list(dict.fromkeys(cell.arm.level.name for cell in cells))
+    return sorted(cells, key=lambda cell: names.index(cell.arm.level.name))
+
+
+def _answers(
+    cells: list[Cell], asked: list[Judgement], *, published: bool
+) -> tuple[list[str], list[list[str]]]:
+    """Return the columns of one indicator and their rows, one a cell.
+
+    Value with interval, the paper's value, and per property (scalable, superlinear, ...) the
+    verdict, with Holm's in brackets where it differs, beside what the paper claims.
+    """
+    indicator = asked[0].comparison.indicator
+    properties = list(dict.fromkeys(wording.property_name(judgement) for judgement in asked))
+    columns = [f"{indicator} [95 %]"]
+    columns += [f"{indicator} paper"] if published else []
+    for name in properties:
+        columns += [name, "paper"] if published else [name]
+    rows = []
+    for cell in cells:
+        here = {
+            wording.property_name(judgement): judgement
+            for judgement in asked
+            if judgement.comparison.changed == cell.arm
+        }
+        row = [NOTHING] * len(columns)
+        for name, judgement in here.items():
+            row[0] = wording.ratio(judgement)
+            place = 1 + published + properties.index(name) * (1 + published)
+            row[place] = wording.verdict(judgement)
+            if published:
+                row[1] = wording.number(judgement.published)
+                row[place + 1] = {None: NOTHING, True: "yes", False: "no"}[judgement.claim]
+        rows.append(row)
+    return columns, rows
+
+
+def _claims(findings: Findings, policy: str) -> Iterator[Section]:
+    claims = [
+        judgement
+        for judgement in findings.judgements
+        if judgement.comparison.policy == policy and judgement.claim is not None
+    ]
+    if not claims:
+        return
+    rows, plain, adjusted = [], Counter[str](), Counter[str]()
+    for judgement in claims:
+        estimate = judgement.estimate
+        on_claim = judgement.on_claim(estimate.verdict if estimate else None) or "blocked"
+        on_claim_adjusted = judgement.on_claim(judgement.adjusted_verdict) or "blocked"
+        plain[on_claim] += 1
+        adjusted[on_claim_adjusted] += 1
+        rows.append(
+            (
+                f"{judgement.comparison.indicator}, {judgement.comparison.label}",
+                wording.claimed(judgement),
+                wording.number(judgement.published),
+                wording.ratio(judgement),
+                on_claim,
+                on_claim_adjusted,
+                wording.power(judgement),
+            )
+        )
+    columns = (
+        "indicator", "claim", "paper", "ours [95 %]", "claim is", "under Holm",
+        "seeds for 80 % power at the paper's value",
+    )  # fmt: skip
+    lines = (
+        f"Unadjusted: {_counted(plain)}.",
+        f"Under Holm, family = all comparisons of one indicator: {_counted(adjusted)}.",
+        'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
+    )
+    yield Section(f"{policy}: claims", columns, tuple(rows), lines)
+
+
+def _counted(verdicts: Counter[str]) -> str:
+    order = ("supported", "refuted", "inconclusive", "blocked")
+    return ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in order if verdicts[verdict])
+
+
+def _reproduction(figure: Reproduction) -> Section:
+    total = len(figure.cells)
+    lines = []
+    if figure.misses is None or figure.mean_interval_width is None:
+        lines.append("Cells inside the 95 % prediction interval: one seed gives no interval.")
+    else:
+        lines += [
+            (
+                f"Cells whose published P lies inside the 95 % prediction interval of one of our "
+                f"runs: {total - len(figure.misses)} of {total}."
+            ),
+            f"Mean width of those intervals: {figure.mean_interval_width:.1f} items.",
+            f"Misses: {', '.join(_miss(cell) for cell in figure.misses) or 'none'}.",
+        ]
+    lines.append(f"Mean relative error of our mean P: {figure.mean_relative_error:.1%}.")
+    pairs = [f"{a.arm.level} and {b.arm.level}" for a, b in figure.disorder]
+    lines.append(
+        f"Swarm sizes up to {figure.largest_ordered} in the opposite order to the published one, "
+        f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
+    )
+    return Section(f"{figure.policy}: reproduction", lines=tuple(lines))
+
+
+def _miss(cell: Cell) -> str:
+    return f"{cell.arm.level} ({cell.published:g} published, {wording.items(cell.prediction)} ours)"
+
+
+def _warnings(findings: Findings) -> Iterator[str]:
+    if any(cell.saturated for cell in findings.cells):
+        yield (
+            f"{wording.SATURATED} saturated: in at least one run every item was delivered, so P is "
+            "capped; indicators that rest on it are marked as well."
+        )
+    if findings.exploratory:
+        yield (
+            "Exploratory: seeds were added after the study began, so the verdicts' error level is "
+            "not the nominal one."
+        )
+    for cell in findings.cells:
+        if cell.problem:
+            yield f"{cell.policy}, {cell.table}, {cell.arm.level}: {cell.problem}."
+    for judgement in findings.judgements:
+        if judgement.estimate is None:
+            comparison = judgement.comparison
+            yield (
+                f"{comparison.policy}, {comparison.indicator}, {comparison.label} is blocked: "
+                f"{judgement.problem}."
+            )
+    for flag, meaning in _FLAGS.items():
+        flagged = [
+            f"{j.comparison.policy} {j.comparison.indicator}, {j.comparison.label}"
+            for j in findings.judgements
+            if j.estimate is not None and flag in j.estimate.flags
+        ]
+        if flagged:
+            yield f"{flag}: {meaning}: {'; '.join(dict.fromkeys(flagged))}."

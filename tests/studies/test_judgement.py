@@ -1,0 +1,139 @@
+"""Verdicts, marks and figures from outcomes that are made up, so that the answer is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparisons import Level
+from swarm_logistics_env.studies.execution import Outcome
+from swarm_logistics_env.studies.judgement import Findings, judge
+from swarm_logistics_env.studies.paper import PAPER
+from swarm_logistics_env.studies.reporting.files import markdown
+from swarm_logistics_env.studies.reporting.sections import sections
+from swarm_logistics_env.studies.reproduction import reproductions
+
+SEEDS = 10
+
+
+def findings(p: Callable[[Level], float], *, full: Level | None = None) -> Findings:
+    """The paper's study if the cell at a level gave p(level) plus noise of one item."""
+    plan = Study.preset("paper", seeds=SEEDS).plan()
+    levels = {arm.condition.key: arm.level for _, _, arm in reversed(plan.cells)}
+    noise = np.random.default_rng(0)
+    outcomes = {}
+    for run in plan.runs():
+        level = levels[run.condition.key]
+        delivered = max(0, round(p(level) + float(noise.normal(0, 1))))
+        outcomes[run.key] = Outcome(
+            run.key, np.arange(float(delivered)), all_delivered=level == full and run.seed == 3
+        )
+    return judge(plan, outcomes, declared_seeds=SEEDS)
+
+
+def as_published(level: Level) -> float:
+    if level.kind == "policy":
+        return 10.0
+    return PAPER.performance[level]
+
+
+@pytest.fixture(scope="module")
+def published() -> Findings:
+    return findings(as_published)
+
+
+def test_the_papers_own_values_reproduce_the_paper(published: Findings) -> None:
+    (figure,) = reproductions(published)
+    assert len(figure.cells) == 33
+    assert figure.misses is not None
+    # Three cells share the base run with 39 under other published values: 41 twice missing.
+    assert {str(cell.arm.level) for cell in figure.misses} <= {"warehouse_width = 10"}
+    assert figure.mean_relative_error < 0.03
+    assert figure.disorder == ()
+    assert figure.largest_ordered == 100
+    assert figure.mean_interval_width == pytest.approx(2 * 2.26 * 1.05, rel=0.25)
+
+
+def test_misses_and_disorder_are_found() -> None:
+    swapped = {20: 33.0, 30: 29.0}
+
+    def p(level: Level) -> float:
+        return (
+            swapped.get(int(level.value), as_published(level))
+            if level.kind == "size"
+            else (as_published(level))
+        )
+
+    (figure,) = reproductions(findings(p))
+    assert figure.misses is not None
+    assert {"N = 20", "N = 30"} <= {str(cell.arm.level) for cell in figure.misses}
+    assert [(str(a.arm.level), str(b.arm.level)) for a, b in figure.disorder] == [
+        ("N = 20", "N = 30")
+    ]
+
+
+def test_claims_are_judged_in_their_own_direction(published: Findings) -> None:
+    verdicts = {
+        (j.comparison.indicator, j.comparison.label, j.comparison.threshold): j.on_claim(
+            j.estimate.verdict if j.estimate else None
+        )
+        for j in published.judgements
+    }
+    assert verdicts["FT", "FM4, m = 3", 0.0] == "supported"  # claimed: not tolerant
+    assert verdicts["S", "N 100 -> 150", 0.0] == "supported"  # claimed: not scalable
+    assert verdicts["S", "N 10 -> 20", 1.0] == "supported"  # claimed: not superlinear
+    assert verdicts["S", "N 5 -> 10", 0.0] == "supported"
+    assert verdicts["FT", "FM2, m = 2", 0.0] == "supported"
+
+
+def test_power_is_undefined_where_the_published_value_is_the_threshold(
+    published: Findings,
+) -> None:
+    power = {
+        (j.comparison.indicator, j.comparison.label): j
+        for j in published.judgements
+        if j.comparison.threshold == 0
+    }
+    at_threshold = power["FT", "FM4, m = 1"]
+    assert at_threshold.published == 0
+    assert at_threshold.seeds_needed is None
+    assert "threshold" in str(at_threshold.no_plan)
+    needed = power["FT", "FM4, m = 3"].seeds_needed
+    assert needed is not None
+    assert needed < 10
+    assert "undefined: an effect of 0 lies at the threshold" in markdown(published)
+
+
+def test_holm_never_adds_a_verdict(published: Findings) -> None:
+    for judgement in published.judgements:
+        assert judgement.estimate is not None
+        assert judgement.adjusted_p is not None
+        assert judgement.adjusted_p >= (judgement.estimate.p_value or 0.0)
+        if judgement.estimate.verdict == "inconclusive":
+            assert judgement.adjusted_verdict == "inconclusive"
+
+
+def test_saturated_cell_marks_what_rests_on_it() -> None:
+    narrow = Level("parameter", "warehouse_width", 5.0)
+    found = findings(as_published, full=narrow)
+    assert [cell.arm.level for cell in found.cells if cell.saturated] == [narrow]
+    marked = {j.comparison.label for j in found.judgements if j.saturated}
+    assert marked == {f"warehouse_width 5 -> {x}" for x in (10, 15, 20)}
+    text = markdown(found)
+    assert text.count("†") == 1 + 3 + 3 + 1  # the cell, its indicators twice, the explanation
+
+
+def test_ablation_that_falls_is_supported(published: Findings) -> None:
+    def p(level: Level) -> float:
+        if level.kind == "policy" and level.name == "random-walk":
+            return 30.0
+        return as_published(level)
+
+    changes = [j for j in findings(p).judgements if j.comparison.indicator == "change"]
+    # At N = 25: 39 -> 30; at N = 100: 74 -> 30, beyond a third.
+    assert [j.on_claim(j.adjusted_verdict) for j in changes] == ["supported", "supported"]
+    titles = [section.title for section in sections(published)]
+    assert "swarm-dt: Ablation: without taxis" in titles
