@@ -1,0 +1,93 @@
+"""`swarm-logistics run` and `scenario`, and where the other commands are joined on."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swarm_logistics_env.cli.application import Application
+from swarm_logistics_env.cli.options import PresetOption, SetOption, fault_of, scenario_of
+from swarm_logistics_env.cli.study import study
+
+app = Application(
+    name="swarm-logistics",
+    help="A warehouse for robot swarms, and the measure of how they cope.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.add_typer(study)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(version("swarm-logistics-env"))
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print it.", is_eager=True, callback=_print_version),
+    ] = False,
+) -> None:
+    """Hold the options that belong to no command."""
+
+
+@app.command("scenario")
+def scenario_command(
+    preset: PresetOption = "paper",
+    changes: SetOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="As JSON, to be read back.")] = False,
+) -> None:
+    """Print every condition of a run: value, unit, source."""
+    chosen = scenario_of(preset, changes)
+    typer.echo(chosen.to_json() if as_json else chosen.sheet().rstrip("\n"))
+
+
+@app.command("run")
+def run_command(
+    policy: Annotated[str, typer.Option(help="Name, or package.module:Class.")] = "swarm-dt",
+    seed: Annotated[int, typer.Option(help="Decides everything random.")] = 0,
+    preset: PresetOption = "paper",
+    changes: SetOption = None,
+    faults: Annotated[
+        list[str] | None,
+        typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
+    ] = None,
+) -> None:
+    """Play one episode and print what it delivered."""
+    import time
+
+    from swarm_logistics_env import policies
+    from swarm_logistics_env.episode import run_episode
+
+    scenario = scenario_of(preset, changes)
+    befalling = [fault_of(text) for text in faults or []]
+    player = policies.load(policy)
+    # Compiles the kernels, so that the time below is the episode's.
+    run_episode(scenario.replace(duration=scenario.control_period), policies.load(policy), seed)
+    start = time.perf_counter()
+    episode = run_episode(scenario, player, seed, befalling)
+    wall = time.perf_counter() - start
+    times = episode.delivery_times
+    typer.echo(
+        f"P = {episode.delivered} items delivered of {scenario.n_items} in {episode.ended_at:g} s "
+        f"by {scenario.n_robots} robots with {policy}, seed {seed}"
+    )
+    if len(times):
+        gaps = [after - before for before, after in zip([0.0, *times], times)]
+        typer.echo(
+            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, "
+            f"{sum(gaps) / len(gaps):.1f} s apart on average, at most {max(gaps):.1f} s"
+        )
+    if episode.failed_robots:
+        typer.echo(
+            f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
+            f"them for {episode.anchoring_seconds:.1f} robot-seconds"
+        )
+    typer.echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")

@@ -1,0 +1,49 @@
+"""The application object: every error that a user can cause becomes one sentence."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import typer
+
+
+class Application(typer.Typer):
+    """A Typer whose call ends the process with 0 (done), 2 (bad input) or 130 (Ctrl-C).
+
+    A command ends otherwise by raising `typer.Exit(code)`.
+    """
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the command line in `sys.argv`, or that in `args`."""
+        sys.exit(self.run(kwargs.get("args")))
+
+    def run(self, arguments: list[str] | None = None) -> int:
+        """Run a command line and return the exit code."""
+        try:
+            code = super().__call__(arguments, standalone_mode=False)
+        except (KeyboardInterrupt, typer.Abort):
+            return _complain("stopped", 130)
+        except Exception as error:
+            sentence = _sentence(error)
+            if sentence is None:
+                raise
+            return _complain(sentence, 2)
+        return code if isinstance(code, int) else 0
+
+
+def _sentence(error: Exception) -> str | None:
+    """Return what to tell the user; None: a fault of ours, to be seen with its traceback."""
+    # Typer's own errors of usage, whichever click they come from.
+    format_message = getattr(error, "format_message", None)
+    if format_message is not None:
+        return str(format_message())
+    from swarm_logistics_env.errors import SwarmLogisticsError
+    from swarm_logistics_env.spi import IndicatorError
+
+    return str(error) if isinstance(error, SwarmLogisticsError | IndicatorError) else None
+
+
+def _complain(sentence: str, code: int) -> int:
+    sys.stderr.write(f"swarm-logistics: {sentence}\n")
+    return code

@@ -1,0 +1,30 @@
+"""Report sections on standard output: drawn at a terminal, Markdown elsewhere."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from swarm_logistics_env.studies.reporting.files import section_markdown
+from swarm_logistics_env.studies.reporting.sections import Section
+
+
+def show(section: Section) -> None:
+    """Print one section."""
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        # No wrapping: whatever reads this knows no terminal width.
+        console.out(section_markdown(section), highlight=False)
+        return
+    console.rule(escape(section.title), align="left")
+    if section.columns:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for column in section.columns:
+            table.add_column(escape(column))
+        for row in section.rows:
+            table.add_row(*(escape(value) for value in row))
+        console.print(table)
+    for line in section.lines:
+        console.print(escape(line))
+    console.print()

@@ -1,0 +1,194 @@
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import swarm_logistics_env
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.studies.store import FILE_NAME, Store
+
+SMALL = [
+    *("--set", "n_robots=3"),
+    *("--set", "n_items=4"),
+    *("--set", "warehouse_width=3"),
+    *("--set", "warehouse_height=3"),
+    *("--set", "delivery_width=1"),
+    *("--set", "duration=20"),
+]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "--sead", "3"], "--sead"),
+        (["run", "--seed", "x"], "valid integer"),
+        (["run", "--set", "n_robot=40"], "did you mean 'n_robots'?"),
+        (["run", "--set", "n_robots"], "FIELD=VALUE"),
+        (["run", "--set", "n_robots=-3"], "n_robots = -3"),
+        (["run", "--preset", "papr"], "did you mean 'paper'?"),
+        (["run", "--policy", "swarm-td"], "did you mean 'swarm-dt'?"),
+        (["run", "--fault", "FM9"], "no failure mode 'FM9'"),
+        (["run", "--fault", "FM1:x"], "MODE[:ROBOTS][@ONSET]"),
+        (["run", "--fault", "FM1@1.2.3"], "number of seconds"),
+        (["run", "--fault", "FM1:99"], "at most n_robots = 25"),
+        (["scenario", "--set", "delivery_width=10"], "leaves no storage"),
+        (["study", "run", "papr", "--out", "x"], "did you mean 'paper'?"),
+        (["study", "run", "paper"], "--out"),
+        (["study", "run", "paper", "--out", "x", "--seeds", "0"], "--seeds"),
+        (["study", "run", "paper", "--out", "x", "--policy", "nobody"], "'nobody'"),
+        (["study", "export", "nowhere", "--to", "x.csv"], "no study in nowhere"),
+        (["study", "fly"], "fly"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert app.run(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert words in printed.err
+    assert len(printed.err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(Scenario, "sheet", broken)
+    with pytest.raises(ZeroDivisionError):
+        app.run(["scenario"])
+
+
+def test_scenario_sheet_and_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["scenario", "--set", "n_robots=40"]) == 0
+    assert "| n_robots | 40 (default 25) |" in capsys.readouterr().out
+    assert app.run(["scenario", "--preset", "paper_scalability", "--json"]) == 0
+    assert Scenario.from_json(capsys.readouterr().out) == Scenario.preset("paper_scalability")
+
+
+def test_run_prints_what_the_episode_gave(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["run", "--seed", "1", *SMALL, "--fault", "FM1:2@5"]) == 0
+    first = capsys.readouterr().out
+    assert "P = " in first
+    assert "seed 1" in first
+    assert "failed robots " in first
+    assert "times real time" in first
+    assert app.run(["run", "--seed", "1", *SMALL, "--fault", "FM1:2@5"]) == 0
+    assert capsys.readouterr().out.splitlines()[:-1] == first.splitlines()[:-1]
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__
+
+
+SHORT_PAPER = """
+import sys
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.studies import paper
+from swarm_logistics_env.cli import app
+
+def shorter(factor):
+    return factor.replace(scenario={**factor.scenario, "duration": DURATION})
+
+if __name__ == "__main__":
+    old = paper.SPECIFICATION
+    paper.SPECIFICATION = old.replace(
+        scenario=Scenario(duration=DURATION),
+        **{k: tuple(map(shorter, getattr(old, k))) for k in ("sizes", "ablations")},
+    )
+    app()
+"""
+
+
+def short_paper(tmp_path: Path, duration: float) -> Path:
+    script = tmp_path / "short_paper.py"
+    script.write_text(SHORT_PAPER.replace("DURATION", str(duration)))
+    return script
+
+
+def records(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_study_run_prints_and_writes_the_report(tmp_path: Path) -> None:
+    script, out = short_paper(tmp_path, 0.5), tmp_path / "out"
+    command = [sys.executable, str(script), "study"]
+    arguments = ["run", "paper", "--seeds", "2", "--processes", "1", "--out", str(out)]
+    done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
+    # Nobody delivers in half a second: every ratio is undefined, and that is said.
+    assert done.returncode == 0, done.stderr
+    for words in (
+        "34 conditions (5 shared) x 2 seeds = 68 runs",
+        "Table I: scalability",
+        "Table II: fault tolerance",
+        "Table III: adaptability to warehouse_width",
+        "Ablation: without taxis",
+        "Cells whose published P lies inside",
+        "Mean relative error",
+        "blocked",
+        "episodes/s",
+    ):
+        assert words in done.stdout
+    report = (out / "report.md").read_text()
+    assert "episodes/s" not in report
+    assert "| duration | 0.5 (default 500) |" in report
+    assert len(records(out / "cells.csv")) == 39
+    assert len(records(out / "claims.csv")) == 43
+
+    exported = subprocess.run(
+        [*command, "export", str(out), "--to", str(tmp_path / "rows.csv")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert exported.stdout.startswith("68 runs")
+    rows = records(tmp_path / "rows.csv")
+    assert [row["run"] for row in rows] == sorted(row["run"] for row in rows)
+    assert json.loads(rows[0]["scenario"])["duration"] == 0.5
+
+
+def stored(directory: Path) -> int:
+    if not (directory / FILE_NAME).is_file():
+        return 0
+    with Store.existing(directory) as store:
+        return len(store.succeeded())
+
+
+def test_ctrl_c_stops_and_says_how_to_go_on(tmp_path: Path) -> None:
+    script, out = short_paper(tmp_path, 500), tmp_path / "out"
+    arguments = ["study", "run", "paper", "--seeds", "2", "--processes", "2", "--out", str(out)]
+    process = subprocess.Popen(
+        [sys.executable, str(script), *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    while stored(out) == 0:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert 0 < stored(out) < 68
+    assert errors.strip().splitlines() == [
+        f"Stopped. Every finished run is kept in {out}; the same command goes on."
+    ]
