@@ -87,4 +87,4 @@ def shapes_with_peak_at(
         return _shape_usl(1.0 - b * peak**2, b, n)
     exponent = np.log(n) - n / peak
     steepness: NDArray[np.float64] = np.exp(sharpness[:, np.newaxis])
-    return np.exp(steepness * (exponent - exponent.max()))
+    return np.asarray(np.exp(steepness * (exponent - exponent.max())))

@@ -118,9 +118,8 @@ def test_no_spread_is_judged_by_sign_and_flagged(
 
 
 def test_rounding_is_not_spread() -> None:
-    # P_F = 24/25 P_o in every seed: R = 0 up to rounding, not a hair beside it with certainty.
-    p_o = np.array([25.0, 50.0, 75.0, 125.0])
-    r = spi.robustness(p_o, p_o * 0.96, n=25, m=1)
+    # P_F = 18/25 P_o in every seed: R = 0 up to rounding, not a hair above it with certainty.
+    r = spi.robustness([25, 50, 75, 150], [18, 36, 54, 108], n=25, m=7)
     assert r.flags == ("degenerate",)
     assert r.verdict == "inconclusive"
 
