@@ -192,3 +192,23 @@ def test_ctrl_c_stops_and_says_how_to_go_on(tmp_path: Path) -> None:
     assert errors.strip().splitlines() == [
         f"Stopped. Every finished run is kept in {out}; the same command goes on."
     ]
+
+
+def test_failed_runs_give_exit_code_1_and_a_report(tmp_path: Path) -> None:
+    script, out = short_paper(tmp_path, 0.5), tmp_path / "out"
+    (tmp_path / "broken_policy.py").write_text(
+        "class Broken:\n"
+        "    def reset(self, n_robots, seed): raise RuntimeError('a wheel came off')\n"
+        "    def act(self, observations): ...\n"
+    )
+    arguments = ["study", "run", "paper", "--seeds", "1", "--processes", "1", "--out", str(out)]
+    done = subprocess.run(
+        [sys.executable, str(script), *arguments, "--policy", "broken_policy:Broken"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1, done.stderr
+    # 32 conditions of the broken policy and the ablation's two, which stand.
+    assert "32 failed" in done.stdout
+    assert "1 of 1 runs failed" in (out / "report.md").read_text()
