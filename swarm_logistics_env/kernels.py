@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import ParamSpec, TypeVar, cast
 
 import numba
@@ -12,6 +14,18 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
+def _digest_of_sources() -> str:
+    here = Path(__file__).parent
+    digest = hashlib.blake2b(digest_size=6)
+    for pattern in ("kernels.py", "observations.py", "warehouse/*.py", "policies/*.py"):
+        for path in sorted(here.glob(pattern)):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+_SOURCES = _digest_of_sources()
+
+
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` with numba.
 
@@ -19,7 +33,13 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     that a second process starts at once; and without fast-math, so that results are the same
     bits wherever they run.
     """
-    return cast("Callable[P, R]", numba.njit(function, cache=True, nogil=True))
+    # numba notices a change of a kernel's own file only, not of the kernels and constants from
+    # other files that were compiled into it. So their digest goes into the name of the cache.
+    name = function.__qualname__
+    function.__qualname__ = f"{name}-{_SOURCES}"
+    compiled = numba.njit(function, cache=True, nogil=True)
+    function.__qualname__ = name
+    return cast("Callable[P, R]", compiled)
 
 
 @kernel
