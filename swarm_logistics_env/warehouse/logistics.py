@@ -230,7 +230,7 @@ def run_timers(
             if elapsed < limit - 1e-9:
                 timer[robot] = elapsed
         value = timer[robot]
-        if gossip and heard[robot] + period < limit - 1e-9:
+        if gossip and present[robot] and heard[robot] + period < limit - 1e-9:
             value = (
                 heard[robot] + period if math.isnan(value) else min(value, heard[robot] + period)
             )
