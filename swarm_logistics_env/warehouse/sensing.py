@@ -201,7 +201,9 @@ def sense(
         view_square = view_range[me] ** 2
         radio_square = radio_range**2
         touch_square = (robot_radius + touch) ** 2
-        reach = max(max(ranger_range[me] + robot_radius, view_range[me]), radio_range)
+        reach = max(
+            ranger_range[me] + robot_radius, view_range[me], radio_range, robot_radius + touch
+        )
         lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
         n_near, anchored = 0, False
         left = cell_along(x - reach, robot_cell, robot_size[0])
@@ -258,7 +260,7 @@ def sense(
         # Free items: in the beams, in view, and in the way of a laden robot.
         scan_square = (ranger_range[me] + item_radius) ** 2 if sees_ranges else 0.0
         touch_square = (touch + item_radius) ** 2
-        reach = max(ranger_range[me] + item_radius, view_range[me])
+        reach = max(ranger_range[me] + item_radius, view_range[me], touch + item_radius)
         n_items = 0
         left = cell_along(x - reach, item_cell, item_size[0])
         right = cell_along(x + reach, item_cell, item_size[0])
