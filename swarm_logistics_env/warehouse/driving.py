@@ -23,12 +23,12 @@ def drive(
     """Turn the robots and fill their wanted velocities (N, 2) [m/s] for one control period.
 
     Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
-    that turns drives along its mean direction. Returns False, with nothing changed, if any
-    command is not finite.
+    that turns drives along its mean direction. Returns False, with nothing changed, if a
+    command of an able robot is not finite.
     """
     for robot in range(commands.shape[0]):
         for column in range(commands.shape[1]):
-            if not math.isfinite(commands[robot, column]):
+            if able[robot] and not math.isfinite(commands[robot, column]):
                 return False
     for robot in range(commands.shape[0]):
         wanted_velocity[robot, 0] = 0.0

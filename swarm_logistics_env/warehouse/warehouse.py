@@ -100,7 +100,8 @@ class Warehouse:
         if not stepping.set_out(
             given, self._constants, state.numbers, state.flags, physics.bodies, physics.velocities
         ):
-            bad = np.argwhere(~np.isfinite(given))[0]
+            able = state.robot_present & state.obeys
+            bad = np.argwhere(~np.isfinite(given) & able[:, None])[0]
             raise CommandError(
                 f"commands[{bad[0]}, {bad[1]}] = {given[bad[0], bad[1]]}: should be finite"
             )
