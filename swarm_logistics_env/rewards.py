@@ -81,7 +81,8 @@ def own_delivery(world: Warehouse, before: Before) -> Earned:
 def lift_requested(world: Warehouse, before: Before) -> Earned:
     """1 to the robot that took up the requested item, -1 to the one that let go of it."""
     carrier = carrier_of_requested(world)
-    if world.state.requested != before.requested or carrier == before.carrier:
+    # Not the requested item's number: with `restock` the same item may be asked for again.
+    if world.state.delivered != before.delivered or carrier == before.carrier:
         return None
     paid = np.zeros(world.state.n_robots)
     if carrier != NOBODY:
