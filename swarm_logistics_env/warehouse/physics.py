@@ -15,7 +15,7 @@ from pymunk import batch
 
 from swarm_logistics_env.scenario import Scenario
 
-_ITERATIONS = 4
+_ITERATIONS = 16
 _SLOP = 0.001  # [m]; pymunk's default 0.1 lets robots of this size pass through each other
 _WALL = 0.5  # [m], half the thickness of a wall
 _ROBOT, _SOLID, _ITEM = 1, 2, 4
