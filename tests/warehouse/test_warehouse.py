@@ -59,7 +59,7 @@ def random_scenario(rng: np.random.Generator) -> Scenario:
         view_range=rng.uniform(0.3, 1.5),
         ranger_range=rng.uniform(0.3, 2.0),
         pickup_range=rng.uniform(0.15, 0.5),
-        relay=str(rng.choice(["none", "gossip"])),
+        relay="gossip" if rng.random() < 0.5 else "none",
         physics_period=float(rng.choice([0.02, 0.025])),
     )
 

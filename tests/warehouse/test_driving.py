@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env.warehouse.driving import drive
+
+
+def driven(
+    commands: ArrayLike, heading: float = 0.0, able: bool = True, period: float = 0.1
+) -> tuple[NDArray[np.float64], float]:
+    """Return the wanted velocity [m/s] and the new heading of one robot of 2 m/s and 6 rad/s."""
+    headings, wanted = np.array([heading]), np.full((1, 2), 9.0)
+    given_row = np.array([commands], dtype=np.float64)
+    assert drive(
+        given_row, np.array([able]), np.array([2.0]), np.array([6.0]), period, headings, wanted
+    )
+    return wanted[0], float(headings[0])
+
+
+@pytest.mark.parametrize(
+    ("commands", "heading", "velocity"),
+    [
+        ((1.0, 0.0, 0.0, 0.0), 0.0, (2.0, 0.0)),
+        ((0.5, 0.0, 0.0, 0.0), math.pi / 2, (0.0, 1.0)),
+        ((0.0, 1.0, 0.0, 0.0), 0.0, (0.0, 2.0)),
+        ((0.0, 1.0, 0.0, 0.0), math.pi / 2, (-2.0, 0.0)),
+        ((-1.0, 0.0, 0.0, 0.0), 0.0, (-2.0, 0.0)),
+        ((3.0, 0.0, 0.0, 0.0), 0.0, (2.0, 0.0)),  # cut
+        ((1.0, 1.0, 0.0, 0.0), 0.0, (math.sqrt(2.0), math.sqrt(2.0))),  # no faster askew
+        ((0.0, 0.0, 0.0, 1.0), 0.0, (0.0, 0.0)),
+    ],
+)
+def test_forward_and_left_are_fractions_of_the_top_speed(
+    commands: tuple[float, ...], heading: float, velocity: tuple[float, float]
+) -> None:
+    wanted, turned = driven(commands, heading)
+    assert wanted == pytest.approx(velocity, abs=1e-12)
+    assert turned == heading
+
+
+@pytest.mark.parametrize(("turn", "angle"), [(1.0, 0.6), (-0.5, -0.3), (7.0, 0.6)])
+def test_turn_is_a_fraction_of_the_top_turn_rate(turn: float, angle: float) -> None:
+    assert driven((0.0, 0.0, turn, 0.0), heading=0.2)[1] == pytest.approx(0.2 + angle)
+
+
+def test_a_robot_that_turns_as_it_drives_goes_in_a_circle() -> None:
+    # Speed 2 m/s at 6 rad/s: a circle of 1/3 m, closed after a turn of 2 pi.
+    n_steps = 200
+    place, heading = np.zeros(2), 0.0
+    period = math.tau / 6.0 / n_steps
+    lowest = highest = 0.0
+    for _ in range(n_steps):
+        wanted, heading = driven((1.0, 0.0, 1.0, 0.0), heading, period=period)
+        place += wanted * period
+        lowest, highest = min(lowest, place[1]), max(highest, place[1])
+    assert place == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert highest - lowest == pytest.approx(2.0 / 3.0, rel=1e-3)
+    assert heading == pytest.approx(0.0, abs=1e-9)
+
+
+@given(
+    st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4),
+    st.floats(-math.pi, math.pi),
+    st.floats(0.01, 3.0),
+)
+def test_speed_stays_within_the_top_and_heading_within_pi(
+    commands: list[float], heading: float, period: float
+) -> None:
+    wanted, turned = driven(commands, heading, period=period)
+    assert np.hypot(*wanted) <= 2.0 + 1e-12
+    assert abs(turned) <= math.pi + 1e-12
+    change = turned - heading - np.clip(commands[2], -1.0, 1.0) * 6.0 * period
+    assert math.remainder(change, math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_robot_that_is_not_able_stands_and_does_not_turn() -> None:
+    wanted, heading = driven((1.0, 1.0, 1.0, 1.0), heading=0.4, able=False)
+    assert wanted.tolist() == [0.0, 0.0]
+    assert heading == 0.4
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_command_that_is_not_finite_changes_nothing(bad: float) -> None:
+    commands = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, bad]])
+    able, heading, wanted = np.array([True, True]), np.array([0.1, 0.2]), np.full((2, 2), 7.0)
+    top = np.array([2.0, 2.0])
+    assert not drive(commands, able, top, top, 0.1, heading, wanted)
+    assert heading.tolist() == [0.1, 0.2]
+    assert (wanted == 7.0).all()
+    able[1] = False
+    assert drive(commands, able, top, top, 0.1, heading, wanted)
+    assert wanted[1].tolist() == [0.0, 0.0]

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from swarm_logistics_env.warehouse.grid import Grid, cell_along, fill
+
+
+def filled(
+    grid: Grid, position: NDArray[np.float64], included: NDArray[np.bool_]
+) -> list[list[int]]:
+    """Return the points of each cell."""
+    fill(position, included, grid.cell, grid.size, grid.start, grid.members)
+    return [
+        grid.members[first:last].tolist()
+        for first, last in zip(grid.start[:-1], grid.start[1:], strict=True)
+    ]
+
+
+@given(
+    width=st.floats(0.3, 60.0),
+    height=st.floats(0.3, 60.0),
+    cell=st.floats(0.1, 3.0),
+    n=st.integers(1, 60),
+    seed=st.integers(0, 10**6),
+)
+def test_every_included_point_stands_once_in_the_cell_that_holds_it(
+    width: float, height: float, cell: float, n: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    # Some a little outside, as bodies are that were just pushed into a wall.
+    position = rng.uniform([-0.05, -0.05], [width + 0.05, height + 0.05], (n, 2))
+    included = rng.random(n) < 0.7
+    grid = Grid(width, height, cell, n)
+    cells = filled(grid, position, included)
+    assert grid.cell >= cell
+    assert (
+        sorted(point for members in cells for point in members) == np.flatnonzero(included).tolist()
+    )
+    for index, members in enumerate(cells):
+        assert members == sorted(members)  # so that ties never depend on memory
+        low = np.array([index % grid.size[0], index // grid.size[0]]) * grid.cell
+        for point in members:
+            inside = np.clip(position[point], 0.0, [width, height])
+            assert (inside >= low - 1e-9).all()
+            assert (inside <= low + grid.cell + 1e-9).all()
+
+
+def test_filling_again_forgets_what_was_there() -> None:
+    grid = Grid(4.0, 4.0, 1.0, 3)
+    position = np.array([[0.5, 0.5], [1.5, 2.5], [3.5, 3.5]])
+    assert sum(map(len, filled(grid, position, np.ones(3, np.bool_)))) == 3
+    assert sum(map(len, filled(grid, position, np.array([False, True, False])))) == 1
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "expected"),
+    [(-3.0, 0), (-0.01, 0), (0.0, 0), (0.99, 0), (1.0, 1), (4.5, 4), (5.0, 4), (99.0, 4)],
+)
+def test_outside_counts_as_the_edge(coordinate: float, expected: int) -> None:
+    assert cell_along(coordinate, 1.0, 5) == expected
+
+
+def test_a_grid_over_a_huge_and_empty_arena_stays_small() -> None:
+    grid = Grid(1000.0, 1000.0, 1.0, 10)
+    assert len(grid.start) < 200

@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.errors import ScenarioError
+from swarm_logistics_env.warehouse import layout
+
+NOTHING = np.zeros((0, 2))
+SEEDS = st.integers(-(2**70), 2**70)
+
+
+def narrowest(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+    """Return the least distance between two points, not counting a point's to itself."""
+    gaps = np.linalg.norm(first[:, None] - second[None], axis=2)
+    return float(gaps[gaps > 0.0].min(initial=np.inf))
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, n_obstacles=st.integers(0, 5))
+def test_everything_stands_clear_within_the_storage(seed: int, n_obstacles: int) -> None:
+    scenario = Scenario(
+        n_robots=15, n_items=20, warehouse_width=5, warehouse_height=3, n_obstacles=n_obstacles,
+        robot_radius=0.15, item_radius=0.1, obstacle_radius=0.25,
+    )  # fmt: skip
+    obstacles = layout.place_obstacles(scenario, seed)
+    items = layout.place_items(scenario, seed, obstacles)
+    robots, headings = layout.place_robots(scenario, seed, obstacles)
+    assert [len(rows) for rows in (obstacles, items, robots)] == [n_obstacles, 20, 15]
+    for centres, radius in ((obstacles, 0.25), (items, 0.1), (robots, 0.15)):
+        assert (centres >= radius).all()
+        assert (centres <= np.array([3.0, 3.0]) - radius).all()
+        assert narrowest(centres, centres) >= 2 * radius
+        if centres is not obstacles:
+            assert narrowest(centres, obstacles) >= radius + 0.25
+    assert (np.abs(headings) <= np.pi).all()
+
+
+@given(seed=SEEDS)
+@settings(max_examples=30)
+def test_a_place_depends_on_its_own_number_not_on_how_many_follow(seed: int) -> None:
+    few, many = Scenario(n_robots=5, n_items=10), Scenario(n_robots=25, n_items=60)
+    for place in (layout.place_items, lambda *key: layout.place_robots(*key)[0]):
+        np.testing.assert_array_equal(
+            place(few, seed, NOTHING), place(many, seed, NOTHING)[: len(place(few, seed, NOTHING))]
+        )
+    headings = [layout.place_robots(each, seed, NOTHING)[1] for each in (few, many)]
+    np.testing.assert_array_equal(headings[0], headings[1][:5])
+
+
+@given(seed=SEEDS, cycle=st.integers(0, 3))
+@settings(max_examples=30)
+def test_every_item_is_requested_once_and_in_an_order_keyed_by_item(seed: int, cycle: int) -> None:
+    few, many = Scenario(n_items=10), Scenario(n_items=60)
+    order = layout.request_order(many, seed, cycle)
+    assert sorted(order) == list(range(60))
+    np.testing.assert_array_equal(order[order < 10], layout.request_order(few, seed, cycle))
+
+
+def test_orders_differ_between_seeds_and_cycles() -> None:
+    scenario = Scenario()
+    orders = {
+        tuple(layout.request_order(scenario, seed, cycle)) for seed in range(5) for cycle in (0, 1)
+    }
+    assert len(orders) == 10
+
+
+def test_places_are_spread_evenly() -> None:
+    scenario = Scenario(n_robots=1)
+    starts = [layout.place_robots(scenario, seed, NOTHING) for seed in range(2000)]
+    places = np.array([centres[0] for centres, _ in starts])
+    # Means of uniform numbers, within five standard errors.
+    for axis, side in enumerate((8.0, 10.0)):
+        span = side - 0.25
+        error = span / np.sqrt(12 * 2000)
+        assert abs(places[:, axis].mean() - side / 2) < 5 * error
+        assert abs(places[:, axis].std() - span / np.sqrt(12)) < 0.1
+    mean_heading = np.mean([heading[0] for _, heading in starts])
+    assert abs(mean_heading) < 5 * 2 * np.pi / np.sqrt(12 * 2000)
+
+
+def test_robots_items_and_obstacles_have_streams_of_their_own() -> None:
+    scenario = Scenario(n_robots=3, n_items=3, n_obstacles=3, obstacle_radius=0.125)
+    places = [
+        layout.place_robots(scenario, 0, NOTHING)[0],
+        layout.place_items(scenario, 0, NOTHING),
+        layout.place_obstacles(scenario, 0),
+    ]
+    assert len({tuple(rows[0]) for rows in places}) == 3
+
+
+def test_a_restocked_item_stands_clear_and_each_elsewhere() -> None:
+    scenario = Scenario(
+        n_robots=20, n_items=20, warehouse_width=5, warehouse_height=3, restock=True
+    )
+    robots, _ = layout.place_robots(scenario, 0, NOTHING)
+    taken = np.vstack([layout.place_items(scenario, 0, NOTHING), robots])
+    places = np.array(
+        [layout.place_restocked(scenario, 0, count, taken, NOTHING) for count in range(1, 30)]
+    )
+    assert narrowest(places, taken) >= 0.25
+    assert (places >= 0.125).all()
+    assert (places <= np.array([3.0, 3.0]) - 0.125).all()
+    assert len(np.unique(places, axis=0)) == 29
+
+
+def test_where_nothing_fits_any_more_it_says_what_would_help() -> None:
+    scenario = Scenario(n_robots=2, n_items=2, warehouse_width=3, warehouse_height=1)
+    wall_to_wall = np.array([(x, y) for x in np.arange(0, 3, 0.1) for y in np.arange(0, 1, 0.1)])
+    with pytest.raises(ScenarioError, match=r"no room .* items .* should be fewer .* or a larger"):
+        layout.place_restocked(scenario, 0, 1, wall_to_wall, NOTHING)

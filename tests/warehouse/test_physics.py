@@ -1,0 +1,213 @@
+"""Bodies in motion: speeds, collisions, jams, and what lies in whose way."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.warehouse.state import STORED
+
+Build = Callable[..., Warehouse]
+
+HOLD = (0.0, 0.0, 0.0, 1.0)
+STAY = (0.0, 0.0, 0.0, 0.0)
+EAST = (1.0, 0.0, 0.0, 0.0)
+WEST = (-1.0, 0.0, 0.0, 0.0)
+FAR = (1.0, 9.0)
+DIAMETER = 0.25
+SUSTAINED = 0.02  # [m], how far bodies may sink into each other under steady pressure
+CLOSING = 2 * 2.0 * 0.02  # [m], what two robots at top speed close in one physics step
+
+
+def deepest_overlap(world: Warehouse) -> float:
+    position = world.state.robot_position[world.state.robot_present]
+    gaps = np.linalg.norm(position[:, None] - position[None], axis=2)
+    return float(DIAMETER - gaps[~np.eye(len(position), dtype=bool)].min())
+
+
+def deepest_in_walls(world: Warehouse) -> float:
+    at, scenario = world.state.robot_position, world.scenario
+    far = np.array([scenario.warehouse_width, scenario.warehouse_height]) - at
+    return float(DIAMETER / 2 - min(at.min(), far.min()))
+
+
+def towards(world: Warehouse, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+    """Return commands that drive everybody to (x, y), or each to its own, at top speed."""
+    away = np.array(np.broadcast_arrays(x, y, np.zeros(world.state.n_robots))[:2]).T
+    away = away - world.state.robot_position
+    angle = np.arctan2(away[:, 1], away[:, 0]) - world.state.robot_heading
+    zeros = np.zeros_like(angle)
+    return np.column_stack([np.cos(angle), np.sin(angle), zeros, zeros])
+
+
+def test_a_jam_of_150_robots_at_a_wall_keeps_their_bodies_apart() -> None:
+    world = Warehouse(Scenario(n_robots=150, n_items=1))
+    world.reset(0)
+    for step in range(120):
+        world.step(towards(world, *(world.state.robot_position + np.array([10.0, 0.0])).T))
+        assert deepest_overlap(world) <= CLOSING
+        if step >= 80:
+            assert deepest_overlap(world) <= SUSTAINED
+            assert deepest_in_walls(world) <= SUSTAINED
+    assert np.median(world.state.robot_position[:, 0]) > 9.0  # it is a jam
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (10.0, 10.0)])
+def test_a_jam_of_150_robots_in_a_corner_keeps_their_bodies_apart(
+    corner: tuple[float, float],
+) -> None:
+    # All drive at one point, so now and then a part of the pile gives way: never by more than an
+    # impact, and not for long.
+    world = Warehouse(Scenario(n_robots=150, n_items=1))
+    world.reset(0)
+    overlaps = []
+    for _ in range(120):
+        world.step(towards(world, *corner))
+        overlaps.append(deepest_overlap(world))
+    assert max(overlaps) <= CLOSING
+    assert np.median(overlaps[80:]) <= SUSTAINED
+    assert np.median(np.linalg.norm(world.state.robot_position - corner, axis=1)) < 3.0
+
+
+@pytest.mark.parametrize("gap", np.linspace(0.3, 0.45, 7))
+def test_two_robots_that_meet_head_on_never_pass_through_each_other(
+    build: Build, gap: float
+) -> None:
+    # One physics step per control step, so that each is looked at.
+    world = build([(4.0, 5.0), (4.0 + gap + 1.0, 5.0)], [FAR], control_period=0.02)
+    for _ in range(100):
+        world.step([EAST, WEST])
+        assert deepest_overlap(world) <= CLOSING
+        assert world.state.robot_position[0, 0] < world.state.robot_position[1, 0]
+    assert abs(deepest_overlap(world)) <= SUSTAINED
+
+
+@pytest.mark.parametrize("way", [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1)])
+def test_walls_stop_a_robot(build: Build, way: tuple[int, int]) -> None:
+    world = build([(5.0, 5.0)], [FAR], control_period=0.02)
+    for _ in range(250):
+        world.step([(*way, 0.0, 0.0)])
+        assert deepest_in_walls(world) <= CLOSING / 2
+    assert abs(deepest_in_walls(world)) <= SUSTAINED
+
+
+def test_an_obstacle_stops_a_robot(build: Build) -> None:
+    world = build([(2.0, 5.0)], [FAR], obstacles=[(4.0, 5.0)], obstacle_radius=0.3)
+    for _ in range(20):
+        world.step([EAST])
+    assert world.state.robot_position[0, 0] == pytest.approx(4.0 - 0.3 - 0.125, abs=SUSTAINED)
+    assert world.state.robot_contact[0]
+
+
+@pytest.mark.parametrize(("top", "acceleration"), [(2.0, 20.0), (1.0, 2.0)])
+def test_a_robot_speeds_up_to_its_top_speed_and_stops_again(
+    build: Build, top: float, acceleration: float
+) -> None:
+    world = build([(1.0, 5.0)], [FAR], max_speed=top, max_acceleration=acceleration)
+    needed = math.ceil(top / acceleration / 0.1 + 1e-9)
+    before = 0.0
+    for _ in range(needed):
+        world.step([EAST])
+        now = world.state.robot_velocity[0, 0]
+        assert now - before <= acceleration * 0.1 * 1.01
+        before = now
+    assert before == pytest.approx(top, rel=0.01)
+    start = world.state.robot_position[0, 0]
+    world.step([EAST])
+    assert world.state.robot_position[0, 0] - start == pytest.approx(top * 0.1, rel=0.01)
+    for _ in range(needed):
+        world.step([STAY])
+    assert world.state.robot_velocity[0, 0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_an_unladen_robot_drives_under_items(build: Build) -> None:
+    world, free = build([(2.0, 5.0)], [(3.0, 5.0)]), build([(2.0, 5.0)], [FAR])
+    for _ in range(10):
+        world.step([EAST])
+        free.step([EAST])
+    np.testing.assert_array_equal(world.state.robot_position, free.state.robot_position)
+    assert world.state.item_position[0].tolist() == [3.0, 5.0]
+
+
+def test_a_laden_robot_does_not_drive_through_an_item(build: Build) -> None:
+    world = build([(2.0, 5.0)], [FAR, (2.0, 5.1), (3.0, 5.0)], pickup_range=0.15)
+    world.step([HOLD])
+    for _ in range(20):
+        world.step([EAST])
+        away = np.linalg.norm(world.state.robot_position[0] - [3.0, 5.0])
+        assert away >= DIAMETER - CLOSING / 2
+    assert world.state.robot_item[0] == 1
+    assert world.state.robot_position[0, 0] == pytest.approx(2.75, abs=SUSTAINED)
+    assert world.state.item_position[2].tolist() == [3.0, 5.0]  # it stays put
+
+
+def test_an_item_is_in_the_way_where_it_was_put_down_and_nowhere_else(build: Build) -> None:
+    # Robot 0 carries item 1 from x = 2 to 4 and leaves it; robot 1, laden, then comes along.
+    items = [FAR, (2.0, 5.1), (1.0, 5.1)]
+    world = build([(2.0, 5.0), (1.0, 5.0)], items, pickup_range=0.15)
+    world.step([HOLD, HOLD])
+    while world.state.robot_position[0, 0] < 4.0:
+        world.step([EAST, STAY])
+    world.step([(0.0, 0.0, 0.0, -1.0), STAY])
+    left_at = world.state.item_position[1, 0]
+    for _ in range(5):
+        world.step([(0.0, 1.0, 0.0, 0.0), STAY])
+    for _ in range(30):
+        world.step([STAY, EAST])
+    assert world.state.robot_position[1, 0] == pytest.approx(left_at - DIAMETER, abs=SUSTAINED)
+
+
+def test_after_putting_down_or_delivering_a_robot_drives_under_items_again(build: Build) -> None:
+    world = build([(7.0, 5.0)], [(7.0, 5.1), (5.0, 5.0)])
+    world.step([HOLD])
+    while world.state.delivered == 0:
+        world.step([EAST])
+    for _ in range(25):
+        world.step([WEST])
+    assert world.state.robot_position[0, 0] < 4.5
+    assert world.state.item_status[1] == STORED
+
+
+def test_a_removed_robot_is_in_nobodys_way(build: Build) -> None:
+    robots = [(2.0, 5.0), (3.0, 5.0)]
+    world = build(robots, [FAR], [Fault("removed", (1,))])
+    free = build(robots[:1], [FAR])
+    for _ in range(10):
+        world.step([EAST, STAY])
+        free.step([EAST])
+    np.testing.assert_array_equal(world.state.robot_position[0], free.state.robot_position[0])
+
+
+def test_a_dead_robot_can_be_pushed_but_not_passed_through(build: Build) -> None:
+    world = build([(2.0, 5.0), (3.0, 5.0)], [FAR], [Fault("dead", (1,))])
+    for _ in range(15):
+        world.step([EAST, EAST])
+        assert deepest_overlap(world) <= CLOSING
+    assert world.state.robot_position[1, 0] > world.state.robot_position[0, 0]
+
+
+def test_collisions_do_not_turn_a_robot(build: Build) -> None:
+    world = build([(2.0, 5.0), (3.0, 5.1)], [FAR])
+    for _ in range(20):
+        world.step([EAST, WEST])
+    assert world.state.robot_heading.tolist() == [0.0, 0.0]
+
+
+def test_the_mirror_image_of_a_world_moves_as_its_mirror_image(build: Build) -> None:
+    # No order of robots is favoured beyond rounding while nothing touches.
+    rng = np.random.default_rng(0)
+    places = np.array(list(itertools.product((2.0, 4.0, 6.0), (2.0, 5.0, 8.0))))
+    commands = rng.uniform(-0.5, 0.5, (9, 4))
+    world, mirrored = build(places, [FAR]), build(places[::-1], [FAR])
+    for _ in range(5):
+        world.step(commands)
+        mirrored.step(commands[::-1])
+    np.testing.assert_allclose(
+        world.state.robot_position, mirrored.state.robot_position[::-1], atol=1e-9
+    )

@@ -1,0 +1,331 @@
+"""What is sensed, against a slow and plain computation of the same, and by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.observations import unflatten
+from swarm_logistics_env.warehouse.state import NOBODY, STORED
+
+Build = Callable[..., Warehouse]
+
+STAY = (0.0, 0.0, 0.0, 0.0)
+HOLD = (0.0, 0.0, 0.0, 1.0)
+TOLERANCE = 2e-5  # [m]: rows are of single precision
+
+FAULTS = (
+    Fault("FM1", 2),
+    Fault("FM3", (3,)),
+    Fault("FM3_send", (4,)),
+    Fault("FM3_hear", (5,)),
+    Fault("view_reduced", (6, 7), factor=0.3),
+    Fault("rangers_blind", (8,)),
+    Fault("dead", (9,)),
+    Fault("removed", (10,)),
+)
+WORLDS = {
+    "square": Scenario(n_robots=20, n_items=30, warehouse_width=5, warehouse_height=5),
+    "tall": Scenario(
+        n_robots=15, n_items=12, warehouse_width=2.2, warehouse_height=13.7, delivery_width=1.1,
+        view_range=2.5, ranger_range=1.3,
+    ),
+    "wide": Scenario(
+        n_robots=15, n_items=25, warehouse_width=17.3, warehouse_height=1.3, delivery_width=9.0,
+        radio_range=2.1, n_obstacles=3, obstacle_radius=0.2,
+    ),
+    "nearly empty": Scenario(n_robots=11, n_items=2, warehouse_width=30, warehouse_height=25),
+    "crowded": Scenario(
+        n_robots=40, n_items=40, warehouse_width=4.6, warehouse_height=3.4, delivery_width=1.0,
+        n_obstacles=2, relay="gossip", timer_limit=3.0, memory_size=3, view_range=0.6,
+    ),
+    "short-sighted": Scenario(
+        n_robots=20, n_items=20, warehouse_width=4, warehouse_height=3, ranger_range=0.05,
+        view_range=0.1, radio_range=0.1, delivery_width=1.0,
+    ),
+    "one robot": Scenario(n_robots=1, n_items=1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_rows_agree_with_a_plain_computation(name: str) -> None:
+    scenario = WORLDS[name]
+    faults = FAULTS if scenario.n_robots > 10 else ()
+    world, policy = Warehouse(scenario), policies.load("swarm-dt")
+    policy.reset(scenario.n_robots, 1)
+    rng = np.random.default_rng(3)
+    rows = world.reset(4, faults)
+    for step in range(60):
+        commands = policy.act(rows)
+        # All ways at once: turned, and crowding into the delivery area and its walls.
+        commands[:, 2] = rng.uniform(-1.0, 1.0, scenario.n_robots)
+        if step > 30:
+            heading = world.state.robot_heading
+            commands[:, 0], commands[:, 1] = np.cos(heading), -np.sin(heading)
+        rows = world.step(commands)
+        if step % 12 == 11:
+            check_rows(world, rows)
+
+
+def check_rows(world: Warehouse, rows: NDArray[np.float32]) -> None:
+    state = world.state
+    for me in range(state.n_robots):
+        if not state.robot_present[me]:
+            assert not rows[me].any()
+            continue
+        parts = unflatten(rows[me], world.scenario)
+        check_scans(world, me, parts)
+        check_items(world, me, parts)
+        check_neighbours(world, me, parts)
+        check_itself(world, me, parts)
+
+
+def modes_of(world: Warehouse, robot: int) -> set[str]:
+    return set(world.state.failure_modes[robot])
+
+
+def seen_from(world: Warehouse, me: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `places` (n, 2) in the frame of robot `me`."""
+    state = world.state
+    heading = state.robot_heading[me]
+    turn = np.array(
+        [[math.cos(heading), math.sin(heading)], [-math.sin(heading), math.cos(heading)]]
+    )
+    return np.asarray((places - state.robot_position[me]) @ turn.T)
+
+
+def others_of(world: Warehouse, me: int) -> NDArray[np.int64]:
+    others = world.state.robot_present.copy()
+    others[me] = False
+    return np.flatnonzero(others)
+
+
+def free_items(world: Warehouse) -> NDArray[np.int64]:
+    return np.flatnonzero(world.state.item_status == STORED)
+
+
+def check_scans(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
+    state, scenario = world.state, world.scenario
+    items = state.item_position[free_items(world)]
+    robots = state.robot_position[others_of(world, me)]
+    blind = bool({"rangers_blind", "dead"} & modes_of(world, me))
+    for beam in range(row.N_BEAMS):
+        angle = beam * math.tau / row.N_BEAMS
+        way = np.array([math.cos(angle), math.sin(angle)])
+        wall = min(
+            to_walls(world, me, beam),
+            to_discs(seen_from(world, me, state.obstacle_position), scenario.obstacle_radius, way),
+        )
+        seen = {
+            "range_robots": to_discs(seen_from(world, me, robots), scenario.robot_radius, way),
+            "range_items": to_discs(seen_from(world, me, items), scenario.item_radius, way),
+            "range_walls": wall,
+        }
+        for name, distance in seen.items():
+            expected = scenario.ranger_range if blind else min(distance, scenario.ranger_range)
+            assert parts[name][beam] == pytest.approx(expected, abs=TOLERANCE)
+
+
+def to_discs(centres: NDArray[np.float64], radius: float, way: NDArray[np.float64]) -> float:
+    """Return how far a beam from the origin goes until it meets a disc: the quadratic's root."""
+    nearest = math.inf
+    for centre in centres:
+        if np.hypot(*centre) <= radius:
+            return 0.0
+        half, offset = -float(way @ centre), float(centre @ centre) - radius**2
+        root = half * half - offset
+        if root > 0.0 and -half > 0.0:
+            nearest = min(nearest, -half - math.sqrt(root))
+    return nearest
+
+
+def to_walls(world: Warehouse, me: int, beam: int) -> float:
+    """Return how far a beam goes until it leaves the arena."""
+    x, y = world.state.robot_position[me]
+    angle = world.state.robot_heading[me] + beam * math.tau / row.N_BEAMS
+    width, height = world.scenario.warehouse_width, world.scenario.warehouse_height
+    distances: list[float] = []
+    for place, way, far in ((x, math.cos(angle), width), (y, math.sin(angle), height)):
+        if abs(way) > 1e-12:
+            distances.append(((far if way > 0.0 else 0.0) - place) / way)
+    return max(min(distances), 0.0)
+
+
+def check_items(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
+    state, scenario = world.state, world.scenario
+    reduced = 0.3 if "view_reduced" in modes_of(world, me) else 1.0
+    view = 0.0 if "dead" in modes_of(world, me) else scenario.view_range * reduced
+    items = free_items(world)
+    places = seen_from(world, me, state.item_position[items])
+    distance = np.hypot(places[:, 0], places[:, 1])
+    order = [at for at in np.argsort(distance) if distance[at] <= view][: row.N_ITEMS_IN_VIEW]
+    expected = np.zeros((row.N_ITEMS_IN_VIEW, 5))
+    for place, at in enumerate(order):
+        item = items[at]
+        is_requested = item == state.requested
+        expected[place] = 1, *places[at], is_requested, item in state.robot_memory[me]
+    names = ("item_present", "item_x", "item_y", "item_requested", "item_recently_held")
+    sensed = np.column_stack([parts[name] for name in names])
+    np.testing.assert_allclose(sensed, expected, atol=TOLERANCE)
+
+
+def check_neighbours(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
+    state, scenario = world.state, world.scenario
+    reduced = 0.3 if "view_reduced" in modes_of(world, me) else 1.0
+    view = 0.0 if "dead" in modes_of(world, me) else scenario.view_range * reduced
+    deaf, mute = {"FM3", "FM3_hear", "dead"}, {"FM3", "FM3_send", "dead"}
+    near: list[tuple[float, int, float, float, bool]] = []
+    for other in others_of(world, me):
+        x, y = seen_from(world, me, state.robot_position[[other]])[0]
+        distance = math.hypot(x, y)
+        heard = distance <= scenario.radio_range and not (
+            deaf & modes_of(world, me) or mute & modes_of(world, int(other))
+        )
+        if heard or distance <= view:
+            near.append((distance, int(other), x, y, heard))
+    near.sort()
+
+    expected = np.zeros((row.N_NEIGHBOURS, 5))
+    tellers = []
+    for place, (distance, other, x, y, heard) in enumerate(near):
+        told = state.robot_told[other]
+        tells = heard and not math.isnan(told)
+        if tells:
+            tellers.append((told, distance, x, y))
+        if place < row.N_NEIGHBOURS:
+            expected[place] = 1, x, y, tells, told if tells else scenario.timer_limit
+    names = ("present", "x", "y", "timer_heard", "timer")
+    sensed = np.column_stack([parts[f"neighbour_{name}"] for name in names])
+    np.testing.assert_allclose(sensed, expected, atol=TOLERANCE)
+
+    lowest = [parts[f"lowest_timer{end}"][0] for end in ("_present", "_x", "_y", "")]
+    told, _, x, y = min(tellers, default=(0.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(lowest, [float(bool(tellers)), x, y, told], atol=TOLERANCE)
+
+
+def check_itself(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
+    state, scenario = world.state, world.scenario
+    item, timer = state.robot_item[me], state.robot_timer[me]
+    velocity = seen_from(world, me, state.robot_position[me] + state.robot_velocity[[me]])[0]
+    expected = {
+        "carrying": item != NOBODY,
+        "carrying_requested": item != NOBODY and item == state.requested,
+        "in_delivery_area": state.robot_position[me, 0] >= scenario.storage_width,
+        "timer_runs": not math.isnan(timer),
+        "timer": scenario.timer_limit if math.isnan(timer) else timer,
+        "velocity": np.clip(velocity, -scenario.max_speed, scenario.max_speed),
+    }
+    for name, value in expected.items():
+        np.testing.assert_allclose(parts[name], value, atol=TOLERANCE)
+
+    gap = narrowest_gap(world, me)
+    if gap < 0.001:
+        assert parts["contact"][0] == 1.0
+    if gap > 0.02:
+        assert parts["contact"][0] == 0.0
+    assert parts["contact"][0] == state.robot_contact[me]
+
+
+def narrowest_gap(world: Warehouse, me: int) -> float:
+    """Return the gap [m] to what is nearest of all that is solid to robot `me`."""
+    state, scenario = world.state, world.scenario
+    x, y = state.robot_position[me]
+    walls = (x, y, scenario.warehouse_width - x, scenario.warehouse_height - y)
+    gaps = [min(walls) - scenario.robot_radius]
+    things = [
+        (state.robot_position[others_of(world, me)], scenario.robot_radius),
+        (state.obstacle_position, scenario.obstacle_radius),
+    ]
+    if state.robot_item[me] != NOBODY:
+        things.append((state.item_position[free_items(world)], scenario.item_radius))
+    for places, radius in things:
+        distances = np.linalg.norm(places - state.robot_position[me], axis=1)
+        gaps.extend((distances - radius - scenario.robot_radius).tolist())
+    return float(min(gaps))
+
+
+# -- by hand ------------------------------------------------------------------------------------
+
+
+def test_a_scan_in_an_empty_corner_by_hand(build: Build) -> None:
+    world = build([(1.0, 0.5)], [(1.5, 0.5)])
+    parts = unflatten(world.observe()[0], world.scenario)
+    walls = parts["range_walls"]
+    assert walls[0] == 2.0  # ahead: nothing in range
+    assert walls[8] == pytest.approx(1.0)  # behind
+    assert walls[12] == pytest.approx(0.5)  # to the right
+    assert walls[10] == pytest.approx(0.5 * math.sqrt(2.0))
+    assert parts["range_items"][0] == pytest.approx(0.5 - 0.125)
+    assert (parts["range_items"][1:] == 2.0).all()
+    assert (parts["range_robots"] == 2.0).all()
+
+
+def test_rows_are_in_the_robots_own_frame(build: Build) -> None:
+    world = build([(2.0, 5.0)], [(2.0, 5.6)])
+    left = unflatten(world.observe()[0], world.scenario)
+    assert [left["item_x"][0], left["item_y"][0]] == pytest.approx([0.0, 0.6])
+    while world.state.robot_heading[0] < math.pi / 2 - 1e-6:
+        rest = (math.pi / 2 - world.state.robot_heading[0]) / (6.0 * 0.1)
+        world.step([(0.0, 0.0, min(rest, 1.0), 0.0)])
+    ahead = unflatten(world.observe()[0], world.scenario)
+    assert [ahead["item_x"][0], ahead["item_y"][0]] == pytest.approx([0.6, 0.0], abs=1e-4)
+    assert ahead["range_items"][0] == pytest.approx(0.475, abs=1e-3)
+
+
+def test_more_items_than_fit_into_a_row_leave_the_nearest(build: Build) -> None:
+    items = [(2.0 + 0.09 * k, 2.0) for k in range(1, 11)]
+    world = build([(2.0, 2.0)], items, view_range=2.0)
+    parts = unflatten(world.observe()[0], world.scenario)
+    np.testing.assert_allclose(parts["item_x"], [0.09 * k for k in range(1, 9)], atol=TOLERANCE)
+    assert parts["item_requested"].tolist() == [1.0] + [0.0] * 7
+
+
+def test_the_lowest_timer_is_heard_beyond_the_neighbours_in_the_row(build: Build) -> None:
+    # Nine robots nearer than the one that tells; it is not in the row, yet heard.
+    ring = [(5.0 + math.cos(k * math.tau / 9), 5.0 + math.sin(k * math.tau / 9)) for k in range(9)]
+    world = build([(5.0, 5.0), *ring, (8.5, 5.0)], [(1.0, 1.0)])
+    rows = world.step([STAY] * 11)
+    parts = unflatten(rows[0], world.scenario)
+    assert (parts["neighbour_present"] == 1.0).all()
+    assert (parts["neighbour_timer_heard"] == 0.0).all()
+    assert parts["lowest_timer_present"][0] == 1.0
+    assert parts["lowest_timer_x"][0] == pytest.approx(3.5)
+
+
+def test_equal_timers_are_settled_by_the_nearest_teller(build: Build) -> None:
+    robots = [(7.0, 5.0), (8.6, 6.0), (8.4, 5.0), (8.5, 4.0)]
+    world = build(robots, [(1.0, 1.0)])
+    rows = world.step([STAY] * 4)
+    lowest = rows[0, row.LOWEST_TIMER : row.LOWEST_TIMER + 4]
+    assert lowest == pytest.approx([1.0, 1.4, 0.0, 0.0])
+
+
+def test_an_unladen_robot_feels_no_item_and_a_laden_one_does(build: Build) -> None:
+    world = build([(2.0, 2.0)], [(1.8, 2.0), (2.24, 2.0)])
+    assert not world.state.robot_contact[0]
+    world.step([HOLD])
+    assert world.state.robot_item[0] == 0
+    assert world.state.robot_contact[0]
+
+
+@pytest.mark.parametrize("x", np.linspace(1.0, 3.0, 21))
+def test_a_robot_that_sees_nothing_still_feels_what_touches_it(build: Build, x: float) -> None:
+    # Wherever the two stand: whether a robot looks around for what touches it must not depend on
+    # how far it sees.
+    robots = [(x, 2.0), (x + 0.255, 2.0)]
+    world = build(robots, [(8.0, 8.0)], ranger_range=0.05, view_range=0.05, radio_range=0.05)
+    assert world.state.robot_contact.tolist() == [True, True]
+
+
+def test_a_failed_robot_is_not_told_so() -> None:
+    # Modes that lose no sense and tell no lie within earshot: the first rows are the same bits.
+    scenario = Scenario(n_robots=5)
+    healthy = Warehouse(scenario).reset(0)
+    for mode in ("FM2", "FM4", "motor_slow", "motor_dead"):
+        np.testing.assert_array_equal(Warehouse(scenario).reset(0, [Fault(mode, 5)]), healthy)
