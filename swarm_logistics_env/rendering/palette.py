@@ -1,0 +1,55 @@
+"""Colours and marks: told apart by every kind of colour vision, and by lightness in print.
+
+Hues are Okabe and Ito's ("Color Universal Design", 2008). What has to be told apart at a glance
+differs in lightness or shape as well: grey levels of the three robot states are 213, 158 and 87.
+"""
+
+from __future__ import annotations
+
+RGB = tuple[int, int, int]
+
+INK: RGB = (30, 30, 30)
+SURROUNDINGS: RGB = (236, 236, 236)
+FLOOR: RGB = (255, 255, 255)
+FLOOR_LINE: RGB = (240, 240, 240)
+DELIVERY_AREA: RGB = (226, 241, 235)
+DELIVERY_HATCH: RGB = (196, 222, 211)
+DELIVERY_WORD: RGB = (120, 150, 138)
+OBSTACLE: RGB = (110, 110, 110)
+
+SEARCHING: RGB = (86, 180, 233)  # sky blue
+SHUFFLING: RGB = (0, 114, 178)  # blue
+DELIVERING: RGB = (240, 228, 66)  # yellow
+TIMER: RGB = (0, 158, 115)  # bluish green
+REQUESTED: RGB = (213, 94, 0)  # vermillion
+LINK: RGB = (158, 67, 117)  # reddish purple, darkened: thin things need contrast
+BEAM: RGB = (230, 159, 0)  # orange
+ITEM: RGB = (214, 214, 214)
+ITEM_EDGE: RGB = (120, 120, 120)
+TRAIL: RGB = (150, 150, 150)
+
+# What a robot that fails in a mode wears. A removed robot is not there to wear anything.
+MARKS = {
+    "FM1": "1",
+    "FM2": "2",
+    "FM3": "3",
+    "FM3_send": "3s",
+    "FM3_hear": "3h",
+    "FM4": "4",
+    "motor_slow": "S",
+    "motor_dead": "M",
+    "view_reduced": "V",
+    "rangers_blind": "R",
+    "dead": "X",
+}
+
+
+def mark(modes: tuple[str, ...]) -> str:
+    """Return what a robot wears that fails in these modes, `1+V`; an unknown mode, its name."""
+    return "+".join(MARKS.get(mode, mode) for mode in modes)
+
+
+def mixed(colour: RGB, other: RGB, share: float) -> RGB:
+    """Return `colour` with a `share` in [0, 1] of `other`."""
+    red, green, blue = (round(a + (b - a) * share) for a, b in zip(colour, other, strict=True))
+    return red, green, blue

@@ -1,0 +1,162 @@
+"""The warehouse as a picture: its state drawn onto a surface in memory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pygame
+
+from swarm_logistics_env.rendering import sprites
+from swarm_logistics_env.rendering.background import background
+from swarm_logistics_env.rendering.canvas import Point, new_canvas, stamp
+from swarm_logistics_env.rendering.caption import Caption
+from swarm_logistics_env.rendering.overlays import draw_beams, draw_links, draw_trails
+from swarm_logistics_env.rendering.palette import DELIVERING, RGB, SEARCHING, SHUFFLING, mark
+from swarm_logistics_env.rendering.projection import Projection
+from swarm_logistics_env.rendering.trails import Trails
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+
+
+class Picture:
+    """Draws states of a warehouse; see `Renderer` for the arguments."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        size: int,
+        show_beams_of: int | None,
+        trails: bool,
+        all_links: bool,
+    ) -> None:
+        self._size, self._beams_of, self._all_links = size, show_beams_of, all_links
+        self._trails = Trails() if trails else None
+        self._lay_out(scenario)
+
+    def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
+        """Return the picture of `state`, which stays as it is until the next call."""
+        if self._shape != _shape(scenario):
+            self._lay_out(scenario)
+        canvas, projection = self._canvas, self._projection
+        canvas.blit(self._background, (0, 0))
+        robots = projection.points(state.robot_position)
+        items = projection.points(state.item_position)
+        # Glow and beams stop at the walls.
+        canvas.set_clip(self._floor)
+        if self._trails is not None:
+            self._trails.note(state)
+            draw_trails(canvas, projection, self._trails)
+        self._draw_obstacles(state)
+        self._draw_halos(state, scenario, robots)
+        self._draw_stored_items(state, items)
+        draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self._all_links)
+        watched = self._beams_of
+        if watched is not None and watched < state.n_robots and state.robot_present[watched]:
+            draw_beams(canvas, state, scenario, robots[watched], watched, projection)
+        canvas.set_clip(None)
+        self._draw_robots(state, robots)
+        self._draw_requested(state, items)
+        self._draw_badges(state, robots)
+        self._caption.draw(canvas, state, scenario)
+        return canvas
+
+    def _lay_out(self, scenario: Scenario) -> None:
+        text_height = max(13, round(self._size / 38))
+        margin = Projection.fitting(scenario, self._size, 0).margin
+        least_width = Caption.least_width(text_height) + 2 * margin
+        self._projection = projection = Projection.fitting(scenario, self._size, least_width)
+        self._caption = Caption(
+            margin, projection.bottom + margin, projection.width - 2 * margin, text_height
+        )
+        height = projection.bottom + margin + self._caption.height + margin // 2
+        height += height % 2  # even, as the width
+        self._canvas = new_canvas(projection.width, height)
+        self._background = new_canvas(projection.width, height)
+        self._background.blit(background(projection, scenario, height, text_height), (0, 0))
+        self._caption.draw_legend(self._background)
+        self._floor = pygame.Rect(
+            projection.left,
+            projection.top,
+            projection.right - projection.left,
+            projection.bottom - projection.top,
+        )
+        # Things stay visible in a warehouse that is drawn small.
+        self._robot_radius = max(3.5, projection.length(scenario.robot_radius))
+        self._item_half = max(2.0, 0.8 * projection.length(scenario.item_radius))
+        self._obstacle_radius = max(3.0, projection.length(scenario.obstacle_radius))
+        self._shape = _shape(scenario)
+
+    def _draw_obstacles(self, state: WarehouseState) -> None:
+        sprite = sprites.obstacle(self._obstacle_radius)
+        obstacles = self._projection.points(state.obstacle_position)
+        stamp(self._canvas, ((sprite, at) for at in obstacles))
+
+    def _draw_halos(self, state: WarehouseState, scenario: Scenario, robots: list[Point]) -> None:
+        age = state.robot_timer / scenario.timer_limit
+        glowing = np.flatnonzero(state.robot_present & (age < 1.0)).tolist()
+        stamp(
+            self._canvas,
+            (
+                (sprites.halo(self._robot_radius, int(age[robot] * sprites.HALOS)), robots[robot])
+                for robot in glowing
+            ),
+        )
+
+    def _draw_stored_items(self, state: WarehouseState, items: list[Point]) -> None:
+        sprite = sprites.item(self._item_half, False)
+        stored = np.flatnonzero(state.item_status == STORED).tolist()
+        stamp(self._canvas, ((sprite, items[item]) for item in stored))
+
+    def _draw_robots(self, state: WarehouseState, robots: list[Point]) -> None:
+        radius, stamps = self._robot_radius, []
+        load = sprites.item(max(1.5, 0.45 * radius), False)
+        faulty, headings = state.failed.tolist(), state.robot_heading.tolist()
+        carried = state.robot_item.tolist()
+        for robot in np.flatnonzero(state.robot_present).tolist():
+            colour = _state_colour(carried[robot], state.requested)
+            step = sprites.heading_step(headings[robot])
+            body = sprites.robot(radius, colour, step, faulty[robot])
+            stamps.append((body, robots[robot]))
+            if carried[robot] not in (NOBODY, state.requested):
+                stamps.append((load, robots[robot]))
+        stamp(self._canvas, stamps)
+
+    def _draw_requested(self, state: WarehouseState, items: list[Point]) -> None:
+        if state.requested == NOBODY:
+            return
+        at = items[state.requested]
+        is_carried = state.item_carrier[state.requested] != NOBODY
+        half = 0.5 * self._robot_radius if is_carried else 1.4 * self._item_half
+        stamp(
+            self._canvas,
+            [
+                (sprites.target(1.9 * self._robot_radius + 1.0), at),
+                (sprites.item(max(1.5, half), True), at),
+            ],
+        )
+
+    def _draw_badges(self, state: WarehouseState, robots: list[Point]) -> None:
+        height = max(11, round(1.2 * self._robot_radius))
+        away = 0.8 * self._robot_radius + 0.3 * height
+        area = self._canvas.get_rect()
+        for robot in np.flatnonzero(state.robot_present & state.failed).tolist():
+            sprite = sprites.badge(mark(state.failure_modes[robot]), height)
+            x, y = robots[robot]
+            place = sprite.get_rect(center=(round(x + away), round(y - away)))
+            self._canvas.blit(sprite, place.clamp(area))
+
+
+def _shape(scenario: Scenario) -> tuple[float, ...]:
+    return (
+        scenario.warehouse_width,
+        scenario.warehouse_height,
+        scenario.delivery_width,
+        scenario.robot_radius,
+        scenario.item_radius,
+        scenario.obstacle_radius,
+    )
+
+
+def _state_colour(carried: int, requested: int) -> RGB:
+    if carried == NOBODY:
+        return SEARCHING
+    return DELIVERING if carried == requested else SHUFFLING

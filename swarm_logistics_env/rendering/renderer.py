@@ -1,0 +1,141 @@
+"""Pictures of a warehouse, as arrays or in a window. pygame is loaded by the first Renderer."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+import warnings
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.state import WarehouseState
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.rendering.window import Window
+
+RenderMode = Literal["rgb_array", "human"]
+_LEAST_SIZE, _LARGEST_SIZE = 100, 8000
+
+
+class Renderer:
+    """Draws states of a warehouse.
+
+    A frame depends on the state and the arguments alone (with `trails`, on the states before it
+    too). It can be pickled and copied; a copy opens a window of its own.
+
+    Args:
+        scenario: the conditions; another one may come with each frame, and the picture's size
+            changes only with the shape of the warehouse.
+        mode: "rgb_array" needs no display; "human" opens a window with the first `show`.
+        size: longer side of the warehouse, margins included [px]; the caption comes below it.
+        show_beams_of: a robot whose sensor beams and view range are drawn.
+        trails: whether robots leave their paths of the last 2.5 seconds.
+        all_links: whether every robot is linked to the neighbour with the lowest timer it hears,
+            rather than only the one that carries the requested item.
+
+    Raises:
+        SetupError: pygame is not installed, or an argument cannot be.
+
+    Example:
+        >>> from swarm_logistics_env import Scenario, Warehouse
+        >>> world = Warehouse(Scenario(n_robots=3))
+        >>> observations = world.reset(seed=0)
+        >>> renderer = Renderer(world.scenario, "rgb_array", size=200)
+        >>> renderer.frame(world.state, world.scenario).dtype
+        dtype('uint8')
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        mode: RenderMode,
+        size: int = 800,
+        *,
+        show_beams_of: int | None = None,
+        trails: bool = False,
+        all_links: bool = False,
+    ) -> None:
+        if mode not in get_args(RenderMode):
+            raise SetupError(f"mode = {mode!r}: should be one of {list(get_args(RenderMode))}")
+        if not _LEAST_SIZE <= size <= _LARGEST_SIZE:
+            raise SetupError(f"size = {size}: should be {_LEAST_SIZE} to {_LARGEST_SIZE} [px]")
+        if show_beams_of is not None and not 0 <= show_beams_of < scenario.n_robots:
+            raise SetupError(
+                f"show_beams_of = {show_beams_of}: should be None or a robot, "
+                f"0 to {scenario.n_robots - 1}"
+            )
+        load_pygame()
+        from swarm_logistics_env.rendering.picture import Picture
+
+        self.mode = mode
+        self._arguments: dict[str, Any] = {
+            "scenario": scenario,
+            "mode": mode,
+            "size": size,
+            "show_beams_of": show_beams_of,
+            "trails": trails,
+            "all_links": all_links,
+        }
+        self._picture = Picture(scenario, size, show_beams_of, trails, all_links)
+        self._window: Window | None = None
+        self._was_closed_by_user = False
+
+    def frame(self, state: WarehouseState, scenario: Scenario) -> NDArray[np.uint8]:
+        """Return the picture of `state`: (H, W, 3), red, green, blue. Works in either mode."""
+        from swarm_logistics_env.rendering.canvas import to_array
+
+        return to_array(self._picture.draw(state, scenario))
+
+    def show(self, state: WarehouseState, scenario: Scenario) -> None:
+        """Show `state` in the window, at most one state per control period of real time.
+
+        Nothing is shown any more once the user has closed the window.
+
+        Raises:
+            SetupError: the mode is not "human", or there is no display.
+        """
+        if self.mode != "human":
+            raise SetupError(f"show with mode = {self.mode!r}: should be 'human'")
+        if self._was_closed_by_user:
+            return
+        if self._window is None:
+            from swarm_logistics_env.rendering.window import Window
+
+            self._window = Window()
+        picture = self._picture.draw(state, scenario)
+        if not self._window.show(picture, 1.0 / scenario.control_period):
+            self._was_closed_by_user = True
+            self.close()
+
+    def close(self) -> None:
+        """Close the window, if any; harmless when called twice. A later `show` opens it anew."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return functools.partial(Renderer, **self._arguments), ()
+
+
+def load_pygame() -> None:
+    """Import pygame, without the greeting that it prints.
+
+    Raises:
+        SetupError: it is not installed.
+    """
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    try:
+        with warnings.catch_warnings():
+            # pygame's own use of old parts of setuptools is nothing the caller can mend.
+            warnings.simplefilter("ignore")
+            for module in ("pygame", "pygame.font", "pygame.pkgdata"):
+                importlib.import_module(module)
+    except ImportError as error:
+        raise SetupError(
+            f"rendering needs pygame ({error}): pip install swarm-logistics-env[render]"
+        ) from error

@@ -1,0 +1,185 @@
+"""What stands in the warehouse and on its caption, as small pictures, each painted once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import ParamSpec
+
+import numpy as np
+import pygame
+from numpy.typing import NDArray
+
+from swarm_logistics_env.rendering.palette import (
+    FLOOR,
+    INK,
+    ITEM,
+    ITEM_EDGE,
+    OBSTACLE,
+    REQUESTED,
+    RGB,
+    TIMER,
+)
+from swarm_logistics_env.rendering.shapes import (
+    box,
+    disc,
+    painted,
+    pill,
+    pixels,
+    ring,
+    wedge,
+)
+
+HEADINGS = 120  # headings that are told apart
+HALOS = 12  # ages of a timer that are told apart
+
+P = ParamSpec("P")
+
+
+def _sprite(paint: Callable[P, NDArray[np.uint8]]) -> Callable[P, pygame.Surface]:
+    @lru_cache(maxsize=2048)
+    def surface(*args: P.args, **kwargs: P.kwargs) -> pygame.Surface:
+        rgba = paint(*args, **kwargs)
+        return pygame.image.frombytes(rgba.tobytes(), (rgba.shape[1], rgba.shape[0]), "RGBA")
+
+    # The cache's type forgets the parameters.
+    return surface  # type: ignore[return-value]
+
+
+def blank(width: int, height: int) -> pygame.Surface:
+    """Return a picture of that size [px] with nothing on it."""
+    return pygame.image.frombytes(bytes(4 * width * height), (width, height), "RGBA")
+
+
+@_sprite
+def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[np.uint8]:
+    """Return a disc with a nose; a faulty robot's edge is thick.
+
+    Args:
+        radius: [px].
+        heading: in `HEADINGS`ths of a turn, to the left from the right.
+    """
+    edge = radius * (0.3 if is_faulty else 0.13) + 0.4
+    nose = radius * 1.45 + 1.0
+    x, y = pixels(nose)
+    turned = -2.0 * math.pi * heading / HEADINGS
+    return painted(
+        (wedge(x, y, turned, nose, radius * 0.5, radius * 0.6 + 0.5), INK, 1.0),
+        (disc(x, y, radius), INK, 1.0),
+        (disc(x, y, radius - edge), colour, 1.0),
+    )
+
+
+@_sprite
+def halo(radius: float, age: int) -> NDArray[np.uint8]:
+    """Return the glow about a robot of that radius [px]; `age` in [0, HALOS), oldest last."""
+    strength = 1.0 - age / HALOS
+    reach = radius * (1.5 + 1.0 * strength)
+    x, y = pixels(reach)
+    fading = np.clip((reach - np.hypot(x, y)) / (reach - radius), 0.0, 1.0)
+    glow = painted((disc(x, y, reach), TIMER, 0.25 + 0.4 * strength))
+    glow[..., 3] = np.rint(glow[..., 3] * fading**0.7)
+    return glow
+
+
+@_sprite
+def item(half: float, is_requested: bool) -> NDArray[np.uint8]:
+    """Return a square of about that half side [px]; its edges fall between pixels."""
+    half = math.floor(half) + 0.5
+    x, y = pixels(half)
+    edge = max(1, round(0.2 * half))
+    inner = half - edge
+    return painted(
+        (box(x, y, half, half), INK if is_requested else ITEM_EDGE, 1.0),
+        (box(x, y, inner, inner), REQUESTED if is_requested else ITEM, 1.0),
+    )
+
+
+@_sprite
+def target(radius: float) -> NDArray[np.uint8]:
+    """Return the ring with four ticks about the requested item, `radius` [px] inside."""
+    width = 0.8 + 0.1 * radius
+    reach = radius + 4.0 * width
+    x, y = pixels(reach)
+    middle = (radius + reach) / 2
+    arm = reach - middle
+    ticks = [
+        box(x - side_x * middle, y - side_y * middle, *half)
+        for side_x, side_y, half in (
+            (1, 0, (arm, width / 2)),
+            (-1, 0, (arm, width / 2)),
+            (0, 1, (width / 2, arm)),
+            (0, -1, (width / 2, arm)),
+        )
+    ]
+    shape = np.minimum.reduce([ring(x, y, radius + width / 2, width), *ticks])
+    # A white edge keeps it apart from whatever lies below.
+    return painted((shape - 1.0, FLOOR, 0.8), (shape, REQUESTED, 1.0))
+
+
+@_sprite
+def obstacle(radius: float) -> NDArray[np.uint8]:
+    """Return a solid disc of that radius [px]."""
+    x, y = pixels(radius)
+    return painted((disc(x, y, radius), INK, 1.0), (disc(x, y, radius - 2.0), OBSTACLE, 1.0))
+
+
+@_sprite
+def circle(radius: float, width: float, colour: RGB) -> NDArray[np.uint8]:
+    """Return a thin circle; all lengths in pixels."""
+    x, y = pixels(radius + width)
+    return painted((ring(x, y, radius, width), colour, 1.0))
+
+
+@_sprite
+def dot(radius: float, colour: RGB) -> NDArray[np.uint8]:
+    """Return a plain disc of that radius [px]."""
+    x, y = pixels(radius)
+    return painted((disc(x, y, radius), colour, 1.0))
+
+
+@_sprite
+def arrowhead(length: float, heading: int, colour: RGB) -> NDArray[np.uint8]:
+    """Return a triangle of that length [px] with its tip in the middle of the picture."""
+    x, y = pixels(1.2 * length)
+    turned = -2.0 * math.pi * heading / HEADINGS
+    return painted((wedge(x, y, turned, 0.0, -length, 0.45 * length), colour, 1.0))
+
+
+def heading_step(angle: float) -> int:
+    """Return an angle [rad], to the left from the right, in `HEADINGS`ths of a turn."""
+    return round(angle * HEADINGS / (2.0 * math.pi)) % HEADINGS
+
+
+def _fast(surface: pygame.Surface) -> pygame.Surface:
+    # Bytes in the order of the picture's own, which are blitted ten times as fast.
+    pixels = pygame.image.tobytes(surface, "RGBA")
+    return pygame.image.frombytes(pixels, surface.get_size(), "RGBA")
+
+
+@lru_cache(maxsize=512)
+def words(text: str, height: int, colour: RGB) -> pygame.Surface:
+    """Return a line of text of that height [px], in the font that pygame brings along."""
+    # A font is not kept: it would die with a pygame.quit() of somebody else's.
+    pygame.font.init()
+    return _fast(pygame.font.Font(None, height).render(text, True, colour))
+
+
+@lru_cache(maxsize=256)
+def badge(mark: str, height: int) -> pygame.Surface:
+    """Return a mark in white on a black pill of that height [px]."""
+    text = words(mark, round(1.25 * height), FLOOR)
+    text = text.subsurface(text.get_bounding_rect())
+    radius = height / 2
+    half_width = max(radius, text.get_width() / 2 + 0.3 * height)
+    x, y = pixels(half_width)
+    y = y[np.abs(y[:, 0]) <= radius + 2.0]
+    rgba = painted(
+        (pill(x, y, half_width + 1.0, radius + 1.0), FLOOR, 0.9),
+        (pill(x, y, half_width, radius), INK, 1.0),
+    )
+    size = (rgba.shape[1], rgba.shape[0])
+    surface = pygame.image.frombytes(rgba.tobytes(), size, "RGBA")
+    surface.blit(text, text.get_rect(center=surface.get_rect().center))
+    return surface
