@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, observations
+from swarm_logistics_env.rendering.links import followed
+from swarm_logistics_env.warehouse import WarehouseState
+from swarm_logistics_env.warehouse.state import NOBODY
+
+
+@pytest.mark.parametrize("relay", ["none", "gossip"])
+def test_follows_whom_the_robot_itself_hears(relay: str) -> None:
+    scenario = Scenario(n_robots=30, radio_range=2.0).replace(relay=relay)
+    world = Warehouse(scenario)
+    faults = [Fault("FM1", [0, 1]), Fault("FM3_send", [2, 3]), Fault("FM3_hear", [4, 5])]
+    world.reset(1, [*faults, Fault("removed", [6], onset=1.0)])
+    compared = 0
+    for _ in range(60):
+        rows = observations.unflatten(world.step(np.tile([1.0, 0.2, 0.1, 0.0], (30, 1))), scenario)
+        state = world.state
+        for robot in range(30):
+            leader = followed(state, scenario, robot)
+            assert (leader != NOBODY) == bool(rows["lowest_timer_present"][robot, 0])
+            if leader == NOBODY:
+                continue
+            compared += 1
+            assert state.robot_told[leader] == state.robot_heard[robot]
+            offset = state.robot_position[leader] - state.robot_position[robot]
+            seen = [rows["lowest_timer_x"][robot, 0], rows["lowest_timer_y"][robot, 0]]
+            assert np.hypot(*offset) == pytest.approx(np.hypot(*seen), abs=1e-5)
+    assert compared > 100
+
+
+def test_nearest_of_those_that_tell_the_same(
+    situation: Callable[..., tuple[WarehouseState, Scenario]],
+) -> None:
+    state, scenario = situation([[2, 2], [5, 2], [4, 2]], [[7, 7]])
+    state.robot_told[:] = [0.0, 1.0, 1.0]
+    assert followed(state, scenario, 0) == 2
+    state.robot_told[2] = 1.1
+    assert followed(state, scenario, 0) == 1
