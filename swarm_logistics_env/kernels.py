@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import ParamSpec, TypeVar, cast
@@ -43,6 +44,19 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     compiled = numba.njit(function, cache=True, nogil=True)
     function.__qualname__ = name
     return cast("Callable[P, R]", compiled)
+
+
+@kernel
+def pair_key(key: np.uint64, other: int) -> np.uint64:
+    """Return the key of a stream of its own for each `other`."""
+    return np.uint64(key) ^ (np.uint64(other + 1) * np.uint64(0xD1342543DE82EF95))
+
+
+@kernel
+def gaussian(key: np.uint64, counter: int) -> float:
+    """Return a standard normal number from numbers 2 `counter` and the next of stream `key`."""
+    radius = math.sqrt(-2.0 * math.log(1.0 - uniform(key, 2 * counter)))
+    return radius * math.cos(2.0 * math.pi * uniform(key, 2 * counter + 1))
 
 
 @kernel

@@ -34,7 +34,13 @@ TIMER_RUNS = CARRYING + 3
 TIMER = CARRYING + 4
 VELOCITY = CARRYING + 5
 CONTACT = CARRYING + 7
-N_COLUMNS = CONTACT + 1
+N_COLUMNS = CONTACT + 1  # and after them, per neighbour, the message it broadcasts
+MESSAGES = N_COLUMNS
+
+
+def n_columns(scenario: Scenario) -> int:
+    """Return the length D of a row in `scenario`."""
+    return N_COLUMNS + N_NEIGHBOURS * scenario.message_size
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,10 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
     items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)
     neighbours = _block(NEIGHBOURS, N_NEIGHBOURS, NEIGHBOUR_FEATURES)
     lowest = _block(LOWEST_TIMER, 1, ("present", "x", "y", "timer"))
+    message = _run(MESSAGES, n_columns(scenario) - MESSAGES)
+    messages = (
+        Column("neighbour_message", "1", message, -1, 1, "what each broadcasts, one by one"),
+    )
     return (
         Column("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"robots; {beam}"),
         Column("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "walls and obstacles"),
@@ -82,12 +92,13 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
         Column("timer", "s", _run(TIMER, 1), 0, limit, "its own timer; the limit when silent"),
         Column("velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; saturates"),
         Column("contact", "flag", _run(CONTACT, 1), 0, 1, "touches a robot, wall or obstacle"),
+        *(messages if scenario.message_size else ()),
     )
 
 
 def bounds(scenario: Scenario) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the lowest and highest possible row, each of shape (N_COLUMNS,)."""
-    low, high = np.zeros(N_COLUMNS, np.float32), np.zeros(N_COLUMNS, np.float32)
+    """Return the lowest and highest possible row, each of shape (D,)."""
+    low, high = np.zeros((2, n_columns(scenario)), np.float32)
     for column in columns(scenario):
         low[column.columns], high[column.columns] = column.low, column.high
     return low, high

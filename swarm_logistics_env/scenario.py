@@ -5,13 +5,48 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
 
 from swarm_logistics_env.errors import ScenarioError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 
 # The densest that discs are strewn at random: well below random sequential addition's .547.
 DENSEST_COVER = 0.4
+
+
+Probability = Annotated[float, Field(ge=0, le=1)]
+Mix = Annotated[tuple[Annotated[float, Field(gt=0, le=1)], ...], Field(min_length=1)]
+
+# What may change while robots are at work; the rest is built into arena, bodies and spaces.
+CHANGES_DURING_RUN = frozenset(
+    {
+        "delivery_width",
+        "duration",
+        "restock",
+        "max_speed",
+        "max_turn_rate",
+        "ranger_range",
+        "view_range",
+        "radio_range",
+        "pickup_range",
+        "timer_limit",
+        "relay",
+        "drive",
+        "speed_mix",
+        "sensing_mix",
+        "ranger_noise",
+        "position_noise",
+        "sensor_dropout",
+        "radio_loss",
+    }
+)
 
 
 class Scenario(Record):
@@ -55,6 +90,15 @@ class Scenario(Record):
     pickup_range: PositiveFloat = Field(
         0.25, description="lifts an item this near, centre to centre [m]; simulator"
     )
+    drive: Literal["holonomic", "differential"] = Field(
+        "holonomic", description="differential: no sideways motion, `left` is ignored; DOTS"
+    )
+    speed_mix: Mix = Field(
+        (1.0,), description="robot i has factor i (repeating) of max_speed and turn rate; here"
+    )
+    sensing_mix: Mix = Field(
+        (1.0,), description="robot i has factor i (repeating) of ranger and view range; here"
+    )
     memory_size: Annotated[int, Field(ge=0, le=16)] = Field(
         2, description="items last put down, not lifted again until a delivery; simulator"
     )
@@ -63,6 +107,22 @@ class Scenario(Record):
     )
     relay: Literal["none", "gossip"] = Field(
         "none", description="robots tell their own timer, or the lowest heard, aged; paper"
+    )
+
+    ranger_noise: NonNegativeFloat = Field(
+        0.0, description="standard deviation of every beam [m]; not published, so 0; here"
+    )
+    position_noise: NonNegativeFloat = Field(
+        0.0, description="standard deviation of x and of y of neighbours and items [m]; here"
+    )
+    sensor_dropout: Probability = Field(
+        0.0, description="a beam, or an item or robot in view, is missed in a control step; here"
+    )
+    radio_loss: Probability = Field(
+        0.0, description="what one robot sends another is lost in a control step; measured 0"
+    )
+    message_size: Annotated[int, Field(ge=0, le=64)] = Field(
+        0, description="numbers in [-1, 1] that each robot broadcasts as it likes; here"
     )
 
     item_radius: PositiveFloat = Field(0.125, description="[m]; simulator")

@@ -1,4 +1,4 @@
-"""From commands to wanted velocities: the drive of a holonomic robot."""
+"""From commands to wanted velocities: the drive of a holonomic or differential robot."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ def drive(
     period: float,
     heading: NDArray[np.float64],
     wanted_velocity: NDArray[np.float64],
+    sideways: bool = True,
 ) -> bool:
     """Turn the robots and fill their wanted velocities (N, 2) [m/s] for one control period.
 
     Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
-    that turns drives along its mean direction. Returns False, with nothing changed, if a
-    command of an able robot is not finite.
+    that turns drives along its mean direction; one that cannot go `sideways` ignores `left`.
+    Rows of robots that are not able are ignored. Returns False, with nothing changed, if any other
+    command is not finite.
     """
     for robot in range(commands.shape[0]):
         for column in range(commands.shape[1]):
@@ -36,7 +38,7 @@ def drive(
         if not able[robot]:
             continue
         forward = min(max(commands[robot, 0], -1.0), 1.0)
-        left = min(max(commands[robot, 1], -1.0), 1.0)
+        left = min(max(commands[robot, 1], -1.0), 1.0) if sideways else 0.0
         norm = math.sqrt(forward * forward + left * left)
         speed = max_speed[robot] / max(norm, 1.0)
         turn = min(max(commands[robot, 2], -1.0), 1.0) * max_turn_rate[robot] * period

@@ -171,10 +171,12 @@ def apply_faults(
     Returns:
         Which robots a fault takes out of the arena, (N,).
     """
-    state.max_speed[:] = scenario.max_speed
-    state.max_turn_rate[:] = scenario.max_turn_rate
-    state.ranger_range[:] = scenario.ranger_range
-    state.view_range[:] = scenario.view_range
+    speed = np.resize(scenario.speed_mix, state.n_robots)
+    sensing = np.resize(scenario.sensing_mix, state.n_robots)
+    state.max_speed[:] = scenario.max_speed * speed
+    state.max_turn_rate[:] = scenario.max_turn_rate * speed
+    state.ranger_range[:] = scenario.ranger_range * sensing
+    state.view_range[:] = scenario.view_range * sensing
     for able in (state.lifts, state.delivers, state.sends, state.hears, state.honest, state.obeys):
         able[:] = True
     gone = np.zeros(state.n_robots, np.bool_)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.kernels import kernel, pair_key, uniform
 from swarm_logistics_env.warehouse.grid import cell_along
 from swarm_logistics_env.warehouse.state import NOBODY
 
@@ -24,6 +24,7 @@ _BEAM_Y = np.sin(2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
 _BORDERS = tuple(math.tan((beam + 0.5) * 2.0 * math.pi / row.N_BEAMS) for beam in range(4))
 _RANGE_ROBOTS, _RANGE_WALLS, _RANGE_ITEMS = row.RANGE_ROBOTS, row.RANGE_WALLS, row.RANGE_ITEMS
 _N_BEAMS, _N_ITEMS, _N_NEIGHBOURS = row.N_BEAMS, row.N_ITEMS_IN_VIEW, row.N_NEIGHBOURS
+_RADIO, _ROBOT_SEEN, _ITEM_SEEN = 0, 1, 2  # purposes of the streams between two things
 _ITEMS, _NEIGHBOURS, _LOWEST = row.ITEMS, row.NEIGHBOURS, row.LOWEST_TIMER
 
 
@@ -94,25 +95,28 @@ def scan_walls(
 
 
 @kernel
-def insert_nearest(
-    square: float,
-    index: int,
-    squares: NDArray[np.float64],
-    indices: NDArray[np.int64],
-    count: int,
+def nearest_first(
+    squares: NDArray[np.float64], indices: NDArray[np.int64], count: int, wanted: int
 ) -> int:
-    """Insert into a list kept nearest first, at most its length; returns the new count."""
-    last = squares.shape[0]
-    if count == last and square >= squares[last - 1]:
-        return count
-    place = min(count, last - 1)
-    while place > 0 and squares[place - 1] > square:
-        squares[place] = squares[place - 1]
-        indices[place] = indices[place - 1]
-        place -= 1
-    squares[place] = square
-    indices[place] = index
-    return min(count + 1, len(squares))
+    """Bring the `wanted` nearest of `count` things to the front, nearest first.
+
+    Returns how many there are, at most `wanted`.
+    """
+    for place in range(min(count, wanted)):
+        nearest, square = place, squares[place]
+        for index in range(place + 1, count):
+            # Both without a branch: which of them is nearer cannot be predicted.
+            nearest = index if squares[index] < square else nearest
+            square = squares[index] if squares[index] < square else square
+        squares[nearest], squares[place] = squares[place], square
+        indices[nearest], indices[place] = indices[place], indices[nearest]
+    return min(count, wanted)
+
+
+@kernel
+def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: float) -> bool:
+    """Return whether what `other` offers the robot of that key is lost in this step."""
+    return uniform(pair_key(key, other), 3 * step + purpose) < probability
 
 
 @kernel
@@ -153,16 +157,20 @@ def sense(
     full_range: float,
     contact: NDArray[np.bool_],
     heard: NDArray[np.float64],
+    keys: NDArray[np.uint64],
+    step: int,
+    radio_loss: float,
+    dropout: float,
+    message: NDArray[np.float64],
     rows: NDArray[np.float32],
 ) -> int:
-    """Fill the observation rows (N, N_COLUMNS), who touches something and what was heard.
+    """Fill the observation rows (N, D), who touches something and what was heard.
 
     Returns how many robots that have not failed touch one that has.
     """
-    near_squares = np.empty(_N_NEIGHBOURS)
-    near = np.empty(_N_NEIGHBOURS, np.int64)
-    item_squares = np.empty(_N_ITEMS)
-    items = np.empty(_N_ITEMS, np.int64)
+    n_things = max(position.shape[0], item_position.shape[0]) + 1
+    found, squares = np.empty(n_things, np.int64), np.empty(n_things)
+    near, near_squares = np.empty(n_things, np.int64), np.empty(n_things)
     rows[:, :] = 0.0
     n_anchored = 0
     for me in range(position.shape[0]):
@@ -231,14 +239,20 @@ def sense(
                 if square < touch_square and failed[other] and not failed[me]:
                     anchored = True
                 is_heard = square <= radio_square and sends[other] and hears[me]
+                if is_heard and radio_loss > 0.0:
+                    is_heard = not is_missed(keys[me], other, step, _RADIO, radio_loss)
                 if is_heard and not math.isnan(told[other]):
                     lower = told[other] < lowest_timer
                     if lower or (told[other] == lowest_timer and square < lowest_square):
                         lowest, lowest_square, lowest_timer = other, square, told[other]
-                if is_heard or square <= view_square:
-                    n_near = insert_nearest(square, other, near_squares, near, n_near)
+                is_seen = square <= view_square
+                if is_seen and dropout > 0.0:
+                    is_seen = not is_missed(keys[me], other, step, _ROBOT_SEEN, dropout)
+                if is_heard or is_seen:
+                    near[n_near], near_squares[n_near] = other, square
+                    n_near += 1
         n_anchored += anchored
-        for place in range(n_near):
+        for place in range(nearest_first(near_squares, near, n_near, _N_NEIGHBOURS)):
             other = near[place]
             dx, dy = position[other, 0] - x, position[other, 1] - y
             column = _NEIGHBOURS + place * _NEIGHBOUR_WIDTH
@@ -246,9 +260,14 @@ def sense(
             out[column + 1] = dx * cosine + dy * sine
             out[column + 2] = dy * cosine - dx * sine
             is_heard = near_squares[place] <= radio_square and sends[other] and hears[me]
+            if is_heard and radio_loss > 0.0:
+                is_heard = not is_missed(keys[me], other, step, _RADIO, radio_loss)
             tells = is_heard and not math.isnan(told[other])
             out[column + 3] = 1.0 if tells else 0.0
             out[column + 4] = told[other] if tells else timer_limit
+            if is_heard:
+                first = row.MESSAGES + place * message.shape[1]
+                out[first : first + message.shape[1]] = message[other]
         if lowest != NOBODY:
             dx, dy = position[lowest, 0] - x, position[lowest, 1] - y
             heard[me] = lowest_timer
@@ -280,10 +299,14 @@ def sense(
                     )  # fmt: skip
                 if square < touch_square and robot_item[me] != NOBODY:
                     touches = True
-                if square <= view_square:
-                    n_items = insert_nearest(square, item, item_squares, items, n_items)
-        for place in range(n_items):
-            item = items[place]
+                is_seen = square <= view_square
+                if is_seen and dropout > 0.0:
+                    is_seen = not is_missed(keys[me], item, step, _ITEM_SEEN, dropout)
+                if is_seen:
+                    near[n_items], near_squares[n_items] = item, square
+                    n_items += 1
+        for place in range(nearest_first(near_squares, near, n_items, _N_ITEMS)):
+            item = near[place]
             dx, dy = item_position[item, 0] - x, item_position[item, 1] - y
             column = _ITEMS + place * _ITEM_WIDTH
             out[column] = 1.0

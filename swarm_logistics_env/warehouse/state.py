@@ -49,18 +49,14 @@ class WarehouseState:
     robot_heading = Column[np.float64]("numbers", HEADING)  # (N,) [rad] from +x to the left, +-pi
     robot_timer = Column[np.float64]("numbers", TIMER)  # (N,) [s] since the area, NaN when silent
     robot_told = Column[np.float64]("numbers", TOLD)  # (N,) [s] told, NaN when silent
-    robot_heard = Column[np.float64](
-        "numbers", HEARD
-    )  # (N,) [s] lowest heard, NaN when none
+    robot_heard = Column[np.float64]("numbers", HEARD)  # (N,) [s] lowest heard, NaN when none
     max_speed = Column[np.float64]("numbers", MAX_SPEED)  # (N,) [m/s]
     max_turn_rate = Column[np.float64]("numbers", MAX_TURN_RATE)  # (N,) [rad/s]
     ranger_range = Column[np.float64]("numbers", RANGER_RANGE)  # (N,) [m], 0 when blind
     view_range = Column[np.float64]("numbers", VIEW_RANGE)  # (N,) [m]
 
     robot_present = Column[np.bool_]("flags", PRESENT)  # (N,)
-    robot_in_delivery = Column[np.bool_](
-        "flags", IN_DELIVERY
-    )  # (N,) its centre is in the area
+    robot_in_delivery = Column[np.bool_]("flags", IN_DELIVERY)  # (N,) its centre is in the area
     robot_contact = Column[np.bool_]("flags", CONTACT)  # (N,) touches something solid to it
     # What each robot can do now; failures take from it, as from the ranges and speeds above.
     lifts = Column[np.bool_]("flags", LIFTS)  # (N,)
@@ -72,9 +68,7 @@ class WarehouseState:
     failed = Column[np.bool_]("flags", FAILED)  # (N,) any failure mode holds
 
     robot_item = Column[np.int64]("links", ITEM)  # (N,) item carried, or NOBODY
-    last_in_delivery = Column[np.int64](
-        "links", LAST_IN_DELIVERY
-    )  # (N,) step, or NOBODY
+    last_in_delivery = Column[np.int64]("links", LAST_IN_DELIVERY)  # (N,) step, or NOBODY
     item_status = Column[np.int64]("item_links", STATUS)  # (I,) STORED, CARRIED or DELIVERED
     item_carrier = Column[np.int64]("item_links", CARRIER)  # (I,) robot, or NOBODY
 
@@ -89,6 +83,7 @@ class WarehouseState:
         self.robot_position = np.zeros((n, 2))  # [m]
         self.robot_velocity = np.zeros((n, 2))  # [m/s]
         self.robot_memory = np.full((n, scenario.memory_size), NOBODY)  # put down, newest first
+        self.robot_message = np.zeros((n, scenario.message_size))  # in [-1, 1], broadcast
         self.item_position = np.zeros((items, 2))  # [m], its carrier's while carried
         self.item_status[:] = STORED
         self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import state as at
+from swarm_logistics_env.warehouse.disturbance import disturb
 from swarm_logistics_env.warehouse.driving import drive
 from swarm_logistics_env.warehouse.grid import fill
 from swarm_logistics_env.warehouse.logistics import (
@@ -26,8 +28,35 @@ from swarm_logistics_env.warehouse.sensing import sense
 (
     WIDTH, HEIGHT, ROBOT_RADIUS, ITEM_RADIUS, OBSTACLE_RADIUS, RANGER_RANGE, RADIO_RANGE,
     PICKUP_RANGE, MAX_SPEED, TIMER_LIMIT, CONTROL_PERIOD, STORAGE_WIDTH, GOSSIP,
-    ROBOT_CELL, ITEM_CELL, N_CONSTANTS,
-) = range(16)  # fmt: skip
+    ROBOT_CELL, ITEM_CELL, SIDEWAYS, RANGER_NOISE, POSITION_NOISE, SENSOR_DROPOUT, RADIO_LOSS,
+    VIEW_RANGE, N_CONSTANTS,
+) = range(22)  # fmt: skip
+
+
+def constants_of(scenario: Scenario, robot_cell: float, item_cell: float) -> NDArray[np.float64]:
+    """Return the numbers that the kernels need of a scenario, (N_CONSTANTS,)."""
+    constants = np.zeros(N_CONSTANTS)
+    constants[WIDTH] = scenario.warehouse_width
+    constants[HEIGHT] = scenario.warehouse_height
+    constants[ROBOT_RADIUS] = scenario.robot_radius
+    constants[ITEM_RADIUS] = scenario.item_radius
+    constants[OBSTACLE_RADIUS] = scenario.obstacle_radius
+    constants[RANGER_RANGE] = scenario.ranger_range
+    constants[RADIO_RANGE] = scenario.radio_range
+    constants[PICKUP_RANGE] = scenario.pickup_range
+    constants[MAX_SPEED] = scenario.max_speed
+    constants[TIMER_LIMIT] = scenario.timer_limit
+    constants[CONTROL_PERIOD] = scenario.control_period
+    constants[STORAGE_WIDTH] = scenario.storage_width
+    constants[GOSSIP] = scenario.relay == "gossip"
+    constants[ROBOT_CELL], constants[ITEM_CELL] = robot_cell, item_cell
+    constants[SIDEWAYS] = scenario.drive == "holonomic"
+    constants[RANGER_NOISE] = scenario.ranger_noise
+    constants[POSITION_NOISE] = scenario.position_noise
+    constants[SENSOR_DROPOUT] = scenario.sensor_dropout
+    constants[RADIO_LOSS] = scenario.radio_loss
+    constants[VIEW_RANGE] = scenario.view_range
+    return constants
 
 
 @kernel
@@ -50,6 +79,7 @@ def set_out(
     return drive(
         commands, able, numbers[at.MAX_SPEED], numbers[at.MAX_TURN_RATE],
         constants[CONTROL_PERIOD], numbers[at.HEADING], velocities[n : 2 * n],
+        constants[SIDEWAYS] > 0.0,
     )  # fmt: skip
 
 
@@ -130,6 +160,8 @@ def perceive(
     item_size: NDArray[np.int64],
     item_start: NDArray[np.int64],
     item_members: NDArray[np.int64],
+    keys: NDArray[np.uint64],
+    message: NDArray[np.float64],
     rows: NDArray[np.float32],
 ) -> int:
     """Run the timers and fill the observation rows; returns how many robots are anchored."""
@@ -143,7 +175,7 @@ def perceive(
         item_position, item_links[at.STATUS] == at.STORED,
         constants[ITEM_CELL], item_size, item_start, item_members,
     )  # fmt: skip
-    return sense(
+    anchored = sense(
         constants[WIDTH], constants[HEIGHT], constants[ROBOT_RADIUS], constants[ITEM_RADIUS],
         constants[OBSTACLE_RADIUS], constants[RADIO_RANGE], constants[MAX_SPEED],
         constants[TIMER_LIMIT], requested, flags[at.PRESENT], position, velocity,
@@ -152,5 +184,14 @@ def perceive(
         numbers[at.VIEW_RANGE], flags[at.SENDS], flags[at.HEARS], flags[at.FAILED],
         constants[ROBOT_CELL], robot_size, robot_start, robot_members,
         constants[ITEM_CELL], item_size, item_start, item_members,
-        constants[RANGER_RANGE], flags[at.CONTACT], numbers[at.HEARD], rows,
+        constants[RANGER_RANGE], flags[at.CONTACT], numbers[at.HEARD], keys, step,
+        constants[RADIO_LOSS], constants[SENSOR_DROPOUT], message, rows,
     )  # fmt: skip
+    is_exact = constants[RANGER_NOISE] == 0.0 and constants[POSITION_NOISE] == 0.0
+    if not is_exact or constants[SENSOR_DROPOUT] > 0.0:
+        disturb(
+            flags[at.PRESENT], keys, step, constants[RANGER_NOISE], constants[POSITION_NOISE],
+            constants[SENSOR_DROPOUT], constants[RANGER_RANGE], constants[VIEW_RANGE],
+            max(constants[VIEW_RANGE], constants[RADIO_RANGE]), rows,
+        )  # fmt: skip
+    return anchored

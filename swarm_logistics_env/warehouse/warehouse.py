@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.observations import N_COLUMNS
-from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
+from swarm_logistics_env.observations import n_columns
+from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
+from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.warehouse import layout, stepping
 from swarm_logistics_env.warehouse.faults import Fault, apply_faults, failed_robots
 from swarm_logistics_env.warehouse.grid import Grid
@@ -18,10 +21,15 @@ from swarm_logistics_env.warehouse.physics import Physics
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
+# How many steps of commands are kept for a pickle to replay, and how many numbers at most.
+_LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
+_NOT_KEPT = ("_physics", "_memory", "_log")
 
 
 class Warehouse:
     """One warehouse with its robots, items and faults; arrays in, arrays out.
+
+    It can be pickled and copied at any moment; the copy goes on exactly as the original does.
 
     Attributes:
         scenario: the conditions of this episode.
@@ -41,6 +49,7 @@ class Warehouse:
         self.state = WarehouseState(self.scenario)
         self.faults: tuple[Fault, ...] = ()
         self._seed: int | None = None
+        self._log: list[NDArray[np.float64]] = []
 
     def reset(
         self,
@@ -48,7 +57,7 @@ class Warehouse:
         faults: Sequence[Fault] = (),
         scenario: Scenario | None = None,
     ) -> NDArray[np.float32]:
-        """Begin an episode and return the first observations (N, N_COLUMNS).
+        """Begin an episode and return the first observations (N, D).
 
         Args:
             seed: alone decides layout, requests, start poses and which robots fail.
@@ -69,15 +78,16 @@ class Warehouse:
         )
         self.scenario, self.state, self._seed = scenario, state, seed
         self.faults, self._struck = tuple(faults), struck
-        self._fault_times = sorted({time for fault in faults for time in fault.changes()})
         self._order = layout.request_order(scenario, seed)
         state.requested = int(self._order[0])
-        self._physics = Physics(
-            scenario, state.robot_position, state.item_position, state.obstacle_position
-        )
+        self._sensor_keys = row_keys(seed, "sensors", scenario.n_robots)
+        self._physics = Physics(scenario, state)
         self._make_room_to_work(scenario)
+        self._take_constants(scenario)
         self._apply_faults()
         self._perceive()
+        self._log = []
+        self._remember()
         return self.observe()
 
     def step(self, commands: ArrayLike) -> NDArray[np.float32]:
@@ -87,9 +97,10 @@ class Warehouse:
             commands: (N, 4), columns `COMMAND_COLUMNS`, each in [-1, 1] (beyond is cut): forward
                 and left in fractions of the top speed, turn in fractions of the top turn rate,
                 gripper > 0.5 hold, < -0.5 open, between as it is. Absent robots' rows are ignored.
+                With `message_size` M, (N, 4 + M): the message to broadcast, zeros if left out.
 
         Returns:
-            Observations (N, N_COLUMNS) float32, an array of the caller's own.
+            Observations (N, D) float32, an array of the caller's own.
 
         Raises:
             CommandError: wrong shape, not numbers, or not finite; the world is as it was.
@@ -100,12 +111,15 @@ class Warehouse:
         if not stepping.set_out(
             given, self._constants, state.numbers, state.flags, physics.bodies, physics.velocities
         ):
-            able = state.robot_present & state.obeys
-            bad = np.argwhere(~np.isfinite(given) & able[:, None])[0]
+            obeying = state.robot_present & state.obeys
+            bad = np.argwhere(~np.isfinite(given) & obeying[:, None])[0]
             raise CommandError(
                 f"commands[{bad[0]}, {bad[1]}] = {given[bad[0], bad[1]]}: should be finite"
             )
+        self._log.append(given)
         physics.advance()
+        if self.scenario.message_size:
+            self._send_messages(given)
         state.step += 1
         state.time = state.step * self.scenario.control_period
         self._handle_items(given)
@@ -114,10 +128,43 @@ class Warehouse:
             self._apply_faults()
         anchored = self._perceive()
         state.anchoring_seconds += anchored * self.scenario.control_period
+        if len(self._log) >= self._longest_log:
+            self._remember()
         return self.observe()
 
+    def change(self, **fields: Any) -> None:
+        """Change conditions while the robots are at work, from the next step on.
+
+        Args:
+            **fields: fields of the scenario, of those in `CHANGES_DURING_RUN`.
+
+        Raises:
+            ScenarioError: a field is unknown, cannot change during a run, or its value cannot be.
+        """
+        for name in fields:
+            if name not in CHANGES_DURING_RUN and name in Scenario.model_fields:
+                raise ScenarioError(
+                    f"Scenario.{name} cannot change during a run: should be set at a reset; "
+                    f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
+                )
+        self.scenario = self.scenario.replace(**fields)
+        self._take_constants(self.scenario)
+        self._apply_faults()
+        self._remember()
+
+    def set_faults(self, faults: Sequence[Fault]) -> None:
+        """Let these faults, instead of those before, hold from now on; none of them repairs all.
+
+        Raises:
+            FaultError: a fault names robots that are not there.
+        """
+        struck = [failed_robots(fault, self._seed or 0, self.state.n_robots) for fault in faults]
+        self.faults, self._struck = tuple(faults), struck
+        self._apply_faults()
+        self._remember()
+
     def observe(self) -> NDArray[np.float32]:
-        """Return what every robot senses now: (N, N_COLUMNS) float32, absent robots zeros."""
+        """Return what every robot senses now: (N, D) float32, absent robots zeros."""
         return self._rows
 
     @property
@@ -139,42 +186,60 @@ class Warehouse:
         if self._seed is None:
             raise SetupError("step before reset: call reset(seed) first")
         try:
-            given = np.ascontiguousarray(commands, dtype=np.float64)
+            given = np.array(commands, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
             raise CommandError(f"commands should be an array of numbers: {error}") from None
-        expected = (self.state.n_robots, len(COMMAND_COLUMNS))
-        if given.shape != expected:
-            raise CommandError(f"commands of shape {given.shape}: should be {expected}")
+        plain = (self.state.n_robots, len(COMMAND_COLUMNS))
+        full = (plain[0], plain[1] + self.scenario.message_size)
+        if given.shape not in (plain, full):
+            raise CommandError(f"commands of shape {given.shape}: should be {full}")
         return given
 
     def _make_room_to_work(self, scenario: Scenario) -> None:
         n, items = scenario.n_robots, scenario.n_items
         width, height = scenario.warehouse_width, scenario.warehouse_height
         cell = (scenario.ranger_range + scenario.robot_radius) / 2
-        self._n_steps = scenario.n_steps
         self._robot_grid = Grid(width, height, cell, n)
         self._item_grid = Grid(width, height, cell, items)
         self._claim = np.full(items, NOBODY)
         self._claim_square = np.zeros(items)
         self._events = np.zeros((2 * n, 3), np.int64)
-        self._constants = np.zeros(stepping.N_CONSTANTS)
-        self._constants[:] = (
-            width,
-            height,
-            scenario.robot_radius,
-            scenario.item_radius,
-            scenario.obstacle_radius,
-            scenario.ranger_range,
-            scenario.radio_range,
-            scenario.pickup_range,
-            scenario.max_speed,
-            scenario.timer_limit,
-            scenario.control_period,
-            scenario.storage_width,
-            scenario.relay == "gossip",
-            self._robot_grid.cell,
-            self._item_grid.cell,
+        size = n * (len(COMMAND_COLUMNS) + scenario.message_size)
+        self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
+
+    def _take_constants(self, scenario: Scenario) -> None:
+        self._n_steps = scenario.n_steps
+        self._n_columns = n_columns(scenario)
+        self._constants = stepping.constants_of(
+            scenario, self._robot_grid.cell, self._item_grid.cell
         )
+
+    def _remember(self) -> None:
+        """Note everything a pickle needs, and rebuild the bodies from it as unpickling will.
+
+        What the engine remembers of contacts cannot be saved, so a pickle holds the world at the
+        last such moment and the commands since, which unpickling replays.
+        """
+        if self.state.step > 0:
+            self._physics = Physics(self.scenario, self.state)
+        self._log = []
+        kept = {name: value for name, value in self.__dict__.items() if name not in _NOT_KEPT}
+        self._memory = pickle.dumps(kept)
+
+    def __getstate__(self) -> dict[str, Any]:
+        if self._seed is None:
+            return self.__dict__
+        return {"_memory": self._memory, "_log": self._log}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        if "_memory" not in saved:
+            self.__dict__.update(saved)
+            return
+        self.__dict__.update(pickle.loads(saved["_memory"]))
+        self._memory, self._log = saved["_memory"], []
+        self._physics = Physics(self.scenario, self.state)
+        for commands in saved["_log"]:
+            self.step(commands)
 
     def _handle_items(self, commands: NDArray[np.float64]) -> None:
         state, grid, physics = self.state, self._item_grid, self._physics
@@ -190,6 +255,14 @@ class Warehouse:
                     physics.lift(robot, item)
                 else:
                     physics.put_down(robot, item, *state.item_position[item].tolist())
+
+    def _send_messages(self, commands: NDArray[np.float64]) -> None:
+        state = self.state
+        state.robot_message[:] = 0.0
+        if commands.shape[1] > len(COMMAND_COLUMNS):
+            sends = state.robot_present & state.obeys
+            message = np.clip(commands[:, len(COMMAND_COLUMNS) :], -1.0, 1.0)
+            state.robot_message[sends] = message[sends]
 
     def _deliver(self) -> None:
         state = self.state
@@ -227,7 +300,8 @@ class Warehouse:
 
     def _apply_faults(self) -> None:
         state = self.state
-        self._fault_times = [time for time in self._fault_times if time > state.time + 5e-7]
+        times = {time for fault in self.faults for time in fault.changes()}
+        self._fault_times = sorted(time for time in times if time > state.time + 5e-7)
         gone = apply_faults(state, self.scenario, self.faults, self._struck)
         for robot in np.flatnonzero(gone & state.robot_present).tolist():
             self._remove(robot)
@@ -250,11 +324,11 @@ class Warehouse:
     def _perceive(self) -> int:
         state, robots, items = self.state, self._robot_grid, self._item_grid
         # New memory every time: what was handed out stays as it was.
-        self._rows = np.empty((len(state.robot_position), N_COLUMNS), np.float32)
+        self._rows = np.empty((len(state.robot_position), self._n_columns), np.float32)
         return stepping.perceive(
             state.step, state.requested, self._constants, state.robot_position,
             state.robot_velocity, state.numbers, state.flags, state.links, state.robot_memory,
             state.item_position, state.item_links, state.obstacle_position,
             robots.size, robots.start, robots.members, items.size, items.start, items.members,
-            self._rows,
+            self._sensor_keys, state.robot_message, self._rows,
         )  # fmt: skip
