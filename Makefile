@@ -39,7 +39,7 @@ clean:
 	rm -rf .venvs build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,study
+$(DEV)/installed: EXTRAS := dev,study,render
 $(STUDY)/installed: EXTRAS := study
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
+from swarm_logistics_env.central_state import global_state, global_state_bounds
 from swarm_logistics_env.errors import CommandError, SetupError, suggest
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.rewards import RewardTerms
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault, Warehouse
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.rendering import Renderer
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, Any]]
@@ -34,7 +38,7 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         scenario: the conditions; default: the paper's.
         faults: what befalls which robots in every episode.
         rewards: reward term -> weight; default: 1 to everybody for each delivery.
-        render_mode: None.
+        render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
         **fields: fields of the scenario to replace, e.g. `n_robots=40`.
 
@@ -50,7 +54,8 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
 
     metadata: ClassVar[dict[str, Any]] = {
         "name": "swarm_logistics_v0",
-        "render_modes": [],
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,  # of the default control period; an instance has its own
         "is_parallelizable": True,
     }
 
@@ -67,18 +72,21 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         self.scenario = (scenario or Scenario()).replace(**fields)
         self.faults = tuple(faults)
         self.max_cycles = max_cycles
-        if render_mode is not None:
-            modes = self.metadata["render_modes"]
+        modes = self.metadata["render_modes"]
+        if render_mode is not None and render_mode not in modes:
             raise SetupError(f"render_mode = {render_mode!r}: should be None or one of {modes}")
         self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": 1.0 / self.scenario.control_period}
+        self._renderer: Renderer | None = None
         self.warehouse = Warehouse(self.scenario)
         self.agents: list[str] = []
         self.possible_agents = _names(self.scenario.n_robots)
+        self._covered = [self.scenario]
         self._rewards = RewardTerms(rewards)
         self._episode_seeds = np.random.default_rng()
         low, high = bounds(self.scenario)
         self._observation_space = Box(low, high, dtype=np.float32)
-        self._action_space = Box(-1.0, 1.0, (4,), dtype=np.float32)
+        self._action_space = Box(-1.0, 1.0, (4 + self.scenario.message_size,), dtype=np.float32)
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""
@@ -98,6 +106,11 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
                 None, each of which differs.
             options: for this episode: "scenario", fields to replace; "faults", instead of the
                 environment's. Other keys are ignored with a warning.
+
+        Raises:
+            ScenarioError, FaultError: an option cannot be.
+            SetupError: in such a scenario observations could leave the observation space, which
+                is that of the environment's own (and of those given to `cover`).
         """
         options = dict(options or {})
         for unknown in options.keys() - set(_OPTIONS):
@@ -106,6 +119,7 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
                 stacklevel=3,
             )
         scenario = self.scenario.replace(**options.get("scenario", {}))
+        self._check_covered(scenario)
         faults = options.get("faults", self.faults)
         if seed is None:
             seed = int(self._episode_seeds.integers(2**63))
@@ -145,6 +159,63 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
             truncations = was_present & ~terminations
         return observations, rewards, terminations, truncations
 
+    def cover(self, scenario: Scenario) -> None:
+        """Widen the observation space so that episodes may also be played in `scenario`.
+
+        For wrappers, when they are made: spaces must not change once they were handed out.
+
+        Raises:
+            SetupError: its rows or commands are longer or shorter than this environment's.
+        """
+        low, high = bounds(scenario)
+        if low.shape != self._observation_space.shape:
+            raise SetupError(
+                f"message_size = {scenario.message_size}: should be the environment's own, "
+                f"{self.scenario.message_size}, which its spaces are made for"
+            )
+        space = self._observation_space
+        low, high = np.minimum(low, space.low), np.maximum(high, space.high)
+        self._observation_space = Box(low, high, dtype=np.float32)
+        self._covered.append(scenario)
+        if scenario.n_robots > len(self.possible_agents):
+            self.possible_agents = _names(scenario.n_robots)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture (H, W, 3) in mode "rgb_array"; show the window in mode "human".
+
+        Raises:
+            SetupError: no render_mode was chosen, pygame is missing, or there is no display.
+        """
+        if self.render_mode is None:
+            raise SetupError('render_mode = None: should be "rgb_array" or "human" to render')
+        if self._renderer is None:
+            from swarm_logistics_env.rendering import Renderer
+
+            self._renderer = Renderer(self.scenario, self.render_mode)
+        world = self.warehouse
+        if self.render_mode == "rgb_array":
+            return self._renderer.frame(world.state, world.scenario)
+        self._renderer.show(world.state, world.scenario)
+        return None
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the whole warehouse as one vector, see `global_state`; for central critics."""
+        n_items = max(scenario.n_items for scenario in self._covered)
+        return global_state(self.warehouse, len(self.possible_agents), n_items)
+
+    @property
+    def state_space(self) -> Box:
+        """The space of `state()`, for `possible_agents` robots and the most items there may be."""
+        n_items = max(scenario.n_items for scenario in self._covered)
+        lows, highs = zip(
+            *(
+                global_state_bounds(scenario, len(self.possible_agents), n_items)
+                for scenario in self._covered
+            ),
+            strict=True,
+        )
+        return Box(np.min(lows, axis=0), np.max(highs, axis=0), dtype=np.float32)
+
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Infos]:
@@ -168,7 +239,7 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         agents, rows = self.agents, self._rows()
         if not agents:
             return {}, {}, {}, {}, {}
-        commands = np.zeros((self.warehouse.state.n_robots, 4))
+        commands = np.zeros((self.warehouse.state.n_robots, *self._action_space.shape))
         commands[rows] = self._gathered(actions)
         outcome = self.step_arrays(commands)
         observations, rewards = outcome[0][rows], outcome[1][rows]
@@ -190,6 +261,24 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
 
     def close(self) -> None:
         """Release what rendering holds; harmless when called twice."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _check_covered(self, scenario: Scenario) -> None:
+        low, high = bounds(scenario)
+        space = self._observation_space
+        if low.shape == space.shape and (low >= space.low).all() and (high <= space.high).all():
+            return
+        changed = [
+            f"{name} = {value}"
+            for name, value in scenario.model_dump().items()
+            if value != getattr(self.scenario, name)
+        ]
+        raise SetupError(
+            f"{', '.join(changed)}: observations could leave the observation space; should be "
+            "within what the environment was built for, or announced by env.cover(scenario)"
+        )
 
     def _rows(self) -> list[int]:
         return [int(agent[6:]) for agent in self.agents]
@@ -208,10 +297,11 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
                     )
             missing = next(agent for agent in self.agents if agent not in actions)
             raise CommandError(f"no command for {missing!r}: should be one for every agent")
+        wanted = self._action_space.shape
         for agent in self.agents:
-            if np.shape(actions[agent]) != (4,):
+            if np.shape(actions[agent]) != wanted:
                 raise CommandError(
-                    f"command of {agent!r} of shape {np.shape(actions[agent])}: should be (4,)"
+                    f"command of {agent!r} of shape {np.shape(actions[agent])}: should be {wanted}"
                 )
         try:
             return np.array([actions[agent] for agent in self.agents], dtype=np.float64)

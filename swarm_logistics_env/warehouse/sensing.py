@@ -169,7 +169,6 @@ def sense(
     Returns how many robots that have not failed touch one that has.
     """
     n_things = max(position.shape[0], item_position.shape[0]) + 1
-    found, squares = np.empty(n_things, np.int64), np.empty(n_things)
     near, near_squares = np.empty(n_things, np.int64), np.empty(n_things)
     rows[:, :] = 0.0
     n_anchored = 0
