@@ -71,12 +71,15 @@ class SwarmDT:
 
     def __init__(self, **parameters: Any) -> None:
         self.parameters = SwarmDTParameters(**parameters)
-        self._control_period = Scenario().control_period
+        self.configure(Scenario())
         self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
-        """Take the control period, which a robot's maker knows; nothing of the surroundings."""
+        """Take what a robot's maker knows, period and drive; nothing of the surroundings."""
         self._control_period = scenario.control_period
+        self._widest_step = 0.0
+        if scenario.drive == "differential":
+            self._widest_step = scenario.max_turn_rate * scenario.control_period
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode with random stored headings."""
@@ -104,6 +107,7 @@ class SwarmDT:
             parameters.wall_distance,
             parameters.taxis_gain,
             parameters.heading_follows,
+            self._widest_step,
             self._heading,
             commands,
         )
@@ -123,10 +127,14 @@ def decide_swarm_dt(
     wall_distance: float,
     taxis_gain: float,
     heading_follows: bool,
+    widest_step: float,
     heading: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading."""
+    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading.
+
+    `widest_step` is how far a differential robot turns in a period [rad]; 0: holonomic.
+    """
     for robot in range(observations.shape[0]):
         sensed = observations[robot]
         carries = sensed[row.CARRYING] > 0.5
@@ -173,6 +181,15 @@ def decide_swarm_dt(
         commands[robot, 0] = x / norm
         commands[robot, 1] = y / norm
         commands[robot, 2] = 0.0
+        if widest_step > 0.0:
+            # It turns towards where it wants to go and drives as far as it then faces that way;
+            # the stored heading is kept in the robot's frame, so it turns back by as much.
+            wanted, speed = math.atan2(y, x), math.sqrt(x * x + y * y) / norm
+            turned = min(max(wanted, -widest_step), widest_step)
+            commands[robot, 0] = speed * max(math.cos(wanted - turned), 0.0)
+            commands[robot, 1] = 0.0
+            commands[robot, 2] = turned / widest_step
+            heading[robot] -= turned
         lets_go = carries and not delivers and uniform(keys[robot], 2 * step + 2) < drop_probability
         commands[robot, 3] = -1.0 if lets_go else 1.0
 
