@@ -116,10 +116,10 @@ class Scenario(Record):
         0.0, description="standard deviation of x and of y of neighbours and items [m]; here"
     )
     sensor_dropout: Probability = Field(
-        0.0, description="a beam, or an item or robot in view, is missed in a control step; here"
+        0.0, description="a beam, or a thing in view, is missed in a step [probability]; here"
     )
     radio_loss: Probability = Field(
-        0.0, description="what one robot sends another is lost in a control step; measured 0"
+        0.0, description="what one robot sends another is lost in a step [probability]; measured 0"
     )
     message_size: Annotated[int, Field(ge=0, le=64)] = Field(
         0, description="numbers in [-1, 1] that each robot broadcasts as it likes; here"
