@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Episode, Fault, Scenario, policies, run_episode
+from swarm_logistics_env.errors import FaultError, PolicyError
+from swarm_logistics_env.warehouse import WarehouseState
+
+# Everything is in reach of everybody, so that whoever drives east delivers.
+REACHABLE = Scenario(n_robots=1, n_items=3, pickup_range=14.0, duration=60.0)
+
+
+class Courier:
+    """Sees everything: drives the requested item straight east, and back for the next."""
+
+    needs_state = True
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        self.begun = (n_robots, seed)
+
+    def act(
+        self, observations: NDArray[np.float32], state: WarehouseState | None = None
+    ) -> NDArray[np.float64]:
+        assert state is not None
+        way = np.where(state.robot_item == state.requested, 1.0, -1.0)
+        heading = state.robot_heading
+        hold = np.ones_like(way)
+        return np.column_stack([way * np.cos(heading), -way * np.sin(heading), 0 * way, hold])
+
+
+class Broken:
+    """Returns what it is told to after a second."""
+
+    def __init__(self, commands: Any) -> None:
+        self._commands, self._step = commands, 0
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        self._n = n_robots
+
+    def act(self, observations: NDArray[np.float32]) -> Any:
+        self._step += 1
+        return self._commands if self._step > 10 else np.zeros((self._n, 4))
+
+
+def test_an_episode_of_swarm_dt_is_what_it_says() -> None:
+    episode = run_episode(
+        Scenario(duration=60.0, warehouse_width=6), policies.load("swarm-dt"), seed=3
+    )
+    assert episode.seed == 3
+    assert episode.delivered == len(episode.delivery_times) > 0
+    assert episode.delivery_times.dtype == np.float64
+    assert (np.diff(episode.delivery_times) >= 0.0).all()
+    assert episode.delivery_times[0] > 0.0
+    assert episode.delivery_times[-1] <= 60.0
+    assert episode.ended_at == 60.0
+    assert not episode.all_delivered
+    assert episode.failed_robots == ()
+    assert episode.anchoring_seconds == 0.0
+
+
+def test_it_ends_with_the_last_item() -> None:
+    episode = run_episode(REACHABLE, Courier(), seed=0)
+    assert episode.all_delivered
+    assert episode.delivered == 3
+    assert episode.ended_at == episode.delivery_times[-1] < 60.0
+
+
+def test_with_restock_it_goes_on_to_the_end() -> None:
+    episode = run_episode(REACHABLE.replace(restock=True), Courier(), seed=0)
+    assert not episode.all_delivered
+    assert episode.delivered > 3
+    assert episode.ended_at == 60.0
+
+
+def test_the_same_arguments_give_the_same_bits_and_another_seed_others() -> None:
+    scenario = Scenario(n_robots=10, duration=20.0, warehouse_width=5, warehouse_height=5)
+    policy = policies.load("swarm-dt")
+    faults = [Fault("FM1", 2), Fault("dead", 1, onset=5.0)]
+    first, again = (run_episode(scenario, policy, 0, faults) for _ in range(2))
+    np.testing.assert_array_equal(first.delivery_times, again.delivery_times)
+    assert first.anchoring_seconds == again.anchoring_seconds > 0.0
+    times = [run_episode(scenario, policy, seed).delivery_times.tolist() for seed in range(4)]
+    assert any(each != times[0] for each in times[1:])
+
+
+def test_every_robot_that_a_fault_names_is_listed_once() -> None:
+    faults = [Fault("FM1", (4, 2)), Fault("FM2", (2, 0), onset=99.0)]
+    episode = run_episode(Scenario(duration=1.0), policies.load("swarm-dt"), 0, faults)
+    assert episode.failed_robots == (0, 2, 4)
+
+
+def test_anchoring_counts_seconds_of_working_robots_at_failed_ones() -> None:
+    # In a storage so narrow that a working robot cannot pass a dead one, it stands before it.
+    scenario = Scenario(
+        n_robots=2, n_items=1, warehouse_width=4, warehouse_height=0.3, delivery_width=1.0,
+        duration=20.0, pickup_range=0.15,
+    )  # fmt: skip
+    longest = 0.0
+    for seed in range(6):
+        for dead in (0, 1):
+            episode = run_episode(
+                scenario, policies.load("random-walk"), seed, [Fault("dead", (dead,))]
+            )
+            longest = max(longest, episode.anchoring_seconds)
+            assert 0.0 <= episode.anchoring_seconds <= 20.0
+    assert longest > 1.0
+    both = run_episode(scenario, policies.load("random-walk"), 0, [Fault("dead", 2)])
+    assert both.anchoring_seconds == 0.0
+
+
+def test_a_policy_is_told_of_the_episode_and_its_period() -> None:
+    class Noted(Courier):
+        def configure(self, scenario: Scenario) -> None:
+            self.scenario = scenario
+
+    policy, scenario = Noted(), REACHABLE.replace(duration=1.0, control_period=0.2)
+    run_episode(scenario, policy, seed=11)
+    assert policy.begun == (1, 11)
+    assert policy.scenario == scenario
+
+
+@pytest.mark.parametrize(
+    ("commands", "complaint"),
+    [
+        (np.zeros((2, 3)), r"Broken at 1 s: .*\(2, 3\): should be \(2, 4\)"),
+        (np.full((2, 4), np.nan), r"Broken at 1 s: commands\[0, 0\] = nan: should be finite"),
+        (None, "Broken at 1 s: "),
+    ],
+)
+def test_a_policy_that_returns_no_commands_is_named(commands: Any, complaint: str) -> None:
+    with pytest.raises(PolicyError, match=complaint):
+        run_episode(Scenario(n_robots=2), Broken(commands), seed=0)
+
+
+def test_faults_of_robots_that_are_not_there_are_refused() -> None:
+    with pytest.raises(FaultError):
+        run_episode(Scenario(n_robots=2), policies.load("swarm-dt"), 0, [Fault("FM1", 3)])
+
+
+def test_an_episode_cannot_be_changed() -> None:
+    episode = run_episode(Scenario(duration=0.1), policies.load("swarm-dt"), 0)
+    assert isinstance(episode, Episode)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        episode.seed = 1  # type: ignore[misc]

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+from typing import ClassVar
+
+import pytest
+from pydantic import Field
+
+from swarm_logistics_env.errors import (
+    PolicyError,
+    ScenarioError,
+    SetupError,
+    SwarmLogisticsError,
+    suggest,
+)
+from swarm_logistics_env.records import Record
+
+
+class Lamp(Record):
+    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+
+    power: float = Field(5.0, gt=0)
+    colours: tuple[str, ...] = ("red",)
+    name: str | None = None
+
+
+class Switch(Record):
+    number: int
+
+
+def test_errors_are_of_the_records_own_type_and_of_one_family() -> None:
+    with pytest.raises(PolicyError, match=r"Lamp.power = -1.0: should be greater than 0"):
+        Lamp(power=-1.0)
+    with pytest.raises(SwarmLogisticsError):
+        Lamp(power=-1.0)
+    with pytest.raises(ValueError, match="power"):
+        Lamp(power=-1.0)
+    assert issubclass(ScenarioError, ValueError)
+    assert issubclass(SetupError, SwarmLogisticsError)
+
+
+def test_an_unknown_field_suggests_the_nearest() -> None:
+    with pytest.raises(PolicyError, match=r"Lamp has no field 'powr'; did you mean 'power'?"):
+        Lamp(powr=3)  # type: ignore[call-arg]
+    with pytest.raises(PolicyError, match="Lamp has no field 'xyz'; known: colours, name, power"):
+        Lamp(xyz=3)  # type: ignore[call-arg]
+
+
+def test_a_missing_field_is_named() -> None:
+    with pytest.raises(SwarmLogisticsError, match=r"Switch\.number"):
+        Switch()  # type: ignore[call-arg]
+
+
+def test_a_place_within_a_field_is_named() -> None:
+    with pytest.raises(PolicyError, match=r"Lamp.colours.1 = 7: "):
+        Lamp(colours=("red", 7))  # type: ignore[arg-type]
+
+
+def test_a_long_value_is_cut_short() -> None:
+    with pytest.raises(PolicyError) as refused:
+        Lamp(power="x" * 10_000)  # type: ignore[arg-type]
+    assert len(str(refused.value)) < 300
+
+
+def test_replace_is_validated_like_a_new_record() -> None:
+    lamp = Lamp(power=2.0)
+    assert lamp.replace(name="a") == Lamp(power=2.0, name="a")
+    assert lamp.name is None
+    with pytest.raises(PolicyError, match="power = 0"):
+        lamp.replace(power=0)
+    with pytest.raises(PolicyError, match="no field 'nam'"):
+        lamp.replace(nam="b")
+
+
+def test_json_there_and_back() -> None:
+    lamp = Lamp(power=0.1, colours=("a", "b"))
+    assert Lamp.from_json(lamp.to_json()) == lamp
+    assert Lamp.from_json(lamp.to_json().encode()) == lamp
+    for text in ("nonsense", '{"power": 0}', '{"colour": 1}'):
+        with pytest.raises(PolicyError, match="Lamp"):
+            Lamp.from_json(text)
+
+
+def test_equal_records_are_one_in_a_set() -> None:
+    assert len({Lamp(), Lamp(power=5.0), Lamp(power=6.0)}) == 2
+
+
+def test_suggest() -> None:
+    assert suggest("taxi", ["taxis", "drop"]) == "; did you mean 'taxis'?"
+    assert suggest("zzz", ["b", "a"]) == "; known: a, b"

@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_logistics_env import SCENARIO_PRESETS, Scenario, Warehouse
+from swarm_logistics_env.errors import ScenarioError, SwarmLogisticsError
+
+
+def test_the_defaults_are_the_papers_set_up() -> None:
+    scenario = Scenario()
+    assert (scenario.warehouse_width, scenario.warehouse_height) == (10.0, 10.0)
+    assert scenario.duration == 500.0
+    assert (scenario.n_robots, scenario.n_items) == (25, 60)
+    assert scenario.storage_width == 8.0
+    assert scenario.n_steps == 5000
+    assert scenario.n_substeps == 5
+
+
+@given(
+    n_robots=st.integers(1, 100),
+    n_items=st.integers(1, 100),
+    warehouse_width=st.floats(8.0, 40.0),
+    delivery_width=st.floats(0.01, 3.0),
+    duration=st.floats(0.1, 1e5),
+    restock=st.booleans(),
+    relay=st.sampled_from(["none", "gossip"]),
+    view_range=st.floats(1e-3, 50.0),
+)
+def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
+    scenario = Scenario(**fields)
+    assert Scenario.from_json(scenario.to_json()) == scenario
+    assert Scenario(**json.loads(json.dumps(scenario.model_dump(mode="json")))) == scenario
+    assert hash(Scenario.from_json(scenario.to_json())) == hash(scenario)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"n_robots": 0}, "Scenario.n_robots = 0: should be greater than 0"),
+        ({"n_robots": -3}, "Scenario.n_robots = -3: should be greater than 0"),
+        ({"n_robots": 2.5}, "Scenario.n_robots = 2.5: should be a valid integer"),
+        ({"n_robots": "many"}, "Scenario.n_robots = 'many': should be a valid integer"),
+        ({"n_items": 0}, "Scenario.n_items = 0: should be greater than 0"),
+        ({"n_obstacles": -1}, "n_obstacles = -1: should be greater than or equal to 0"),
+        ({"warehouse_width": 0.0}, "warehouse_width = 0.0: should be greater than 0"),
+        ({"duration": math.nan}, "duration = nan: should be a finite number"),
+        ({"duration": math.inf}, "duration = inf: should be a finite number"),
+        ({"memory_size": 17}, "memory_size = 17: should be less than or equal to 16"),
+        ({"relay": "flood"}, "relay = 'flood': should be 'none' or 'gossip'"),
+        ({"restock": "sometimes"}, "restock = 'sometimes': should be a valid boolean"),
+        ({"n_robot": 3}, "no field 'n_robot'; did you mean 'n_robots'?"),
+        ({"delivery_with": 3}, "no field 'delivery_with'; did you mean 'delivery_width'?"),
+        ({"qqq": 3}, "no field 'qqq'; known: .*n_robots"),
+    ],
+)
+def test_a_field_that_is_unknown_or_out_of_range_is_named_with_what_would_be_right(
+    fields: dict[str, Any], complaint: str
+) -> None:
+    with pytest.raises(ScenarioError, match=complaint):
+        Scenario(**fields)
+    with pytest.raises(ScenarioError, match=complaint):
+        Scenario().replace(**fields)
+
+
+def test_every_wrong_field_is_named_at_once() -> None:
+    with pytest.raises(ScenarioError, match=r"n_robots = 0: .*; .*n_items = -1: .*"):
+        Scenario(n_robots=0, n_items=-1)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        (
+            {"n_robots": 25, "warehouse_width": 0.5, "warehouse_height": 0.5},
+            "delivery_width = 2.0 m leaves no storage: should be less than .* 0.5 m",
+        ),
+        (
+            {"warehouse_width": 0.5, "warehouse_height": 0.5, "delivery_width": 0.1},
+            r"n_robots = 25 of radius 0.125 m do not fit .* 0.4 x 0.5 m: should be at most 1 ",
+        ),
+        ({"delivery_width": 10.0}, "delivery_width = 10.0 m leaves no storage: should be less"),
+        ({"n_items": 5000}, "n_items = 5000 .* do not fit .* 8 x 10 m: should be at most 651"),
+        ({"n_robots": 10**9}, "n_robots = 1000000000 .* should be at most 651"),
+        ({"n_obstacles": 300}, "n_obstacles = 300 .* should be at most 113"),
+        (
+            {"n_obstacles": 100, "n_items": 200},
+            r"n_items = 200 .* should be at most \d+ ",
+        ),
+        ({"warehouse_height": 0.2}, "warehouse_height = 0.2 m is narrower .* at least 0.25 m"),
+        (
+            {"warehouse_width": 2.2},
+            r"warehouse_width - delivery_width = 0.2 m is narrower .* at least 0.25 m",
+        ),
+        (
+            {"control_period": 0.05},
+            "control_period = 0.05 s should be a whole multiple of physics_period = 0.02 s",
+        ),
+        (
+            {"physics_period": 0.1},
+            r"physics_period = 0.1 s lets a robot cross 0.2 m .* at most .* 0.0625 s",
+        ),
+        ({"duration": 0.05}, "duration = 0.05 s should be at least one control_period"),
+    ],
+)
+def test_what_cannot_be_built_is_refused_with_the_reason(
+    fields: dict[str, Any], complaint: str
+) -> None:
+    with pytest.raises(ScenarioError, match=complaint):
+        Scenario(**fields)
+
+
+@pytest.mark.parametrize(
+    ("field", "count"), [("n_robots", 651), ("n_items", 651), ("n_obstacles", 113)]
+)
+def test_as_many_as_it_says_fit_do_fit(field: str, count: int) -> None:
+    smallest = Scenario(n_robots=1, n_items=1)
+    if field == "n_obstacles":
+        # Obstacles take their room from the others.
+        count -= 1
+    Warehouse(smallest.replace(**{field: count})).reset(0)
+    with pytest.raises(ScenarioError, match=field):
+        smallest.replace(**{field: 652})
+
+
+@pytest.mark.parametrize(
+    "text", ["{", "", "[]", "7", '{"n_robots": 0}', '{"n_robot": 5}', '{"duration": NaN}']
+)
+def test_json_of_no_scenario_is_refused(text: str) -> None:
+    with pytest.raises(ScenarioError, match="Scenario"):
+        Scenario.from_json(text)
+
+
+def test_a_scenario_cannot_be_changed_in_place() -> None:
+    scenario = Scenario()
+    with pytest.raises((SwarmLogisticsError, ValueError), match="frozen"):
+        scenario.n_robots = 3  # type: ignore[misc]
+    assert scenario.n_robots == 25
+
+
+def test_replace_changes_the_named_fields_only() -> None:
+    changed = Scenario(n_items=70).replace(n_robots=40)
+    assert (changed.n_robots, changed.n_items) == (40, 70)
+    assert changed.replace(n_robots=25, n_items=60) == Scenario()
+
+
+@pytest.mark.parametrize(
+    ("duration", "control_period", "steps"),
+    [(500.0, 0.1, 5000), (0.7, 0.1, 7), (0.75, 0.1, 8), (1.0, 0.02, 50), (2.0, 0.3, 7)],
+)
+def test_an_episode_has_enough_steps_for_its_duration(
+    duration: float, control_period: float, steps: int
+) -> None:
+    assert Scenario(duration=duration, control_period=control_period).n_steps == steps
+
+
+def test_the_sheet_lists_every_field_with_its_value_unit_and_source() -> None:
+    sheet = Scenario(n_robots=7, max_speed=1.25).sheet()
+    rows = {line.split(" | ")[0].removeprefix("| "): line for line in sheet.splitlines()}
+    for name, field in Scenario.model_fields.items():
+        meaning = field.description or ""
+        assert meaning in rows[name]
+        # A length, a time and the like has its unit; the source comes last.
+        value = field.default
+        assert not isinstance(value, float) or "[" in meaning, name
+        source = meaning.rsplit(";", 1)[-1]
+        known = ("paper", "DOTS", "simulator", "measured", "here")
+        assert ";" in meaning, name
+        assert any(word in source for word in known), name
+    assert "| 7 (default 25) |" in rows["n_robots"]
+    assert "| 1.25 (default 2) |" in rows["max_speed"]
+    assert "| 60 |" in rows["n_items"]
+
+
+def test_presets() -> None:
+    assert set(SCENARIO_PRESETS) == {"paper", "paper_scalability", "dots"}
+    assert Scenario.preset("paper") == Scenario()
+    assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
+    assert Scenario.preset("dots") == Scenario(max_speed=1.0, max_acceleration=2.0)
+    with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
+        Scenario.preset("papr")
+
+
+@pytest.mark.parametrize("name", SCENARIO_PRESETS)
+def test_every_preset_runs(name: str) -> None:
+    world = Warehouse(Scenario.preset(name))
+    world.reset(0)
+    rows = world.step(np.zeros((world.scenario.n_robots, 4)))
+    assert np.isfinite(rows).all()

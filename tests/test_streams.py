@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_logistics_env.kernels import uniform
+from swarm_logistics_env.streams import generator, key, row_keys
+
+
+def test_a_stream_is_the_same_whenever_it_is_asked_for() -> None:
+    first = generator(3, "places", 7).random(5)
+    generator(3, "places", 8).random(100)
+    np.testing.assert_array_equal(first, generator(3, "places", 7).random(5))
+
+
+@pytest.mark.parametrize(
+    "other", [(4, "places", 7), (3, "place", 7), (3, "places", 8), (3, "places"), (37, "places")]
+)
+def test_streams_of_different_keys_differ(other: tuple[int, str]) -> None:
+    assert generator(3, "places", 7).random() != generator(*other).random()
+
+
+def test_zero_and_negative_and_huge_seeds_are_seeds() -> None:
+    seeds = (0, 1, -1, 2**63, 2**64, 2**200)
+    assert len({key(seed, "a") for seed in seeds}) == len(seeds)
+
+
+def test_a_seed_of_numpys_kind_is_the_same_seed() -> None:
+    assert key(int(np.int64(5)), "a") == key(np.int64(5), "a")  # type: ignore[arg-type]
+
+
+@given(st.integers(0, 2**63), st.integers(1, 50), st.integers(1, 50))
+def test_a_rows_key_does_not_depend_on_how_many_rows_there_are(seed: int, n: int, m: int) -> None:
+    shared = min(n, m)
+    np.testing.assert_array_equal(row_keys(seed, "a", n)[:shared], row_keys(seed, "a", m)[:shared])
+    assert len(set(row_keys(seed, "a", n))) == n
+
+
+def test_numbers_of_a_kernel_stream_are_uniform_and_independent() -> None:
+    keys = row_keys(0, "test", 200)
+    numbers = np.array([[uniform(each, count) for count in range(200)] for each in keys])
+    assert numbers.min() >= 0.0
+    assert numbers.max() < 1.0
+    n = numbers.size
+    assert abs(numbers.mean() - 0.5) < 5 / np.sqrt(12 * n)
+    counts = np.histogram(numbers, 20, (0.0, 1.0))[0]
+    assert ((counts - n / 20) ** 2 / (n / 20)).sum() < 50.0  # chi square, 19 degrees of freedom
+    along = np.corrcoef(numbers[:, :-1].ravel(), numbers[:, 1:].ravel())[0, 1]
+    across = np.corrcoef(numbers[:-1].ravel(), numbers[1:].ravel())[0, 1]
+    assert abs(along) < 5 / np.sqrt(n)
+    assert abs(across) < 5 / np.sqrt(n)
+
+
+def test_streams_are_the_same_in_another_process() -> None:
+    code = (
+        "from swarm_logistics_env.streams import generator, row_keys\n"
+        "print(generator(5, 'a', 2).integers(2**62), row_keys(5, 'a', 3)[-1])"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    expected = [generator(5, "a", 2).integers(2**62), row_keys(5, "a", 3)[-1]]
+    assert told == [str(number) for number in expected]
