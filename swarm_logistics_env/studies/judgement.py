@@ -106,6 +106,7 @@ class Findings:
         judgements: every comparison, in the order of the tables.
         exploratory: more seeds than were declared at the study's start, so the verdicts' error
             level is not the nominal one.
+        outcomes: of the plan's runs, by key, for what P alone does not tell.
     """
 
     plan: Plan
@@ -113,6 +114,7 @@ class Findings:
     cells: tuple[Cell, ...]
     judgements: tuple[Judgement, ...]
     exploratory: bool
+    outcomes: Mapping[str, Outcome]
 
 
 def judge(plan: Plan, outcomes: Mapping[str, Outcome], declared_seeds: int) -> Findings:
@@ -134,6 +136,7 @@ def judge(plan: Plan, outcomes: Mapping[str, Outcome], declared_seeds: int) -> F
         cells,
         _adjusted(judgements),
         exploratory=len(plan.seeds) > declared_seeds,
+        outcomes=outcomes,
     )
 
 
