@@ -4,32 +4,33 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
-from pettingzoo import ParallelEnv
 
 from swarm_logistics_env.central_state import global_state, global_state_bounds
-from swarm_logistics_env.errors import CommandError, SetupError, suggest
+from swarm_logistics_env.dict_view import ArrayStep, DictView, agent_names
+from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.observations import bounds
+from swarm_logistics_env.reset_options import (
+    OPTIONS,
+    checked_options,
+    checked_seed,
+    faults_among,
+    scenario_fields,
+)
 from swarm_logistics_env.rewards import RewardTerms
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import generator
+from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Fault, Warehouse
 
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer
 
-Observations = dict[str, NDArray[np.float32]]
-Infos = dict[str, dict[str, Any]]
-ArrayStep = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
-_NOTHING_TO_SAY: dict[str, Any] = {}
-_OPTIONS = ("faults", "scenario")
 
-
-class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # type: ignore[misc]  # PettingZoo ships no types
+class SwarmLogisticsEnv(DictView):
     """A swarm fetches requested items in a warehouse, each robot with its own sensors only.
 
     `reset_arrays` and `step_arrays` are the environment; `reset` and `step` are their dict view.
@@ -42,6 +43,10 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
         **fields: fields of the scenario to replace, e.g. `n_robots=40`.
 
+    Attributes:
+        next_seed: the seed of the episode that a reset without one begins; follows from the
+            seed of the episode before.
+
     Raises:
         ScenarioError, FaultError, SetupError: an argument is unknown or cannot be.
 
@@ -52,7 +57,7 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         ['robot_0', 'robot_1', 'robot_2']
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012  # PettingZoo has it on the class as well
         "name": "swarm_logistics_v0",
         "render_modes": ["human", "rgb_array"],
         "render_fps": 10,  # of the default control period; an instance has its own
@@ -65,7 +70,7 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         *,
         faults: Sequence[Fault] = (),
         rewards: Mapping[str, float] | None = None,
-        render_mode: str | None = None,
+        render_mode: Literal["human", "rgb_array"] | None = None,
         max_cycles: int | None = None,
         **fields: Any,
     ) -> None:
@@ -80,10 +85,10 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         self._renderer: Renderer | None = None
         self.warehouse = Warehouse(self.scenario)
         self.agents: list[str] = []
-        self.possible_agents = _names(self.scenario.n_robots)
+        self.possible_agents = agent_names(range(self.scenario.n_robots))
         self._covered = [self.scenario]
         self._rewards = RewardTerms(rewards)
-        self._episode_seeds = np.random.default_rng()
+        self.next_seed = int(np.random.default_rng().integers(2**63))
         low, high = bounds(self.scenario)
         self._observation_space = Box(low, high, dtype=np.float32)
         self._action_space = Box(-1.0, 1.0, (4 + self.scenario.message_size,), dtype=np.float32)
@@ -109,28 +114,39 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
 
         Raises:
             ScenarioError, FaultError: an option cannot be.
-            SetupError: in such a scenario observations could leave the observation space, which
-                is that of the environment's own (and of those given to `cover`).
+            SetupError: a seed or option is of the wrong type, or in such a scenario observations
+                could leave the observation space, which is that of the environment's own (and of
+                those given to `cover`).
         """
-        options = dict(options or {})
-        for unknown in options.keys() - set(_OPTIONS):
+        options = checked_options(options)
+        for unknown in options.keys() - set(OPTIONS):
             warnings.warn(
-                f"reset option {str(unknown)!r} is ignored{suggest(str(unknown), _OPTIONS)}",
+                f"reset option {str(unknown)!r} is ignored{suggest(str(unknown), OPTIONS)}",
                 stacklevel=3,
             )
-        scenario = self.scenario.replace(**options.get("scenario", {}))
+        seed = self.next_seed if seed is None else checked_seed(seed)
+        scenario = self.scenario_of(seed, options)
         self._check_covered(scenario)
-        faults = options.get("faults", self.faults)
-        if seed is None:
-            seed = int(self._episode_seeds.integers(2**63))
-        else:
-            self._episode_seeds = generator(seed, "episodes that follow")
-        observations = self.warehouse.reset(seed, faults, scenario)
+        observations = self.warehouse.reset(seed, faults_among(options, self.faults), scenario)
+        self.next_seed = key(seed, "the episode that follows") >> 1
         self._rewards.begin(self.warehouse)
         if scenario.n_robots > len(self.possible_agents):
-            self.possible_agents = _names(scenario.n_robots)
-        self.agents = self._present()
+            self.possible_agents = agent_names(range(scenario.n_robots))
+        self.agents = agent_names(np.flatnonzero(self.warehouse.state.robot_present).tolist())
         return observations
+
+    def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
+        """Return the scenario of the episode that such a reset would begin; changes nothing.
+
+        Raises:
+            ScenarioError, SetupError: as `reset_arrays`.
+        """
+        return self.scenario.replace(**scenario_fields(options))
+
+    @property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios that episodes are played in, unless a reset's options say otherwise."""
+        return (self.scenario,)
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
         """Take one control period.
@@ -141,7 +157,7 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         Returns:
             Observations (N, D), rewards (N,), terminations (N,) and truncations (N,). A robot
             terminates when it is removed, all do when everything is delivered; all are truncated
-            when the time is up.
+            when the time is up. `agents` are those to whom neither happened yet.
 
         Raises:
             CommandError: wrong shape or not finite; nothing has happened then.
@@ -157,6 +173,9 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         truncations = np.zeros_like(terminations)
         if world.is_over_time or is_cut:
             truncations = was_present & ~terminations
+        is_done = terminations | truncations
+        if is_done.any():
+            self.agents = agent_names(np.flatnonzero(was_present & ~is_done).tolist())
         return observations, rewards, terminations, truncations
 
     def cover(self, scenario: Scenario) -> None:
@@ -178,7 +197,7 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         self._observation_space = Box(low, high, dtype=np.float32)
         self._covered.append(scenario)
         if scenario.n_robots > len(self.possible_agents):
-            self.possible_agents = _names(scenario.n_robots)
+            self.possible_agents = agent_names(range(scenario.n_robots))
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (H, W, 3) in mode "rgb_array"; show the window in mode "human".
@@ -216,54 +235,15 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
         )
         return Box(np.min(lows, axis=0), np.max(highs, axis=0), dtype=np.float32)
 
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observations, Infos]:
-        """Begin an episode; see `reset_arrays`. Returns observations and infos by agent."""
-        rows = self.reset_arrays(seed, options)
-        observations = {f"robot_{row}": rows[row] for row in self._rows()}
-        return observations, self._infos(self.agents)
-
-    def step(
-        self, actions: Mapping[str, ArrayLike]
-    ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], Infos]:
-        """Take one control period; see `step_arrays`.
-
-        Args:
-            actions: one command (4,) for every agent in `agents`.
-
-        Raises:
-            CommandError: an agent's command is missing, for an unknown agent, of the wrong shape
-                or not finite.
-        """
-        agents, rows = self.agents, self._rows()
-        if not agents:
-            return {}, {}, {}, {}, {}
-        commands = np.zeros((self.warehouse.state.n_robots, *self._action_space.shape))
-        commands[rows] = self._gathered(actions)
-        outcome = self.step_arrays(commands)
-        observations, rewards = outcome[0][rows], outcome[1][rows]
-        terminations, truncations = outcome[2][rows], outcome[3][rows]
-        infos = self._infos(agents)
-        if (terminations | truncations).all():
-            self.agents = []
-            last = {"delivered": self.warehouse.state.delivered}
-            infos = {agent: {**info, **last} for agent, info in infos.items()}
-        elif terminations.any():
-            self.agents = self._present()
-        return (
-            dict(zip(agents, observations, strict=True)),
-            dict(zip(agents, rewards.tolist(), strict=True)),
-            dict(zip(agents, terminations.tolist(), strict=True)),
-            dict(zip(agents, truncations.tolist(), strict=True)),
-            infos,
-        )
-
     def close(self) -> None:
         """Release what rendering holds; harmless when called twice."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy opens a window of its own.
+        return {**self.__dict__, "_renderer": None}
 
     def _check_covered(self, scenario: Scenario) -> None:
         low, high = bounds(scenario)
@@ -279,47 +259,3 @@ class SwarmLogisticsEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32
             f"{', '.join(changed)}: observations could leave the observation space; should be "
             "within what the environment was built for, or announced by env.cover(scenario)"
         )
-
-    def _rows(self) -> list[int]:
-        return [int(agent[6:]) for agent in self.agents]
-
-    def _present(self) -> list[str]:
-        present = np.flatnonzero(self.warehouse.state.robot_present)
-        return [f"robot_{row}" for row in present]
-
-    def _gathered(self, actions: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
-        if actions.keys() != set(self.agents):
-            for agent in actions:
-                if agent not in self.agents:
-                    raise CommandError(
-                        f"a command for {agent!r}, who is not there"
-                        f"{suggest(str(agent), self.agents)}"
-                    )
-            missing = next(agent for agent in self.agents if agent not in actions)
-            raise CommandError(f"no command for {missing!r}: should be one for every agent")
-        wanted = self._action_space.shape
-        for agent in self.agents:
-            if np.shape(actions[agent]) != wanted:
-                raise CommandError(
-                    f"command of {agent!r} of shape {np.shape(actions[agent])}: should be {wanted}"
-                )
-        try:
-            return np.array([actions[agent] for agent in self.agents], dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise CommandError(f"commands should be numbers: {error}") from None
-
-    def _infos(self, agents: Sequence[str]) -> Infos:
-        # The robots are not told who failed; whoever trains or judges them is.
-        modes = self.warehouse.state.failure_modes
-        if not any(modes):
-            return dict.fromkeys(agents, _NOTHING_TO_SAY)
-        return {
-            agent: {"failure_modes": modes[int(agent[6:])]}
-            if modes[int(agent[6:])]
-            else _NOTHING_TO_SAY
-            for agent in agents
-        }
-
-
-def _names(count: int) -> list[str]:
-    return [f"robot_{number}" for number in range(count)]

@@ -1,0 +1,122 @@
+"""The dicts that PettingZoo asks for, as a view of an environment's array methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pettingzoo import ParallelEnv
+
+from swarm_logistics_env.errors import CommandError, suggest
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.warehouse import Warehouse
+
+Observations = dict[str, NDArray[np.float32]]
+Infos = dict[str, dict[str, Any]]
+ArrayStep = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
+_NOTHING_TO_SAY: dict[str, Any] = {}
+
+
+class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # type: ignore[misc]  # PettingZoo ships no types
+    """`reset` and `step` of whoever has `reset_arrays` and `step_arrays`.
+
+    So that what a wrapper does to the arrays holds for the dicts as well.
+    """
+
+    agents: list[str]
+    warehouse: Warehouse
+
+    def reset_arrays(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> NDArray[np.float32]:
+        """Begin an episode and return the first observations (N, D)."""
+        raise NotImplementedError
+
+    def step_arrays(self, commands: ArrayLike) -> ArrayStep:
+        """Take one control period; leaves in `agents` who goes on."""
+        raise NotImplementedError
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, Infos]:
+        """Begin an episode; see `reset_arrays`. Returns observations and infos by agent."""
+        observations = self.reset_arrays(seed, options)
+        agents = self.agents
+        return {agent: observations[_row(agent)] for agent in agents}, self._infos(agents)
+
+    def step(
+        self, actions: Mapping[str, ArrayLike]
+    ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """Take one control period; see `step_arrays`.
+
+        Args:
+            actions: one command (4,) for every agent in `agents`.
+
+        Raises:
+            CommandError: an agent's command is missing, for an unknown agent, of the wrong shape
+                or not finite.
+        """
+        agents = self.agents
+        if not agents:
+            return {}, {}, {}, {}, {}
+        rows = [_row(agent) for agent in agents]
+        wanted = self.action_space(agents[0]).shape
+        commands = np.zeros((self.warehouse.state.n_robots, *wanted))
+        commands[rows] = _gathered(actions, agents, wanted)
+        outcome = self.step_arrays(commands)
+        observations, rewards, terminations, truncations = (part[rows] for part in outcome)
+        infos = self._infos(agents)
+        if not self.agents:
+            last = {"delivered": self.warehouse.state.delivered}
+            infos = {agent: {**info, **last} for agent, info in infos.items()}
+        return (
+            dict(zip(agents, observations, strict=True)),
+            dict(zip(agents, rewards.tolist(), strict=True)),
+            dict(zip(agents, terminations.tolist(), strict=True)),
+            dict(zip(agents, truncations.tolist(), strict=True)),
+            infos,
+        )
+
+    def _infos(self, agents: Sequence[str]) -> Infos:
+        # The robots are not told who failed; whoever trains or judges them is.
+        modes = self.warehouse.state.failure_modes
+        if not any(modes):
+            return dict.fromkeys(agents, _NOTHING_TO_SAY)
+        return {
+            agent: {"failure_modes": modes[_row(agent)]} if modes[_row(agent)] else _NOTHING_TO_SAY
+            for agent in agents
+        }
+
+
+def agent_names(rows: Sequence[int]) -> list[str]:
+    """Return the names of the robots in these rows."""
+    return [f"robot_{row}" for row in rows]
+
+
+def _row(agent: str) -> int:
+    return int(agent[6:])
+
+
+def _gathered(
+    actions: Mapping[str, ArrayLike], agents: Sequence[str], wanted: tuple[int, ...]
+) -> NDArray[np.float64]:
+    if actions.keys() != set(agents):
+        for agent in actions:
+            if agent not in agents:
+                raise CommandError(
+                    f"a command for {agent!r}, who is not there{suggest(str(agent), agents)}"
+                )
+        missing = next(agent for agent in agents if agent not in actions)
+        raise CommandError(f"no command for {missing!r}: should be one for every agent")
+    for agent in agents:
+        if np.shape(actions[agent]) != wanted:
+            raise CommandError(
+                f"command of {agent!r} of shape {np.shape(actions[agent])}: should be {wanted}"
+            )
+    try:
+        return np.array([actions[agent] for agent in agents], dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise CommandError(f"commands should be numbers: {error}") from None

@@ -1,0 +1,65 @@
+"""The options of a reset, checked: what the environment and its wrappers read of them."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.warehouse import Fault
+
+OPTIONS = ("faults", "scenario")
+
+
+def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the options as a dict of one's own, empty for None.
+
+    Raises:
+        SetupError: they are no mapping.
+    """
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise SetupError(f"options = {options!r}: should be None or a dict with keys {OPTIONS}")
+    return dict(options)
+
+
+def checked_seed(seed: int) -> int:
+    """Return the seed as an int.
+
+    Raises:
+        SetupError: it is none.
+    """
+    try:
+        return operator.index(seed)
+    except TypeError:
+        raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
+
+
+def scenario_fields(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of the scenario that the options replace.
+
+    Raises:
+        SetupError: they are no mapping from names.
+    """
+    fields = options.get("scenario", {})
+    if not isinstance(fields, Mapping) or not all(isinstance(name, str) for name in fields):
+        raise SetupError(
+            f'options["scenario"] = {fields!r}: should be a dict of fields, as {{"n_robots": 40}}'
+        )
+    return dict(fields)
+
+
+def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[Fault, ...]:
+    """Return the faults that the options give, or `default` where they give none.
+
+    Raises:
+        SetupError: they are not a sequence of faults.
+    """
+    faults = options.get("faults", default)
+    if not isinstance(faults, Sequence) or not all(isinstance(fault, Fault) for fault in faults):
+        raise SetupError(
+            f'options["faults"] = {faults!r}: should be a list of faults, as [Fault("FM1", 2)]'
+        )
+    return tuple(faults)
