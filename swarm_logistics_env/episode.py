@@ -41,7 +41,11 @@ class Episode:
 
 
 def run_episode(
-    scenario: Scenario, policy: Policy, seed: int, faults: Sequence[Fault] = ()
+    scenario: Scenario,
+    policy: Policy,
+    seed: int,
+    faults: Sequence[Fault] = (),
+    policy_seed: int | None = None,
 ) -> Episode:
     """Play `policy` in `scenario` to the end.
 
@@ -50,6 +54,8 @@ def run_episode(
     Args:
         seed: decides the layout, the requests, which robots fail and the policy's own randomness.
         faults: what befalls which robots, and when.
+        policy_seed: decides the policy's own randomness instead of `seed`; the same world with
+            another behaviour.
 
     Raises:
         FaultError: a fault names robots that are not there.
@@ -62,7 +68,7 @@ def run_episode(
     """
     world = Warehouse(scenario)
     observations = world.reset(seed, faults)
-    start(policy, scenario, seed)
+    start(policy, scenario, seed if policy_seed is None else policy_seed)
     while not (world.is_over_time or world.all_delivered):
         commands = decide(policy, observations, world.state)
         try:

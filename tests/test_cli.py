@@ -43,6 +43,10 @@ SMALL = [
         (["scenario", "--set", "delivery_width=10"], "leaves no storage"),
         (["study", "run", "papr", "--out", "x"], "did you mean 'paper'?"),
         (["study", "run", "paper"], "--out"),
+        (["study", "run", "none.toml", "--out", "x"], "cannot read the study file none.toml"),
+        (["study", "plan", "quik"], "did you mean 'quick'?"),
+        (["study", "plan", "quick", "--policy", "nobody"], "'nobody'"),
+        (["study", "report", "nowhere"], "no study in nowhere"),
         (["study", "run", "paper", "--out", "x", "--seeds", "0"], "--seeds"),
         (["study", "run", "paper", "--out", "x", "--policy", "nobody"], "'nobody'"),
         (["study", "export", "nowhere", "--to", "x.csv"], "no study in nowhere"),
@@ -163,6 +167,20 @@ def test_study_run_prints_and_writes_the_report(tmp_path: Path) -> None:
     rows = records(tmp_path / "rows.csv")
     assert [row["run"] for row in rows] == sorted(row["run"] for row in rows)
     assert json.loads(rows[0]["scenario"])["duration"] == 0.5
+
+
+def test_study_plan_prints_conditions_once_and_what_they_take(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[[sizes]]\nvalues = [5, 25]\n[[faults]]\nmodes = ['FM1']\nrobots = [1]\n")
+    assert app.run(["study", "plan", str(path), "--policy", "swarm-dt", "--seeds", "3"]) == 0
+    printed = capsys.readouterr().out
+    # N = 25 is the baseline of the faults as well.
+    assert "Scalability (N = 25); Fault tolerance and robustness (no fault)" in printed
+    assert "4 conditions (1 shared) x 3 seeds = 12 runs" in printed
+    assert "On one process of this machine at most " in printed
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def stored(directory: Path) -> int:

@@ -9,6 +9,19 @@ import typer
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.plan import Plan
+    from swarm_logistics_env.studies.reporting.sections import Section
+
+StudyArgument = Annotated[
+    str, typer.Argument(metavar="FILE|PRESET", help="TOML file of a study, or a preset's name.")
+]
+SeedsOption = Annotated[
+    int | None,
+    typer.Option(min=1, help="Seeds 0, 1, ... of every condition; the study's if not given."),
+]
+PolicyOption = Annotated[
+    list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
+]
 
 study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
 
@@ -18,14 +31,30 @@ def group() -> None:
     """Judge a swarm by its indicators."""
 
 
+@study.command("plan")
+def plan_command(
+    asked: StudyArgument, seeds: SeedsOption = None, policies: PolicyOption = None
+) -> None:
+    """Print the conditions, shared ones once, and what they will take; nothing is run."""
+    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.studies.pilot import expect
+
+    plan = study_of(asked, None, seeds, policies).plan()
+    expected = expect(plan)
+    show(_conditions(plan))
+    typer.echo(plan)
+    typer.echo(
+        f"On one process of this machine at most {duration(expected.seconds)}, with a store of "
+        f"{expected.size / 1e6:.1f} MB"
+    )
+
+
 @study.command("run")
 def run_command(
-    preset: Annotated[str, typer.Argument(help="Preset study: paper.")],
+    asked: StudyArgument,
     out: Annotated[Path, typer.Option(help="Directory of its store and report.")],
-    seeds: Annotated[int, typer.Option(min=1, help="Seeds 0, 1, ... of every condition.")] = 20,
-    policies: Annotated[
-        list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
-    ] = None,
+    seeds: SeedsOption = None,
+    policies: PolicyOption = None,
     processes: Annotated[
         int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
     ] = None,
@@ -33,14 +62,21 @@ def run_command(
     """Play the runs that are missing, then print and write the report."""
     import os
 
+    chosen = study_of(asked, out, seeds, policies)
+    typer.echo(chosen.plan())
+    failed = _run(chosen, processes or os.cpu_count() or 1)
+    _show(chosen)
+    raise typer.Exit(1 if failed else 0)
+
+
+@study.command("report")
+def report_command(
+    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+) -> None:
+    """Print and write the report of a study again, from its store alone."""
     from swarm_logistics_env.studies import Study
 
-    chosen = {"policies": tuple(policies)} if policies else {}
-    asked = Study.preset(preset, out=out, seeds=seeds, **chosen)
-    typer.echo(asked.plan())
-    failed = _run(asked, processes or os.cpu_count() or 1)
-    _show(asked)
-    raise typer.Exit(1 if failed else 0)
+    _show(Study.stored(directory))
 
 
 @study.command("export")
@@ -54,6 +90,45 @@ def export_command(
 
     with Store.existing(directory) as store:
         typer.echo(f"{export_rows(store, to)} runs in {to}")
+
+
+def study_of(asked: str, out: Path | None, seeds: int | None, policies: list[str] | None) -> Study:
+    """Return the study of a file or a preset with the options that were given.
+
+    Raises:
+        StudyError: there is no such file or preset, or it cannot be.
+    """
+    from swarm_logistics_env.studies import Study
+
+    fields: dict[str, object] = {}
+    if seeds is not None:
+        fields["seeds"] = seeds
+    if policies:
+        fields["policies"] = tuple(policies)
+    if asked.endswith(".toml") or Path(asked).is_file():
+        return Study.from_file(asked, out=out, **fields)
+    return Study.preset(asked, out=out, **fields)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words, e.g. "2 h 10 min"."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    hours, minutes = divmod(round(seconds / 60), 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
+def _conditions(plan: Plan) -> Section:
+    from swarm_logistics_env.studies.reporting.sections import Section
+
+    uses: dict[str, list[str]] = {}
+    for _, table, arm in plan.cells:
+        uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.level})")
+    rows = (
+        (condition.policy.label, str(condition.scenario.n_robots), "; ".join(uses[condition.key]))
+        for condition in plan.conditions
+    )
+    return Section("Conditions", ("policy", "N", "stands in"), tuple(rows))
 
 
 def _run(asked: Study, processes: int) -> int:

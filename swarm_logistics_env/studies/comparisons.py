@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +33,14 @@ class Level(NamedTuple):
             return f"{self.name}, N = {self.value:g}"
         if self == NO_FAULT:
             return "no fault"
+        if self == OTHER_BEHAVIOUR:
+            return "no fault, other behaviour seeds"
         start = f" from {self.onset:g} s" if self.onset else ""
         return f"{self.name}, m = {self.value:g}{start}"
 
 
 NO_FAULT = Level("fault", "none", 0)
+OTHER_BEHAVIOUR = Level("fault", "other behaviour", 0)
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,26 @@ class Arm:
 
     level: Level
     condition: Condition
+
+
+@dataclass(frozen=True)
+class Twins:
+    """Two arms without fault that share worlds, not behaviour: what chance alone makes of them.
+
+    Attributes:
+        table: heading of the report's table of the faults whose null this is.
+        original: the arm of P_o.
+        other: the same with other behaviour seeds.
+    """
+
+    table: str
+    original: Arm
+    other: Arm
+
+    @property
+    def policy(self) -> str:
+        """Label of the policy."""
+        return self.original.condition.policy.label
 
 
 class Question(NamedTuple):
@@ -109,11 +132,15 @@ class Comparison:
             return f"{after.name} {before.value:g} -> {after.value:g}"
         return str(after)
 
-    def estimate(self, performance: Performance) -> Estimate:
-        """Return the indicator over paired seeds.
+    def estimate(
+        self, performance: Performance, *, level: float = 0.95, paired: bool = True
+    ) -> Estimate:
+        """Return the indicator over seeds.
 
         Args:
             performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
+            level: confidence level of interval and verdict, in (0, 1).
+            paired: whether the arms share their seeds, row by row.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
@@ -121,18 +148,21 @@ class Comparison:
         before, after = self.original.level.value, self.changed.level.value
         p_o, p_new = performance(self.original), performance(self.changed)
         swarm = self.original.condition.scenario.n_robots
+        asked: _Asked = {"threshold": self.threshold, "level": level, "paired": paired}
         if self.indicator == "S":
-            return spi.scalability(
-                p_o, p_new, n=int(before), m=int(after - before), threshold=self.threshold
-            )
+            return spi.scalability(p_o, p_new, n=int(before), m=int(after - before), **asked)
         if self.indicator == "FT":
             assert self.removed is not None
             p_s = performance(self.removed)
-            return spi.fault_tolerance(
-                p_o, p_new, p_s, n=swarm, m=int(after), threshold=self.threshold
-            )
+            return spi.fault_tolerance(p_o, p_new, p_s, n=swarm, m=int(after), **asked)
         if self.indicator == "R":
-            return spi.robustness(p_o, p_new, n=swarm, m=int(after), threshold=self.threshold)
+            return spi.robustness(p_o, p_new, n=swarm, m=int(after), **asked)
         if self.indicator == "A":
-            return spi.adaptability(p_o, p_new, x_o=before, x_new=after, threshold=self.threshold)
-        return spi.relative_change(p_o, p_new, threshold=self.threshold)
+            return spi.adaptability(p_o, p_new, x_o=before, x_new=after, **asked)
+        return spi.relative_change(p_o, p_new, **asked)
+
+
+class _Asked(TypedDict):
+    threshold: float
+    level: float
+    paired: bool

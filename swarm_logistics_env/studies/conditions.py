@@ -7,6 +7,7 @@ import json
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from swarm_logistics_env import streams
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.faults import Fault
 
@@ -28,11 +29,17 @@ class StudiedPolicy:
 
 @dataclass(frozen=True)
 class Condition:
-    """All of a run but its seed. Conditions of equal content have equal keys and share runs."""
+    """All of a run but its seed. Conditions of equal content have equal keys and share runs.
+
+    Attributes:
+        behaviour: 0: the policy's randomness follows from the run's seed; another number: from
+            that number as well, so that the same worlds are met by another behaviour.
+    """
 
     policy: StudiedPolicy
     scenario: Scenario
     faults: tuple[Fault, ...] = ()
+    behaviour: int = 0
 
     @cached_property
     def scenario_json(self) -> str:
@@ -46,15 +53,18 @@ class Condition:
 
     @cached_property
     def key(self) -> str:
-        """Digest of scenario, faults and policy identity, 64 hexadecimal digits."""
-        return _digest(self.scenario_json, self.faults_json, self.policy.identity)
+        """Digest of scenario, faults, policy identity and behaviour, 64 hexadecimal digits."""
+        return _digest(*self._content)
+
+    @property
+    def _content(self) -> tuple[str, ...]:
+        # Behaviour 0 adds nothing: the keys are those of stores that knew no other.
+        other = (str(self.behaviour),) if self.behaviour else ()
+        return (self.scenario_json, self.faults_json, self.policy.identity, *other)
 
     def run(self, code: str, seed: int) -> Run:
         """Return the run of this condition at one seed, under one version of the code."""
-        run_key = _digest(
-            self.scenario_json, self.faults_json, self.policy.identity, code, str(seed)
-        )
-        return Run(run_key, self, code, seed)
+        return Run(_digest(*self._content, code, str(seed)), self, code, seed)
 
 
 @dataclass(frozen=True)
@@ -65,6 +75,15 @@ class Run:
     condition: Condition
     code: str
     seed: int
+
+    @property
+    def policy_seed(self) -> int:
+        """Seed of the policy's own randomness."""
+        behaviour = self.condition.behaviour
+        if not behaviour:
+            return self.seed
+        # 31 bits: policies hand it to generators of all kinds.
+        return streams.key(self.seed, "other behaviour", behaviour) & 0x7FFFFFFF
 
 
 def _canonical(value: object) -> str:

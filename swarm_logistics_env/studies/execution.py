@@ -33,6 +33,7 @@ class Outcome:
         anchoring_seconds: robot-seconds that working robots spent in contact range of failed ones.
         error: traceback; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
+        untimed: items delivered, where only their number is known; None: the times tell it.
     """
 
     run: str
@@ -43,11 +44,12 @@ class Outcome:
     anchoring_seconds: float = 0.0
     error: str | None = None
     wall_seconds: float = 0.0
+    untimed: int | None = None
 
     @property
     def delivered(self) -> int:
         """The paper's P [items]."""
-        return len(self.delivery_times)
+        return len(self.delivery_times) if self.untimed is None else self.untimed
 
 
 def execute(run: Run) -> Outcome:
@@ -61,7 +63,9 @@ def execute(run: Run) -> Outcome:
                 "the package changed while the study ran"
             )
         policy = _fresh(condition.policy.source)
-        episode = run_episode(condition.scenario, policy, run.seed, condition.faults)
+        episode = run_episode(
+            condition.scenario, policy, run.seed, condition.faults, run.policy_seed
+        )
     except Exception:  # noqa: BLE001 - kept as the run's row, and blocks the verdict
         return Outcome(
             run.key, error=traceback.format_exc(), wall_seconds=time.perf_counter() - start

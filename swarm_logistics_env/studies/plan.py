@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,14 @@ from swarm_logistics_env import policies
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.code_version import code_version
-from swarm_logistics_env.studies.comparisons import NO_FAULT, Arm, Comparison, Level
+from swarm_logistics_env.studies.comparisons import (
+    NO_FAULT,
+    OTHER_BEHAVIOUR,
+    Arm,
+    Comparison,
+    Level,
+    Twins,
+)
 from swarm_logistics_env.studies.conditions import Condition, Run, StudiedPolicy
 from swarm_logistics_env.studies.specification import (
     Ablation,
@@ -35,11 +42,17 @@ class Plan:
         specification: what it was made from.
         comparisons: in the order of the report.
         code: version of the code that decides what a run gives.
+        identities: of the policies, by the part that each plays in the specification.
+        twins: pairs without fault, one for the faults of each policy that begin during the run.
+        paired: whether all conditions share their seeds.
     """
 
     specification: Specification
     comparisons: tuple[Comparison, ...]
     code: str
+    identities: Mapping[str, str]
+    twins: tuple[Twins, ...] = ()
+    paired: bool = True
 
     @property
     def seeds(self) -> range:
@@ -49,11 +62,12 @@ class Plan:
     @cached_property
     def cells(self) -> tuple[tuple[str, str, Arm], ...]:
         """Every (policy label, table, arm) whose P the report shows, each once."""
-        cells = (
+        cells = [
             (comparison.policy, comparison.table, arm)
             for comparison in self.comparisons
             for arm in comparison.arms
-        )
+        ]
+        cells += [(twins.policy, twins.table, twins.other) for twins in self.twins]
         return tuple(dict.fromkeys(cells))
 
     @cached_property
@@ -77,29 +91,73 @@ class Plan:
         )
 
 
-def make_plan(specification: Specification) -> Plan:
+def make_plan(
+    specification: Specification,
+    *,
+    code: str | None = None,
+    identities: Mapping[str, str] | None = None,
+) -> Plan:
     """Return the plan of a study.
+
+    Args:
+        code: version of the code that played it; None: that of this process.
+        identities: of its policies when it was played; None: they are loaded and asked.
 
     Raises:
         StudyError: the specification varies nothing, or a step of it cannot be.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
-    comparisons: list[Comparison] = []
-    for source in specification.policies:
-        policy = studied(source)
-        for sizes in specification.sizes:
-            comparisons += _scalability(specification.scenario, sizes, policy)
-        for faults in specification.faults:
-            comparisons += _faults(specification.scenario, faults, policy)
-        for parameter in specification.parameters:
-            comparisons += _adaptability(specification.scenario, parameter, policy)
-        for ablation in specification.ablations:
-            lesser = studied(ablation.policy)
-            if lesser.identity != policy.identity:
-                comparisons.append(_ablation(specification.scenario, ablation, policy, lesser))
+    known: dict[str, str] = {}
+
+    def policy_of(part: str, source: object) -> StudiedPolicy:
+        if identities is None:
+            policy = studied(source)
+        elif part in identities:
+            policy = StudiedPolicy(policy_label(source), identities[part], source)
+        else:
+            raise StudyError(f"the study does not know the identity of its {part}")
+        known[part] = policy.identity
+        return policy
+
+    found = list(_asked(specification, policy_of))
+    comparisons = tuple(
+        item
+        for item in found
+        if isinstance(item, Comparison) and item.indicator in specification.indicators
+    )
     if not comparisons:
-        raise StudyError("the study compares nothing: give sizes, faults, parameters or ablations")
-    return Plan(specification, tuple(comparisons), code_version())
+        raise StudyError(
+            "the study compares nothing: give sizes, faults, parameters or ablations, and the "
+            "indicators that judge them"
+        )
+    return Plan(
+        specification,
+        comparisons,
+        code or code_version(),
+        known,
+        tuple(item for item in found if isinstance(item, Twins)),
+    )
+
+
+def _asked(
+    specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
+) -> Iterator[Comparison | Twins]:
+    base = specification.scenario
+    lesser = [
+        (ablation, policy_of(f"ablation {number}", ablation.policy))
+        for number, ablation in enumerate(specification.ablations, start=1)
+    ]
+    for source in specification.policies:
+        policy = policy_of(f"policy {policy_label(source)}", source)
+        for sizes in specification.sizes:
+            yield from scalability(base, sizes, policy)
+        for faults in specification.faults:
+            yield from robustness(base, faults, policy)
+        for parameter in specification.parameters:
+            yield from adaptability(base, parameter, policy)
+        for ablation, part in lesser:
+            if part.identity != policy.identity:
+                yield _ablation(base, ablation, policy, part)
 
 
 def studied(source: object) -> StudiedPolicy:
@@ -118,7 +176,8 @@ def _title(factor: Factor, general: str) -> str:
     return factor.title or (f"{general} ({changes})" if changes else general)
 
 
-def _scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
+def scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
+    """Yield the comparisons between neighbouring swarm sizes."""
     scenario = vary(base, sizes.scenario)
     table = _title(sizes, "Scalability")
     arms = {
@@ -137,7 +196,10 @@ def _scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterato
         yield Comparison(table, "S", arms[small], arms[large], threshold=1.0)
 
 
-def _faults(base: Scenario, faults: Faults, policy: StudiedPolicy) -> Iterator[Comparison]:
+def robustness(
+    base: Scenario, faults: Faults, policy: StudiedPolicy
+) -> Iterator[Comparison | Twins]:
+    """Yield FT and R of every mode, m and onset, and the twins where an onset is in mid-run."""
     scenario = vary(base, faults.scenario)
     table = _title(faults, "Fault tolerance and robustness")
     for m in faults.robots:
@@ -153,6 +215,9 @@ def _faults(base: Scenario, faults: Faults, policy: StudiedPolicy) -> Iterator[C
                 f"{scenario.duration:g} s, or nothing fails"
             )
     original = Arm(NO_FAULT, _condition(policy, scenario))
+    if any(faults.onsets):
+        other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1))
+        yield Twins(table, original, other)
 
     def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
         fault = Fault(mode, m, onset=onset, duration=duration)
@@ -167,9 +232,10 @@ def _faults(base: Scenario, faults: Faults, policy: StudiedPolicy) -> Iterator[C
                 yield Comparison(table, "R", original, failed)
 
 
-def _adaptability(
+def adaptability(
     base: Scenario, parameter: Parameter, policy: StudiedPolicy
 ) -> Iterator[Comparison]:
+    """Yield the comparisons of a parameter's first value with each other one."""
     scenario = vary(base, parameter.scenario)
     table = _title(parameter, f"Adaptability to {parameter.name}")
     original, *changed = (

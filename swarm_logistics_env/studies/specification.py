@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, ClassVar
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     BeforeValidator,
@@ -13,6 +14,7 @@ from pydantic import (
     PositiveFloat,
     PositiveInt,
     field_validator,
+    model_validator,
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
@@ -21,6 +23,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 
 ScenarioFields = dict[str, Any]
+Judged = Literal["S", "FT", "R", "A", "change"]
 
 
 def vary(base: Scenario, fields: ScenarioFields) -> Scenario:
@@ -61,6 +64,12 @@ PolicySource = Annotated[Any, BeforeValidator(_policy), PlainSerializer(policy_l
 
 class _Part(Record):
     error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+
+def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    if len(set(values)) < len(values):
+        raise ValueError("should hold each value once")
+    return values
 
 
 class Factor(_Part):
@@ -118,6 +127,11 @@ class Faults(Factor):
                 raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
         return modes
 
+    @field_validator("modes", "robots", "onsets")
+    @classmethod
+    def _distinct(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
+        return _each_once(values)
+
 
 class Parameter(Factor):
     """Values of one field of the scenario: adaptability A from the first value to each other.
@@ -147,9 +161,7 @@ class Parameter(Factor):
     @field_validator("values")
     @classmethod
     def _distinct(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        if len(set(values)) < len(values):
-            raise ValueError("should hold each value once")
-        return values
+        return _each_once(values)
 
 
 class Ablation(Factor):
@@ -173,6 +185,9 @@ class Specification(_Part):
         seeds: number of seeds; 0 .. seeds - 1, the same for every condition.
         scenario: the base; a dict of fields, "preset" among them, makes one.
         sizes, faults, parameters, ablations: what is varied.
+        indicators: which of them are asked; conditions that only others need are not run.
+        looks: numbers of seeds, rising, at which the study is going to be judged; declared before
+            its first run they keep the error over all looks at 5 % (O'Brien-Fleming spending).
         reference: published results that the report sets beside ours.
 
     Raises:
@@ -187,7 +202,27 @@ class Specification(_Part):
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
+    indicators: Annotated[tuple[Judged, ...], Field(min_length=1)] = ("S", "FT", "R", "A", "change")
+    looks: tuple[PositiveInt, ...] = ()
     reference: str | None = None
+
+    @field_validator("indicators")
+    @classmethod
+    def _distinct(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
+        return _each_once(values)
+
+    @field_validator("looks")
+    @classmethod
+    def _rising(cls, looks: tuple[int, ...]) -> tuple[int, ...]:
+        if any(later <= earlier for earlier, later in pairwise(looks)):
+            raise ValueError("should be rising numbers of seeds")
+        return looks
+
+    @model_validator(mode="after")
+    def _at_a_look(self) -> Self:
+        if self.looks and self.seeds not in self.looks:
+            raise ValueError(f"seeds = {self.seeds}: should be one of the looks {self.looks}")
+        return self
 
     @field_validator("policies")
     @classmethod

@@ -17,7 +17,7 @@ from swarm_logistics_env.studies.conditions import Run
 from swarm_logistics_env.studies.execution import Outcome
 
 FILE_NAME = "study.sqlite"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
 
 _SCHEMA = """
@@ -27,7 +27,8 @@ CREATE TABLE conditions (
     policy TEXT NOT NULL,
     policy_identity TEXT NOT NULL,
     scenario TEXT NOT NULL,  -- JSON
-    faults TEXT NOT NULL     -- JSON
+    faults TEXT NOT NULL,    -- JSON
+    behaviour INTEGER NOT NULL DEFAULT 0
 ) WITHOUT ROWID;
 CREATE TABLE runs (
     run TEXT PRIMARY KEY,
@@ -35,7 +36,7 @@ CREATE TABLE runs (
     code TEXT NOT NULL,
     seed INTEGER NOT NULL,
     delivered INTEGER,           -- NULL, like all of the result, where the run failed
-    delivery_times BLOB,         -- float64, little-endian [s]
+    delivery_times BLOB,         -- float64, little-endian [s]; NULL: only their number is known
     ended_at REAL,               -- [s]
     all_delivered INTEGER,
     failed_robots TEXT,          -- JSON
@@ -46,9 +47,12 @@ CREATE TABLE runs (
 ) WITHOUT ROWID;
 """
 
+# Statements that turn a store of each older schema into one of the next.
+_MIGRATIONS = {1: "ALTER TABLE conditions ADD COLUMN behaviour INTEGER NOT NULL DEFAULT 0"}
+
 _ROWS = """
 SELECT run, condition, policy, policy_identity, code, seed, delivered, ended_at, all_delivered,
-       anchoring_seconds, failed_robots, delivery_times, scenario, faults, error
+       anchoring_seconds, failed_robots, delivery_times, scenario, faults, behaviour, error
 FROM runs JOIN conditions USING (condition) ORDER BY run
 """
 
@@ -105,7 +109,7 @@ class Store:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
         condition = run.condition
         failed = outcome.error is not None
-        times = outcome.delivery_times.astype("<f8").tobytes()
+        times = outcome.delivery_times.astype("<f8").tobytes() if outcome.untimed is None else None
         result: tuple[object, ...] = (
             outcome.delivered,
             times,
@@ -116,13 +120,14 @@ class Store:
         )
         with self._transaction():
             self._database.execute(
-                "INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?)",
+                "INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?, ?)",
                 (
                     condition.key,
                     condition.policy.label,
                     condition.policy.identity,
                     condition.scenario_json,
                     condition.faults_json,
+                    condition.behaviour,
                 ),
             )
             self._database.execute(
@@ -153,10 +158,10 @@ class Store:
         found = {}
         with self._explained():
             rows = self._database.execute(
-                "SELECT run, delivery_times, ended_at, all_delivered, failed_robots,"
+                "SELECT run, delivered, delivery_times, ended_at, all_delivered, failed_robots,"
                 " anchoring_seconds, error, wall_seconds FROM runs"
             )
-            for run, times, ended_at, all_delivered, robots, anchoring, error, wall in rows:
+            for run, count, times, ended_at, all_delivered, robots, anchoring, error, wall in rows:
                 if run not in wanted:
                     continue
                 if error is not None:
@@ -164,12 +169,13 @@ class Store:
                     continue
                 found[run] = Outcome(
                     run,
-                    delivery_times=np.frombuffer(times, dtype="<f8"),
+                    delivery_times=np.frombuffer(times or b"", dtype="<f8"),
                     ended_at=ended_at,
                     all_delivered=bool(all_delivered),
                     failed_robots=tuple(json.loads(robots)),
                     anchoring_seconds=anchoring,
                     wall_seconds=wall,
+                    untimed=count if times is None else None,
                 )
         return found
 
@@ -206,15 +212,17 @@ class Store:
         (tables,) = self._database.execute("SELECT count(*) FROM sqlite_master").fetchone()
         if application != APPLICATION_ID and tables:
             raise StudyError(f"{self.path} is a database, but not the store of a study")
-        if application == APPLICATION_ID and version != SCHEMA_VERSION:
+        if application == APPLICATION_ID and not 1 <= version <= SCHEMA_VERSION:
             raise StudyError(
                 f"{self.path} has store schema {version}, this version of the package reads "
-                f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
+                f"schemas 1 to {SCHEMA_VERSION}: export it with the version that wrote it"
             )
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._database.execute("PRAGMA journal_mode = WAL")
         self._database.execute("PRAGMA synchronous = NORMAL")
         if application == APPLICATION_ID:
+            if version < SCHEMA_VERSION:
+                self._migrate()
             return
         with self._transaction():
             # Another process may have made the tables since: two shards start at once.
@@ -224,6 +232,14 @@ class Store:
             for statement in _SCHEMA.split(";\n"):
                 self._database.execute(statement)
             self._database.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            self._database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+    def _migrate(self) -> None:
+        with self._transaction():
+            # Asked again: another process may have migrated it since.
+            (version,) = self._database.execute("PRAGMA user_version").fetchone()
+            for older in range(version, SCHEMA_VERSION):
+                self._database.execute(_MIGRATIONS[older])
             self._database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
     @contextmanager

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies.code_version import code_version
 from swarm_logistics_env.studies.engines import Engine, serial
 from swarm_logistics_env.studies.judgement import Findings, judge
 from swarm_logistics_env.studies.plan import Plan, make_plan
+from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.progress import Progress
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.studies.study_file import read_study_file
 
 if TYPE_CHECKING:
     import pandas as pd
 
+# Names of the store's notes.
 _DECLARED_SEEDS = "declared_seeds"
+_SPECIFICATION = "specification"
+_CODE = "code"
+_IDENTITIES = "identities"
 
 
 @dataclass(frozen=True)
@@ -69,11 +77,47 @@ class Study:
         Raises:
             StudyError: there is no such preset, or a field cannot be.
         """
-        known = presets()
-        if name not in known:
-            raise StudyError(f"no study preset {name!r}{suggest(name, known)}")
+        return cls._of(load_preset(name).replace(**fields), out)
+
+    @classmethod
+    def from_file(cls, path: str | Path, *, out: str | Path | None = None, **fields: Any) -> Self:
+        """Return the study that a TOML file describes (`read_study_file`), some fields changed.
+
+        Raises:
+            StudyError: the file cannot be read, or a field of it is unknown or cannot be.
+        """
+        return cls._of(read_study_file(Path(path)).replace(**fields), out)
+
+    @classmethod
+    def stored(cls, out: str | Path) -> Self:
+        """Return a study that was run before, as it was run: code version and policies included.
+
+        Its policies need not be importable any more.
+
+        Raises:
+            StudyError: there is none, or its store does not say how it was planned.
+        """
+        out = Path(out)
+        with Store.existing(out) as store:
+            notes = {name: store.note(name) for name in (_SPECIFICATION, _CODE, _IDENTITIES)}
+        for name, value in notes.items():
+            if value is None:
+                raise StudyError(
+                    f"the store in {out} does not note its {name}: run the study once more there "
+                    "(finished runs are kept), then it will"
+                )
+        study = cls._of(Specification.from_json(str(notes[_SPECIFICATION])), out)
+        study._plan = make_plan(
+            study.specification,
+            code=notes[_CODE],
+            identities=json.loads(str(notes[_IDENTITIES])),
+        )
+        return study
+
+    @classmethod
+    def _of(cls, specification: Specification, out: str | Path | None) -> Self:
         study = cls(out=out)
-        study.specification = known[name].replace(**fields)
+        study.specification = specification
         return study
 
     def plan(self) -> Plan:
@@ -93,6 +137,11 @@ class Study:
             StudyError: the store or the engine cannot be used.
         """
         plan = self.plan()
+        if plan.code != code_version():
+            raise StudyError(
+                f"this study was played under code version {plan.code}, this is "
+                f"{code_version()}: plan it anew, and all of it runs again"
+            )
         if engine is None and processes > 1:
             from swarm_logistics_env.studies.engines.processes import Processes
 
@@ -100,7 +149,9 @@ class Study:
         with self._store() as store:
             if store.note(_DECLARED_SEEDS) is None:
                 store.set_note(_DECLARED_SEEDS, str(len(plan.seeds)))
-            store.set_note("specification", self.specification.to_json())
+            store.set_note(_SPECIFICATION, self.specification.to_json())
+            store.set_note(_CODE, plan.code)
+            store.set_note(_IDENTITIES, json.dumps(dict(plan.identities)))
             done = store.succeeded()
             runs = [run for run in plan.runs() if run.key not in done]
             kept = len(plan.conditions) * len(plan.seeds) - len(runs)
@@ -178,10 +229,3 @@ class Study:
                 raise StudyError("nothing has been run: call run() first")
             self._memory = Store(None)
         yield self._memory
-
-
-def presets() -> dict[str, Specification]:
-    """Return the studies that come with the package, by name."""
-    from swarm_logistics_env.studies.paper import SPECIFICATION
-
-    return {SPECIFICATION.name: SPECIFICATION}

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.policies import SwarmDT, identity
 from swarm_logistics_env.studies.code_version import code_version
@@ -35,3 +37,29 @@ def test_run_of_other_code_fails_rather_than_mixes() -> None:
     outcome = execute(condition("swarm-dt").run("0" * 16, 0))
     assert outcome.error is not None
     assert "the package changed while the study ran" in outcome.error
+
+
+class Recording(SwarmDT):
+    """Keeps the seeds that it is reset with, and never moves."""
+
+    identity = "recording"
+    seeds: list[int] = []  # noqa: RUF012 - shared by the copies that runs play
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        super().reset(n_robots, seed)
+        Recording.seeds.append(seed)
+
+
+def test_other_behaviour_meets_the_same_worlds() -> None:
+    Recording.seeds.clear()
+    source = Recording()
+    Recording.seeds.clear()
+    same = Condition(StudiedPolicy("mine", "recording", source), SCENARIO)
+    other = replace(same, behaviour=1)
+    assert other.key != same.key
+    for seed in (0, 1):
+        for condition_ in (same, other):
+            assert execute(condition_.run(code_version(), seed)).error is None
+    first, other_first, second, other_second = Recording.seeds
+    assert (first, second) == (0, 1)
+    assert len({first, second, other_first, other_second}) == 4

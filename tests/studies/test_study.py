@@ -59,6 +59,15 @@ class Failing(SwarmDT):
         return np.asarray(super().act(observations), dtype=np.float64)
 
 
+class Steady(SwarmDT):
+    """Swarm D-T under a name that nothing can load."""
+
+    identity = "steady"
+
+
+ONE: dict[str, Any] = {"sizes": [{"values": [2, 4]}]}
+
+
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small study, played in this process."""
@@ -161,6 +170,29 @@ def test_finished_runs_are_kept_and_seeds_can_be_added(tmp_path: Path) -> None:
     assert (tally.played, tally.kept) == (3, 6)
     assert more.findings().exploratory
     assert len(more.results()) == 9
+
+
+def test_stored_study_is_judged_without_its_policies(tmp_path: Path) -> None:
+    study = Study(out=tmp_path, policies=[Steady()], seeds=2, scenario=SMALL["scenario"], **ONE)
+    study.run()
+    study.report()
+    written = reports(tmp_path)
+    again = Study.stored(tmp_path)
+    assert [c.key for c in again.plan().conditions] == [c.key for c in study.plan().conditions]
+    again.report()
+    assert reports(tmp_path) == written
+    with sqlite3.connect(tmp_path / FILE_NAME) as database:
+        database.execute("UPDATE notes SET value = 'older' WHERE name = 'code'")
+    database.close()
+    with pytest.raises(StudyError, match="was played under code version older"):
+        Study.stored(tmp_path).run()
+
+
+def test_only_what_is_asked_is_run() -> None:
+    fields = {**SMALL, "faults": [{"modes": ["FM1"], "robots": [1]}], "indicators": ["R"]}
+    plan = Study(**fields).plan()
+    assert {comparison.indicator for comparison in plan.comparisons} == {"R"}
+    assert len(plan.conditions) == 2
 
 
 def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:

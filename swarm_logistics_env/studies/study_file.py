@@ -1,0 +1,41 @@
+"""Study files: a specification as TOML, the same fields under the same names."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.studies.specification import Specification
+
+
+def read_study_file(path: Path) -> Specification:
+    """Return the specification in a TOML file, named after the file where it has no name.
+
+    Example of a file:
+        policies = ["swarm-dt", "random-walk"]
+        seeds = 20
+        scenario = { preset = "paper", duration = 300 }
+
+        [[faults]]
+        modes = ["FM1", "FM4"]
+        robots = [1, 2]
+
+        [[parameters]]
+        name = "delivery_width"
+        values = [2.0, 1.0]
+
+    Raises:
+        StudyError: the file cannot be read, is not TOML, or a field of it is unknown or cannot be.
+    """
+    try:
+        fields = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise StudyError(f"cannot read the study file {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = str(error).splitlines()[0]
+        raise StudyError(f"the study file {path} is not TOML: {reason}") from error
+    try:
+        return Specification(**{"name": path.stem, **fields})
+    except SwarmLogisticsError as error:  # whichever record of it refuses
+        raise StudyError(f"{path}: {error}") from error
