@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
-from swarm_logistics_env.observations import N_COLUMNS, bounds
+from swarm_logistics_env.observations import bounds, n_columns
 from swarm_logistics_env.warehouse import WarehouseState
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
@@ -62,6 +62,13 @@ def random_scenario(rng: np.random.Generator) -> Scenario:
         pickup_range=rng.uniform(0.15, 0.5),
         relay="gossip" if rng.random() < 0.5 else "none",
         physics_period=float(rng.choice([0.02, 0.025])),
+        drive="differential" if rng.random() < 0.3 else "holonomic",
+        sensing_mix=(1.0, 0.5) if rng.random() < 0.3 else (1.0,),
+        ranger_noise=float(rng.choice([0.0, 0.1])),
+        position_noise=float(rng.choice([0.0, 0.1])),
+        sensor_dropout=float(rng.choice([0.0, 0.2])),
+        radio_loss=float(rng.choice([0.0, 0.2])),
+        message_size=int(rng.choice([0, 0, 3])),
     )
 
 
@@ -91,23 +98,24 @@ class Driver:
     """Swarm D-T, noise, or carriers who know where everything is, in turn."""
 
     def __init__(self, rng: np.random.Generator, scenario: Scenario, number: int) -> None:
-        self._rng, self._n = rng, scenario.n_robots
+        self._rng, self._n, self._width = rng, scenario.n_robots, 4 + scenario.message_size
         self._kind = ("couriers", "swarm-dt", "noise")[number % 3]
-        self._noise = np.zeros((self._n, 4))
+        self._noise = np.zeros((self._n, self._width))
         self._policy = policies.load("swarm-dt")
         self._policy.reset(self._n, number)
 
     def commands(
         self, observations: NDArray[np.float32], state: WarehouseState
     ) -> NDArray[np.float64]:
-        if self._kind == "swarm-dt":
-            return self._policy.act(observations)
-        if self._kind == "couriers":
-            return couriers(state, self._rng)
         changes = self._rng.random(self._n) < 0.2
-        fresh = self._rng.uniform(-1.5, 1.5, (self._n, 4))
+        fresh = self._rng.uniform(-1.5, 1.5, (self._n, self._width))
         self._noise = np.where(changes[:, None], fresh, self._noise)
-        return self._noise
+        commands = self._noise.copy()  # the messages, if any, stay noise
+        if self._kind == "swarm-dt":
+            commands[:, :4] = self._policy.act(observations)
+        if self._kind == "couriers":
+            commands[:, :4] = couriers(state, self._rng)
+        return commands
 
 
 def couriers(state: WarehouseState, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -190,7 +198,7 @@ def check_laws(world: Warehouse, observations: NDArray[np.float32]) -> None:
 
     # What is sensed.
     low, high = bounds(scenario)
-    assert observations.shape == (scenario.n_robots, N_COLUMNS)
+    assert observations.shape == (scenario.n_robots, n_columns(scenario))
     assert observations.dtype == np.float32
     assert (observations[here] >= low).all()
     assert (observations[here] <= high).all()
