@@ -44,6 +44,9 @@ SMALL = [
         (["study", "run", "papr", "--out", "x"], "did you mean 'paper'?"),
         (["study", "run", "paper"], "--out"),
         (["study", "run", "none.toml", "--out", "x"], "cannot read the study file none.toml"),
+        (["study", "run", "quick", "--out", "x", "--shard", "0/2"], "i/n with i from 1 to n"),
+        (["study", "run", "quick", "--out", "x", "--engine", "slurm"], "no engine 'slurm'"),
+        (["study", "merge", "nowhere", "--out", "x"], "no study in nowhere"),
         (["study", "plan", "quik"], "did you mean 'quick'?"),
         (["study", "plan", "quick", "--policy", "nobody"], "'nobody'"),
         (["study", "report", "nowhere"], "no study in nowhere"),
@@ -210,6 +213,21 @@ def test_ctrl_c_stops_and_says_how_to_go_on(tmp_path: Path) -> None:
     assert errors.strip().splitlines() == [
         f"Stopped. Every finished run is kept in {out}; the same command goes on."
     ]
+
+
+def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
+    script, out = short_paper(tmp_path, 0.5), tmp_path / "out"
+    command = [sys.executable, str(script), "study"]
+    for number in ("1/2", "2/2"):
+        arguments = ["run", "paper", "--seeds", "1", "--processes", "1", "--out", str(out)]
+        done = subprocess.run(
+            [*command, *arguments, "--shard", number], capture_output=True, text=True, check=True
+        )
+        assert "17 runs played" in done.stdout
+        assert f"study merge {out}/shard-*-of-2 --out {out}" in done.stdout
+    shards = [str(out / f"shard-{number}-of-2") for number in (1, 2)]
+    assert app.run(["study", "merge", *shards, "--out", str(out)]) == 0
+    assert stored(out) == 34
 
 
 def test_failed_runs_give_exit_code_1_and_a_report(tmp_path: Path) -> None:

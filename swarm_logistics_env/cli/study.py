@@ -9,8 +9,10 @@ import typer
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.engines import Engine
     from swarm_logistics_env.studies.plan import Plan
     from swarm_logistics_env.studies.reporting.sections import Section
+    from swarm_logistics_env.studies.shards import Shard
 
 StudyArgument = Annotated[
     str, typer.Argument(metavar="FILE|PRESET", help="TOML file of a study, or a preset's name.")
@@ -58,14 +60,39 @@ def run_command(
     processes: Annotated[
         int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
     ] = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(help="local (this process), process, or ray; process if not given."),
+    ] = None,
+    address: Annotated[
+        str | None,
+        typer.Option(help="Of a Ray cluster, e.g. auto; one is started here if not given."),
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N."),
+    ] = None,
 ) -> None:
     """Play the runs that are missing, then print and write the report."""
-    import os
+    from swarm_logistics_env.studies.engines import engine_named
+    from swarm_logistics_env.studies.shards import Shard
 
-    chosen = study_of(asked, out, seeds, policies)
+    part = Shard.parse(shard) if shard else None
+    chosen = study_of(asked, out / part.directory if part else out, seeds, policies)
+    player = engine_named(
+        engine or ("ray" if address else "local" if processes == 1 else "process"),
+        processes,
+        address,
+    )
     typer.echo(chosen.plan())
-    failed = _run(chosen, processes or os.cpu_count() or 1)
-    _show(chosen)
+    failed = _run(chosen, player, part)
+    if part is None:
+        _show(chosen)
+    else:
+        typer.echo(
+            f"When all {part.count} shards are done: swarm-logistics study merge "
+            f"{out}/shard-*-of-{part.count} --out {out}"
+        )
     raise typer.Exit(1 if failed else 0)
 
 
@@ -82,14 +109,26 @@ def report_command(
 @study.command("export")
 def export_command(
     directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
-    to: Annotated[Path, typer.Option(help="CSV file to write.")],
+    to: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""
-    from swarm_logistics_env.studies.reporting.files import export_rows
+    from swarm_logistics_env.studies.export import export
     from swarm_logistics_env.studies.store import Store
 
     with Store.existing(directory) as store:
-        typer.echo(f"{export_rows(store, to)} runs in {to}")
+        count, digest = export(store, to)
+    typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
+
+
+@study.command("merge")
+def merge_command(
+    directories: Annotated[list[Path], typer.Argument(help="Directories of shards of a study.")],
+    out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
+) -> None:
+    """Make one store of those that shards or machines have filled."""
+    from swarm_logistics_env.studies.merging import merge
+
+    typer.echo(f"{merge(directories, out)} runs in {out}")
 
 
 def study_of(asked: str, out: Path | None, seeds: int | None, policies: list[str] | None) -> Study:
@@ -131,10 +170,10 @@ def _conditions(plan: Plan) -> Section:
     return Section("Conditions", ("policy", "N", "stands in"), tuple(rows))
 
 
-def _run(asked: Study, processes: int) -> int:
+def _run(asked: Study, engine: Engine, shard: Shard | None) -> int:
     """Run a study, tell how it went, and return how many runs failed."""
     try:
-        tally = asked.run(processes=processes)
+        tally = asked.run(engine, shard=shard)
     except KeyboardInterrupt:
         typer.echo(
             f"\nStopped. Every finished run is kept in {asked.out}; the same command goes on.",

@@ -50,6 +50,20 @@ CREATE TABLE runs (
 # Statements that turn a store of each older schema into one of the next.
 _MIGRATIONS = {1: "ALTER TABLE conditions ADD COLUMN behaviour INTEGER NOT NULL DEFAULT 0"}
 
+_RESULT = "delivered, delivery_times, ended_at, all_delivered, failed_robots, anchoring_seconds"
+_CLASH = f"""
+SELECT run, seed FROM main.runs JOIN (SELECT run, {_RESULT} FROM other.runs WHERE error IS NULL)
+    AS theirs USING (run)
+WHERE error IS NULL AND ({", ".join(f"runs.{name}" for name in _RESULT.split(", "))})
+    IS NOT ({", ".join(f"theirs.{name}" for name in _RESULT.split(", "))})
+"""
+_ABSORB = (
+    "INSERT OR IGNORE INTO main.conditions SELECT * FROM other.conditions",
+    """DELETE FROM main.runs
+    WHERE error IS NOT NULL AND run IN (SELECT run FROM other.runs WHERE error IS NULL)""",
+    "INSERT OR IGNORE INTO main.runs SELECT * FROM other.runs",
+)
+
 _ROWS = """
 SELECT run, condition, policy, policy_identity, code, seed, delivered, ended_at, all_delivered,
        anchoring_seconds, failed_robots, delivery_times, scenario, faults, behaviour, error
@@ -145,6 +159,33 @@ class Store:
                     outcome.wall_seconds,
                 ),
             )
+
+    def __len__(self) -> int:
+        with self._explained():
+            (count,) = self._database.execute("SELECT count(*) FROM runs").fetchone()
+            return int(count)
+
+    def absorb(self, path: Path) -> None:
+        """Add the runs of another store, to which `add`'s rule applies.
+
+        Raises:
+            StudyError: the file is not a store, or has another result of a run that is here.
+        """
+        Store(path).close()  # is it one, of this schema?
+        with self._explained():
+            self._database.execute("ATTACH ? AS other", (str(path),))
+        try:
+            with self._transaction():
+                clash = self._database.execute(_CLASH).fetchone()
+                if clash is not None:
+                    raise StudyError(
+                        f"{path} has another result than the stores before it for the run "
+                        f"{clash[0]} (seed {clash[1]}), of the same scenario, policy and code"
+                    )
+                for statement in _ABSORB:
+                    self._database.execute(statement)
+        finally:
+            self._database.execute("DETACH other")
 
     def succeeded(self) -> set[str]:
         """Return the keys of the runs that need not run again."""

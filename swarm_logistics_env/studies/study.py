@@ -10,24 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies import notes
 from swarm_logistics_env.studies.code_version import code_version
-from swarm_logistics_env.studies.engines import Engine, serial
+from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.judgement import Findings, judge
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.progress import Progress
+from swarm_logistics_env.studies.shards import Shard
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.studies.study_file import read_study_file
 
 if TYPE_CHECKING:
     import pandas as pd
-
-# Names of the store's notes.
-_DECLARED_SEEDS = "declared_seeds"
-_SPECIFICATION = "specification"
-_CODE = "code"
-_IDENTITIES = "identities"
 
 
 @dataclass(frozen=True)
@@ -99,18 +95,12 @@ class Study:
         """
         out = Path(out)
         with Store.existing(out) as store:
-            notes = {name: store.note(name) for name in (_SPECIFICATION, _CODE, _IDENTITIES)}
-        for name, value in notes.items():
-            if value is None:
-                raise StudyError(
-                    f"the store in {out} does not note its {name}: run the study once more there "
-                    "(finished runs are kept), then it will"
-                )
-        study = cls._of(Specification.from_json(str(notes[_SPECIFICATION])), out)
+            noted = notes.planned(store, out)
+        study = cls._of(Specification.from_json(noted[notes.SPECIFICATION]), out)
         study._plan = make_plan(
             study.specification,
-            code=notes[_CODE],
-            identities=json.loads(str(notes[_IDENTITIES])),
+            code=noted[notes.CODE],
+            identities=json.loads(noted[notes.IDENTITIES]),
         )
         return study
 
@@ -126,12 +116,23 @@ class Study:
             self._plan = make_plan(self.specification)
         return self._plan
 
-    def run(self, engine: Engine | None = None, processes: int = 1) -> Tally:
+    def run(
+        self,
+        engine: Engine | str | None = None,
+        *,
+        processes: int | None = None,
+        address: str | None = None,
+        shard: Shard | None = None,
+    ) -> Tally:
         """Play the runs that are missing, and those that failed before; each is kept at once.
 
         Args:
-            engine: what plays them; None: this process, or `processes` of them. More than one need
-                the caller to stand under `if __name__ == "__main__":`.
+            engine: what plays them: "local" (this process), "process" or "ray", or an engine of
+                one's own; None: this process, or `processes` of them.
+            processes: how many worker processes; they need the caller to stand under
+                `if __name__ == "__main__":`.
+            address: of the Ray cluster; None: one on this machine.
+            shard: which part to play, the others being left to other machines; None: all.
 
         Raises:
             StudyError: the store or the engine cannot be used.
@@ -142,20 +143,22 @@ class Study:
                 f"this study was played under code version {plan.code}, this is "
                 f"{code_version()}: plan it anew, and all of it runs again"
             )
-        if engine is None and processes > 1:
-            from swarm_logistics_env.studies.engines.processes import Processes
-
-            engine = Processes(processes)
+        if engine is None:
+            engine = "process" if processes is not None and processes > 1 else "local"
+        if isinstance(engine, str):
+            engine = engine_named(engine, processes, address)
+        whole = list(shard.of(plan.runs()) if shard else plan.runs())
         with self._store() as store:
-            if store.note(_DECLARED_SEEDS) is None:
-                store.set_note(_DECLARED_SEEDS, str(len(plan.seeds)))
-            store.set_note(_SPECIFICATION, self.specification.to_json())
-            store.set_note(_CODE, plan.code)
-            store.set_note(_IDENTITIES, json.dumps(dict(plan.identities)))
+            if store.note(notes.DECLARED_SEEDS) is None:
+                store.set_note(notes.DECLARED_SEEDS, str(len(plan.seeds)))
+                store.set_note(notes.DECLARED_LOOKS, json.dumps(self.specification.looks))
+            store.set_note(notes.SPECIFICATION, self.specification.to_json())
+            store.set_note(notes.CODE, plan.code)
+            store.set_note(notes.IDENTITIES, json.dumps(dict(plan.identities)))
             done = store.succeeded()
-            runs = [run for run in plan.runs() if run.key not in done]
-            kept = len(plan.conditions) * len(plan.seeds) - len(runs)
-            finished = (engine or serial)(runs)
+            runs = [run for run in whole if run.key not in done]
+            kept = len(whole) - len(runs)
+            finished = engine(runs)
             # Closed at once where this stops early, so that no worker outlives it.
             with closing(finished), Progress(len(runs), self.specification.name) as progress:
                 for run, outcome in finished:
@@ -171,7 +174,7 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            declared = store.note(_DECLARED_SEEDS)
+            declared = store.note(notes.DECLARED_SEEDS)
             return judge(
                 plan,
                 store.outcomes(plan.runs()),

@@ -1,0 +1,119 @@
+"""One study, whichever engine plays it: identical exports."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.engines import engine_named
+from swarm_logistics_env.studies.export import export
+from swarm_logistics_env.studies.merging import merge
+from swarm_logistics_env.studies.shards import Shard
+from swarm_logistics_env.studies.store import Store
+
+needs_ray = pytest.mark.skipif(
+    importlib.util.find_spec("ray") is None, reason="ray is not installed"
+)
+
+STUDY: dict[str, Any] = {
+    "seeds": 2,
+    "scenario": {
+        "n_robots": 4,
+        "n_items": 8,
+        "warehouse_width": 3.0,
+        "warehouse_height": 3.0,
+        "delivery_width": 1.0,
+        "duration": 20.0,
+        "restock": True,
+    },
+    "faults": [{"modes": ["FM1", "FM4"], "robots": [1], "onsets": [5.0]}],
+}
+
+
+def digest(directory: Path) -> str:
+    with Store.existing(directory) as store:
+        return export(store, directory / "rows.csv")[1]
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Digest of what this process gives."""
+    directory = tmp_path_factory.mktemp("local")
+    study = Study(out=directory, **STUDY)
+    assert study.run("local").failed == 0
+    assert study.results()["delivered"].sum() > 0
+    return digest(directory)
+
+
+def test_two_processes(local: str, tmp_path: Path) -> None:
+    assert Study(out=tmp_path, **STUDY).run("process", processes=2).failed == 0
+    assert digest(tmp_path) == local
+
+
+def test_two_shards_merged(local: str, tmp_path: Path) -> None:
+    parts = [tmp_path / "1", tmp_path / "2"]
+    for number, part in enumerate(parts, start=1):
+        tally = Study(out=part, **STUDY).run(shard=Shard(number, 2))
+        assert tally.played == 5
+        assert Study(out=part, **STUDY).run(shard=Shard(number, 2)).kept == 5
+    merge(parts, tmp_path)
+    assert digest(tmp_path) == local
+    assert not Study.stored(tmp_path).findings().exploratory
+
+
+@needs_ray
+@pytest.mark.filterwarnings("ignore")  # of ray's own
+def test_ray_with_two_local_nodes(local: str, tmp_path: Path) -> None:
+    from ray.cluster_utils import Cluster
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    try:
+        cluster.add_node(num_cpus=1)
+        tally = Study(out=tmp_path, **STUDY).run("ray", address=cluster.address)
+    finally:
+        cluster.shutdown()
+    assert tally.failed == 0
+    assert digest(tmp_path) == local
+
+
+@needs_ray
+@pytest.mark.filterwarnings("ignore")
+def test_ray_starts_a_node_of_its_own(local: str, tmp_path: Path) -> None:
+    import ray
+
+    assert Study(out=tmp_path, **STUDY).run("ray", processes=1).failed == 0
+    assert digest(tmp_path) == local
+    assert not ray.is_initialized()
+
+
+@needs_ray
+@pytest.mark.filterwarnings("ignore")
+def test_no_cluster_at_that_address(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="no Ray cluster at auto"):
+        Study(out=tmp_path, **STUDY).run("ray", address="auto")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("proces",), "did you mean 'process'?"),
+        (("local", 2), "is one process, not 2"),
+        (("process", 2, "auto"), "only ray has an address"),
+        (("ray", 2, "auto"), "its own number of cores"),
+    ],
+)
+def test_no_such_engine(arguments: Any, words: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        engine_named(*arguments)
+    assert words in str(caught.value)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="ray is installed")
+def test_ray_that_is_missing_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match=r"swarm-logistics-env\[ray\]"):
+        Study(out=tmp_path, **STUDY).run("ray")

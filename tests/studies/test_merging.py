@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.merging import merge
+from swarm_logistics_env.studies.store import FILE_NAME, Store
+
+SCENARIO = {"n_robots": 3, "n_items": 4, "warehouse_width": 3, "warehouse_height": 3, "duration": 2}
+
+
+def played(directory: Path, **fields: Any) -> Path:
+    Study(
+        out=directory,
+        **{"scenario": SCENARIO, "sizes": [{"values": [2, 3]}], "seeds": 2, **fields},
+    ).run()
+    return directory
+
+
+def altered(directory: Path, statement: str) -> Path:
+    with sqlite3.connect(directory / FILE_NAME) as database:
+        database.execute(statement)
+    database.close()
+    return directory
+
+
+def rows(directory: Path) -> list[dict[str, Any]]:
+    with Store.existing(directory) as store:
+        return list(store.rows())
+
+
+def test_seeds_and_policies_of_two_machines_become_one_study(tmp_path: Path) -> None:
+    one = played(tmp_path / "one")
+    other = played(tmp_path / "other", seeds=3, policies=["swarm-dt", "random-walk"])
+    assert merge([one, other], tmp_path / "both") == 12
+    assert rows(tmp_path / "both") == rows(other)
+    merged = Study.stored(tmp_path / "both")
+    assert merged.specification.seeds == 3
+    assert merged.specification.policies == ("swarm-dt", "random-walk")
+    # Two seeds were declared where the first runs were looked at.
+    assert merged.findings().exploratory
+    assert not [path for path in (tmp_path / "both").iterdir() if path.name != FILE_NAME]
+
+
+def test_success_wins_over_failure_whichever_comes_first(tmp_path: Path) -> None:
+    whole = played(tmp_path / "whole")
+    failed = altered(
+        played(tmp_path / "failed"), "UPDATE runs SET error = 'Traceback', delivered = NULL"
+    )
+    for number, order in enumerate([(whole, failed), (failed, whole)]):
+        merge(order, tmp_path / str(number))
+        assert rows(tmp_path / str(number)) == rows(whole)
+
+
+def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
+    one, other = played(tmp_path / "one"), played(tmp_path / "other")
+    assert merge([one, other], tmp_path / "both") == 4
+    assert rows(tmp_path / "both") == rows(one)
+
+
+@pytest.mark.parametrize(
+    ("fields", "statement", "words"),
+    [
+        ({}, "UPDATE runs SET ended_at = 1.5", "has another result"),
+        ({}, "UPDATE notes SET value = 'old' WHERE name = 'code'", "never mixes two versions"),
+        ({}, "DELETE FROM notes WHERE name = 'identities'", "does not note its identities"),
+        ({}, "INSERT INTO notes VALUES ('imported', 'x.csv')", "was imported"),
+        (
+            {},
+            """UPDATE notes SET value = '{"policy swarm-dt": "x"}' WHERE name = 'identities'""",
+            "its code differs",
+        ),
+        ({"sizes": [{"values": [2, 4]}]}, "SELECT 1", "differ in sizes"),
+        ({"looks": [2, 4]}, "SELECT 1", "different looks"),
+    ],
+)
+def test_what_is_not_one_study_is_not_merged(
+    tmp_path: Path, fields: dict[str, Any], statement: str, words: str
+) -> None:
+    one = played(tmp_path / "one")
+    other = altered(played(tmp_path / "other", **fields), statement)
+    before = rows(one), rows(other)
+    with pytest.raises(StudyError, match=words):
+        merge([one, other], tmp_path / "both")
+    assert (rows(one), rows(other)) == before
+    assert not (tmp_path / "both").exists() or not list((tmp_path / "both").iterdir())
+
+
+def test_study_is_not_overwritten(tmp_path: Path) -> None:
+    one, other = played(tmp_path / "one"), played(tmp_path / "other")
+    with pytest.raises(StudyError, match="holds a study already"):
+        merge([one, other], other)
