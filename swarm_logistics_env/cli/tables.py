@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from swarm_logistics_env.studies.reporting.files import section_markdown
+from swarm_logistics_env.studies.reporting.markdown import section_markdown
 from swarm_logistics_env.studies.reporting.sections import Section
 
 

@@ -12,7 +12,8 @@ from swarm_logistics_env.studies.comparisons import Level
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.judgement import Findings, judge
 from swarm_logistics_env.studies.paper import PAPER
-from swarm_logistics_env.studies.reporting.files import markdown
+from swarm_logistics_env.studies.reporting.document import document
+from swarm_logistics_env.studies.reporting.markdown import markdown
 from swarm_logistics_env.studies.reporting.sections import sections
 from swarm_logistics_env.studies.reproduction import reproductions
 
@@ -104,7 +105,7 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
     needed = power["FT", "FM4, m = 3"].seeds_needed
     assert needed is not None
     assert needed < 10
-    assert "undefined: an effect of 0 lies at the threshold" in markdown(published)
+    assert "undefined: an effect of 0 lies at the threshold" in markdown(document(published))
 
 
 def test_holm_never_adds_a_verdict(published: Findings) -> None:
@@ -122,8 +123,9 @@ def test_saturated_cell_marks_what_rests_on_it() -> None:
     assert [cell.arm.level for cell in found.cells if cell.saturated] == [narrow]
     marked = {j.comparison.label for j in found.judgements if j.saturated}
     assert marked == {f"warehouse_width 5 -> {x}" for x in (10, 15, 20)}
-    text = markdown(found)
-    assert text.count("†") == 1 + 3 + 3 + 1  # the cell, its indicators twice, the explanation
+    text = markdown(document(found))
+    # The cell; its indicators in a table, the claims and a sentence; caption and explanation.
+    assert text.count("†") == 1 + 3 * 3 + 2
 
 
 def test_ablation_that_falls_is_supported(published: Findings) -> None:

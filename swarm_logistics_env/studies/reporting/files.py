@@ -1,4 +1,7 @@
-"""The report as files: Markdown to read, CSV to compute with. Equal rows give equal bytes."""
+"""The report as files: HTML and Markdown to read, CSV to compute with.
+
+Equal rows give equal bytes.
+"""
 
 from __future__ import annotations
 
@@ -9,53 +12,52 @@ from pathlib import Path
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
 from swarm_logistics_env.studies.reporting import wording
-from swarm_logistics_env.studies.reporting.sections import Section, sections
-from swarm_logistics_env.studies.reporting.setup_sheet import setup_sheet
+from swarm_logistics_env.studies.reporting.document import document, figures_of
+from swarm_logistics_env.studies.reporting.html import html
+from swarm_logistics_env.studies.reporting.images import (
+    how_to_get_figures,
+    inline_svg,
+    missing_packages,
+    write_images,
+)
+from swarm_logistics_env.studies.reporting.markdown import markdown
 from swarm_logistics_env.studies.store import Store
 
 Value = str | float | int | bool | list[float] | None
 
 
 def write_report(findings: Findings, directory: Path) -> tuple[Path, ...]:
-    """Write report.md, cells.csv and claims.csv; return their paths.
+    """Write report.md, cells.csv, claims.csv, every figure's data, and with the extra `study`
+    installed report.html and every figure as SVG and PNG; return the paths of report and tables.
 
     Raises:
         StudyError: a file cannot be written.
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    files = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
+    pictures = directory / "figures"
+    try:
+        pictures.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(f"cannot write to {pictures}: {error.strerror}") from error
     cells = [cell_record(cell) for cell in findings.cells]
     claims = [judgement_record(judgement) for judgement in findings.judgements]
-    write_text(files[0], markdown(findings))
+    whole = document(findings)
+    for figure in figures_of(whole):
+        write_csv(pictures / f"{figure.name}.csv", figure.columns, figure.rows)
+    missing = missing_packages()
+    if missing:
+        text = markdown(whole, note=how_to_get_figures(missing))
+    else:
+        text = markdown(whole, pictures=pictures.name)
+        drawings = {
+            figure.name: inline_svg(figure, write_images(figure, pictures))
+            for figure in figures_of(whole)
+        }
+        write_text(directory / "report.html", html(whole, drawings))
+    files = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
+    write_text(files[0], text)
     write_csv(files[1], list(cells[0]), (list(cell.values()) for cell in cells))
     write_csv(files[2], list(claims[0]), (list(claim.values()) for claim in claims))
-    return files
-
-
-def markdown(findings: Findings) -> str:
-    """Return the whole report as Markdown."""
-    parts = [f"# Study {findings.plan.specification.name!r}\n"]
-    if findings.reference:
-        parts.append(f'"paper" is {findings.reference.source}.\n')
-    parts += [section_markdown(section) for section in sections(findings)]
-    parts.append(setup_sheet(findings.plan))
-    return "\n".join(parts)
-
-
-def section_markdown(section: Section) -> str:
-    """Return one section as Markdown."""
-    lines = [f"## {section.title}", ""]
-    if section.columns:
-        lines += [_row(section.columns), _row(["---"] * len(section.columns))]
-        lines += [_row(row) for row in section.rows] + [""]
-    for line in section.lines:
-        lines += [line, ""]
-    return "\n".join(lines)
-
-
-def _row(values: Sequence[str]) -> str:
-    escaped = (value.replace("|", r"\|") for value in values)
-    return f"| {' | '.join(escaped)} |"
+    return files if missing else (directory / "report.html", *files)
 
 
 def cell_record(cell: Cell) -> dict[str, Value]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
 from swarm_logistics_env.studies.reporting import wording
+from swarm_logistics_env.studies.reporting.figures import Figure
+from swarm_logistics_env.studies.reporting.sentences import Sentence
 from swarm_logistics_env.studies.reproduction import Reproduction, reproductions
 
 NOTHING = wording.NOTHING
@@ -22,16 +24,25 @@ _FLAGS = {
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with a table, lines of text, or both."""
+    """A heading with a figure, sentences, a table, lines of text, or several of them."""
 
     title: str
     columns: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
     lines: tuple[str, ...] = ()
+    sentences: tuple[Sentence, ...] = ()
+    figures: tuple[Figure, ...] = ()
 
 
 def sections(findings: Findings) -> Iterator[Section]:
-    """Yield the results of a study, in the order of its report, without the set-up."""
+    """Yield the results of a study, for whoever reads no more than them."""
+    yield from tables(findings)
+    if lines := warnings(findings):
+        yield Section("Warnings", lines=lines)
+
+
+def tables(findings: Findings) -> Iterator[Section]:
+    """Yield the tables of a study's results, policy by policy."""
     policies = tuple(dict.fromkeys(cell.policy for cell in findings.cells))
     figures = {figure.policy: figure for figure in reproductions(findings)}
     for policy in policies:
@@ -40,9 +51,11 @@ def sections(findings: Findings) -> Iterator[Section]:
         yield from _claims(findings, policy)
         if policy in figures:
             yield _reproduction(figures[policy])
-    warnings = tuple(_warnings(findings))
-    if warnings:
-        yield Section("Warnings", lines=warnings)
+
+
+def warnings(findings: Findings) -> tuple[str, ...]:
+    """Return what a reader has to know before any verdict, one sentence each."""
+    return tuple(_warnings(findings))
 
 
 def _tables(findings: Findings, policy: str, table: str) -> Iterator[Section]:

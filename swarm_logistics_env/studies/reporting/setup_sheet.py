@@ -2,53 +2,84 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib.metadata import version
 
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.reporting.sections import Section
 from swarm_logistics_env.studies.specification import vary
+from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 
 
-def setup_sheet(plan: Plan) -> str:
-    """Return everything that was held fixed, as Markdown."""
+def setup_sheet(plan: Plan) -> tuple[Section, ...]:
+    """Return everything that was held fixed and everything that was varied."""
     specification = plan.specification
-    lines = [
-        "## Set-up",
-        "",
+    policies = {condition.policy for condition in plan.conditions}
+    return (
+        Section(
+            "Study",
+            lines=_study(plan),
+        ),
+        Section(
+            "Policies",
+            ("policy", "identity"),
+            tuple(
+                (policy.label, policy.identity)
+                for policy in sorted(policies, key=lambda policy: policy.label)
+            ),
+        ),
+        *_failure_modes(plan),
+        Section("Base scenario", *_table(specification.scenario), lines=tuple(_variations(plan))),
+    )
+
+
+def _study(plan: Plan) -> tuple[str, ...]:
+    name = plan.specification.name
+    return (
         (
-            f"Study {specification.name!r}: {len(plan.conditions)} conditions x "
-            f"{len(plan.seeds)} seeds (0 to {plan.seeds[-1]}), the same seeds for every condition. "
+            f"Study {name!r}: {len(plan.conditions)} conditions x {len(plan.seeds)} seeds "
+            f"({plan.seeds[0]} to {plan.seeds[-1]}), the same seeds for every condition. "
             f"swarm-logistics-env {version('swarm-logistics-env')}, code version {plan.code}."
         ),
-        "",
         (
             "Performance P is the number of items delivered in the order requested. Intervals of "
             "P are t-intervals over seeds; those of indicators are Fieller's, paired by seed. A "
             "verdict is a paired t-test against the threshold, one-sided 2.5 % on each side."
         ),
-        "",
-        "Policies:",
-        "",
-    ]
-    policies = {condition.policy for condition in plan.conditions}
-    lines += [
-        f"* {policy.label}: `{policy.identity}`"
-        for policy in sorted(policies, key=lambda policy: policy.label)
-    ]
-    lines += ["", "Base scenario:", "", specification.scenario.sheet()]
+    )
+
+
+def _failure_modes(plan: Plan) -> Iterator[Section]:
+    modes = dict.fromkeys(fault.mode for c in plan.conditions for fault in c.faults)
+    if modes:
+        yield Section(
+            "Failure modes",
+            ("mode", "what it does to a robot"),
+            tuple((mode, FAILURE_MODES[mode].description) for mode in modes),
+        )
+
+
+def _table(scenario: Scenario) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """Return columns and rows of the scenario's own sheet, which is a Markdown table."""
+    head, _, *rows = (
+        tuple(value.strip() for value in line.strip("|").split(" | "))
+        for line in scenario.sheet().splitlines()
+    )
+    return head, tuple(rows)
+
+
+def _variations(plan: Plan) -> Iterator[str]:
+    specification = plan.specification
     for factor in (
         *specification.sizes,
         *specification.faults,
         *specification.parameters,
         *specification.ablations,
     ):
-        differing = _differing(
-            vary(specification.scenario, factor.scenario), specification.scenario
-        )
-        if differing:
-            title = factor.title or type(factor).__name__
-            lines.append(f"{title} differs: {differing}.\n")
-    return "\n".join(lines)
+        scenario = vary(specification.scenario, factor.scenario)
+        if differing := _differing(scenario, specification.scenario):
+            yield f"{factor.title or type(factor).__name__} differs: {differing}."
 
 
 def _differing(scenario: Scenario, base: Scenario) -> str:

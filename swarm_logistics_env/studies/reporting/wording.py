@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from swarm_logistics_env.spi.estimate import Verdict
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.judgement import Judgement
+from swarm_logistics_env.studies.judgement import Findings, Judgement
 
 SATURATED = "†"
 NOTHING = "–"
@@ -47,6 +49,21 @@ def items(interval: Interval | None) -> str:
     return f"{interval.value:.1f} [{interval.low:.1f}, {interval.high:.1f}]"
 
 
+def bracketed(interval: Interval | None, digits: int) -> str:
+    """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
+    if interval is None:
+        return NOTHING
+    value, low, high = (None if x is None else _fixed(x, digits) for x in interval)
+    return f"{value}" if low is None or high is None else f"{value} [{low}, {high}]"
+
+
+def _fixed(value: float, digits: int) -> str:
+    if math.isinf(value):
+        return "∞" if value > 0 else "-∞"
+    # "+ 0.0" after rounding: no minus sign before a zero.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
 def limits(interval: Interval | None) -> str:
     """Return the limits alone."""
     if interval is None or interval.low is None or interval.high is None:
@@ -74,11 +91,14 @@ def verdict(judgement: Judgement) -> str:
     """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
     if judgement.estimate is None:
         return "blocked"
-    plain: Verdict | None = judgement.estimate.verdict
-    adjusted = judgement.adjusted_verdict
-    if _is_fall(judgement):
-        plain, adjusted = judgement.on_claim(plain), judgement.on_claim(adjusted)
+    plain = on_property(judgement, judgement.estimate.verdict)
+    adjusted = on_property(judgement, judgement.adjusted_verdict)
     return f"{plain}" if adjusted == plain else f"{plain} ({adjusted or 'blocked'})"
+
+
+def on_property(judgement: Judgement, verdict: Verdict | None) -> Verdict | None:
+    """Turn a verdict on "above the threshold" into one on the property that is named."""
+    return judgement.on_claim(verdict) if _is_fall(judgement) else verdict
 
 
 def power(judgement: Judgement) -> str:
@@ -88,3 +108,16 @@ def power(judgement: Judgement) -> str:
     if judgement.seeds_needed is None:
         return f"undefined: {judgement.no_plan}"
     return str(judgement.seeds_needed)
+
+
+def decided(judgement: Judgement) -> bool:
+    """Return whether the Holm-adjusted verdict is either way."""
+    return judgement.adjusted_verdict in ("supported", "refuted")
+
+
+def seeds_text(findings: Findings) -> str:
+    """Return over which seeds everything is, e.g. "20 paired seeds (0 to 19)"."""
+    seeds = findings.plan.seeds
+    if len(seeds) == 1:
+        return f"one seed ({seeds[0]})"
+    return f"{len(seeds)} paired seeds ({seeds[0]} to {seeds[-1]})"

@@ -1,0 +1,1 @@
+"""What the runs of a study say beyond the verdicts on its comparisons."""

@@ -1,0 +1,122 @@
+"""The whole report in order, before it becomes Markdown or HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from swarm_logistics_env.studies.analysis.scaling import size_series
+from swarm_logistics_env.studies.judgement import Findings
+from swarm_logistics_env.studies.reporting.beyond import beyond
+from swarm_logistics_env.studies.reporting.figures import (
+    Figure,
+    indicator_figures,
+    scaling_figure,
+)
+from swarm_logistics_env.studies.reporting.sections import Section, tables, warnings
+from swarm_logistics_env.studies.reporting.sentences import sentence
+from swarm_logistics_env.studies.reporting.setup_sheet import setup_sheet
+
+
+_NAMES = {
+    "S": "scalability S",
+    "FT": "fault tolerance FT",
+    "R": "robustness R",
+    "A": "adaptability A",
+    "change": "change of P",
+}
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A part of the report; `text` says what it is and how it is to be read."""
+
+    title: str
+    text: str
+    sections: tuple[Section, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """The whole report."""
+
+    title: str
+    text: tuple[str, ...]
+    chapters: tuple[Chapter, ...]
+
+
+def document(findings: Findings) -> Document:
+    """Return the report on a study's findings."""
+    plan = findings.plan
+    text = [
+        (
+            f"{plan.specification.name}: {len(plan.conditions)} conditions, {len(plan.seeds)} "
+            f"{'seed' if len(plan.seeds) == 1 else 'seeds'} of each; every verdict holds for the "
+            "conditions of the set-up sheet below and for no others."
+        )
+    ]
+    if findings.reference:
+        text.append(f'"paper" is {findings.reference.source}.')
+    return Document(
+        f"Study {plan.specification.name!r}",
+        tuple(text),
+        tuple(chapter for chapter in _chapters(findings) if chapter.sections),
+    )
+
+
+def figures_of(whole: Document) -> Iterator[Figure]:
+    """Yield every figure of a report, in its order."""
+    for chapter in whole.chapters:
+        for section in chapter.sections:
+            yield from section.figures
+
+
+def _chapters(findings: Findings) -> Iterator[Chapter]:
+    series = size_series(findings)
+    yield Chapter(
+        "Warnings", "", tuple([Section("", lines=lines)] if (lines := warnings(findings)) else [])
+    )
+    yield Chapter(
+        "Figures",
+        "The paper's indicators; raw P and the numbers stand in the tables below.",
+        tuple(Section("", figures=(figure,)) for figure in indicator_figures(findings))
+        + tuple(
+            Section("", figures=(scaling_figure(findings, one),))
+            for one in series
+            if one.performance
+        ),
+    )
+    yield Chapter(
+        "Verdicts",
+        "One sentence per question. The mark shows the Holm-adjusted verdict; the family is all "
+        "comparisons of one indicator for one policy.",
+        tuple(_verdicts(findings)),
+    )
+    yield Chapter(
+        "Results",
+        'P is the number of items delivered. Square brackets hold 95 % intervals; "one run" is '
+        "where a single further run falls.",
+        tuple(tables(findings)),
+    )
+    yield Chapter(
+        "Beyond the paper",
+        "Measures that the paper does not define; none of them enters a verdict above.",
+        tuple(beyond(findings, series)),
+    )
+    yield Chapter("Set-up", "", setup_sheet(findings.plan))
+
+
+def _verdicts(findings: Findings) -> Iterator[Section]:
+    families = dict.fromkeys(
+        (j.comparison.policy, j.comparison.indicator) for j in findings.judgements
+    )
+    for policy, indicator in families:
+        yield Section(
+            f"{policy}: {_NAMES[indicator]}",
+            sentences=tuple(
+                sentence(findings, judgement)
+                for judgement in findings.judgements
+                if (judgement.comparison.policy, judgement.comparison.indicator)
+                == (policy, indicator)
+            ),
+        )

@@ -1,0 +1,30 @@
+"""The report as one HTML page that needs nothing but itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from swarm_logistics_env.studies.reporting.document import Document
+
+_MARKS = {"supported": "✓", "refuted": "✗", "inconclusive": "?", "blocked": "!"}
+
+
+def html(document: Document, drawings: Mapping[str, str]) -> str:
+    """Return the whole report.
+
+    Args:
+        document: the report.
+        drawings: inline SVG of every figure, by name.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("swarm_logistics_env.studies", "reporting"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    template = environment.get_template("report.html.jinja")
+    return template.render(document=document, drawings=drawings, marks=_MARKS)
