@@ -1,0 +1,13 @@
+"""Wrappers: break an environment, resize it, change it while it runs.
+
+Each is an environment itself, so they stack in any order. What a wrapper draws for an episode
+follows from the episode's seed. What a reset's options ask for comes before what a wrapper
+draws, and an outer wrapper before an inner one; faults add up.
+"""
+
+from swarm_logistics_env.wrappers.fault_injection import FaultInjection
+from swarm_logistics_env.wrappers.parameter_change import ParameterChange
+from swarm_logistics_env.wrappers.swarm_size import SwarmSize
+from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+__all__ = ["FaultInjection", "ParameterChange", "SwarmSize", "Wrapper"]

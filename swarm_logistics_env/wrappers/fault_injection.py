@@ -1,0 +1,161 @@
+"""Robots that fail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swarm_logistics_env.errors import FaultError
+from swarm_logistics_env.reset_options import faults_among
+from swarm_logistics_env.streams import generator
+from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.wrappers.drawing import Distribution
+from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.scenario import Scenario
+
+
+class FaultInjection(Wrapper):
+    """Lets robots fail in every episode, besides those that fail anyway.
+
+    The robots are not told; `infos` and `warehouse.state` name the modes while they hold. Faults
+    given to a reset as an option take the place of those the environment was made with, as ever;
+    this wrapper's come on top of either.
+
+    Args:
+        env: the environment, or a wrapper of one.
+        mode: a key of `FAILURE_MODES`.
+        robots: how many fail, chosen by the episode's seed alone: sets of 1, 2, 3, .. are nested,
+            and the same for every mode; or the robots' numbers.
+        onset: when [s]: a time, a list to draw from in each episode, or a function of a numpy
+            Generator, that returns one time or an array of any number of them. At each further
+            onset so many more robots fail, while there are any; named robots fail anew.
+        duration: for how long [s]; None: for good.
+        factor: for `motor_slow` and `view_reduced`: what is left, in [0, 1).
+
+    Attributes:
+        injected: this episode's faults of this wrapper, with the robots' numbers.
+
+    Raises:
+        FaultError: no such mode, robots, times or factor; more robots than there may be. For what
+            a distribution gives: at the reset.
+        SetupError: `env` is none.
+
+    Example:
+        >>> from swarm_logistics_env import swarm_logistics_v0
+        >>> env = FaultInjection(swarm_logistics_v0.parallel_env(), "FM1", robots=2, onset=200.0)
+        >>> observations, infos = env.reset(seed=0)
+        >>> len(env.failed_robots), env.injected[0].onset
+        (2, 200.0)
+        >>> def onsets(rng):
+        ...     return rng.exponential(100.0, size=3).cumsum()
+        >>> env = FaultInjection(env, "motor_dead", onset=onsets)
+        >>> observations, infos = env.reset(seed=0)
+        >>> len(env.failed_robots)
+        3
+    """
+
+    def __init__(
+        self,
+        env: SwarmLogisticsEnv | Wrapper,
+        mode: str,
+        robots: int | Sequence[int] = 1,
+        onset: ArrayLike | Distribution = 0.0,
+        duration: float | None = None,
+        factor: float | None = None,
+    ) -> None:
+        super().__init__(env)
+        self._fault = Fault(mode, robots, duration=duration, factor=factor)
+        if not callable(onset):
+            onset = _times(onset)
+            for time in onset:
+                self._fault.replace(onset=time)
+            if len(onset) == 0:
+                raise FaultError("Fault.onset = []: should list at least one time [s]")
+        self._onset = onset
+        self.injected: tuple[Fault, ...] = ()
+        for scenario in self.env.scenarios:
+            self._check(scenario)
+
+    @property
+    def failed_robots(self) -> tuple[int, ...]:
+        """The robots that this wrapper's faults befall in this episode, ascending."""
+        return tuple(sorted({robot for fault in self.injected for robot in _named(fault)}))
+
+    def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
+        """Return the options with this episode's faults added to theirs."""
+        n_robots = self.env.scenario_of(seed, options).n_robots
+        faults = self._drawn(seed, n_robots)
+        return {**options, "faults": (*faults_among(options, self.unwrapped.faults), *faults)}
+
+    def begun(self, seed: int) -> None:
+        """Note this episode's faults."""
+        self.injected = self._drawn(seed, self.warehouse.state.n_robots)
+
+    def cover(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.cover`.
+
+        Raises:
+            FaultError: it has fewer robots than are to fail.
+        """
+        self._check(scenario)
+        self.env.cover(scenario)
+
+    def _check(self, scenario: Scenario) -> None:
+        failed_robots(self._fault, 0, scenario.n_robots)
+
+    def _drawn(self, seed: int, n_robots: int) -> tuple[Fault, ...]:
+        rng = generator(seed, "fault onsets", self._place())
+        if callable(self._onset):
+            onsets = sorted(_times(self._onset(rng)))
+        else:
+            onsets = [self._onset[int(rng.integers(len(self._onset)))]]
+        if isinstance(self._fault.robots, tuple):
+            return self._anew(onsets)
+        return self._one_group_after_another(onsets, self._fault.robots, seed, n_robots)
+
+    def _one_group_after_another(
+        self, onsets: list[float], size: int, seed: int, n_robots: int
+    ) -> tuple[Fault, ...]:
+        faults, before = [], set[int]()
+        for number, onset in enumerate(onsets, start=1):
+            # The first group has to be there; later ones are of those who are left.
+            so_many = self._fault.replace(robots=max(size, min(number * size, n_robots)))
+            chosen = set(failed_robots(so_many, seed, n_robots).tolist())
+            if more := tuple(sorted(chosen - before)):
+                faults.append(self._fault.replace(robots=more, onset=onset))
+            before = chosen
+        return tuple(faults)
+
+    def _anew(self, onsets: list[float]) -> tuple[Fault, ...]:
+        faults: list[Fault] = []
+        for onset in onsets:
+            last = faults[-1] if faults else None
+            if last is None or (last.duration and onset > last.onset + last.duration):
+                faults.append(self._fault.replace(onset=onset))
+            elif last.duration and self._fault.duration:
+                # Still failed: twice motor_slow would be slower.
+                until = onset + self._fault.duration
+                faults[-1] = last.replace(duration=until - last.onset)
+        return tuple(faults)
+
+
+def _times(given: ArrayLike) -> list[float]:
+    try:
+        times = np.atleast_1d(np.asarray(given, dtype=np.float64)).ravel()
+    except (TypeError, ValueError):
+        raise FaultError(
+            f"Fault.onset = {given!r}: should be a time [s], a list of times, or a function of a "
+            "numpy Generator that returns them"
+        ) from None
+    return [float(time) for time in times]
+
+
+def _named(fault: Fault) -> tuple[int, ...]:
+    return fault.robots if isinstance(fault.robots, tuple) else ()

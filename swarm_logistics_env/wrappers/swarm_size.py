@@ -1,0 +1,114 @@
+"""Swarms of other sizes, and robots that leave."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swarm_logistics_env.dict_view import agent_names
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.reset_options import faults_among, scenario_fields
+from swarm_logistics_env.streams import generator
+from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.wrappers.drawing import Distribution, Drawn
+from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.scenario import Scenario
+
+
+class SwarmSize(Wrapper):
+    """Plays each episode with a swarm size of its own, and lets robots leave.
+
+    `possible_agents` are those of the largest swarm. A robot that leaves terminates, and is gone
+    from `agents` for the rest of the episode; those that leave first are those that would fail
+    first (see `Fault`), so that P_S and P_F of one seed are about the same robots. A size among a
+    reset's options comes before the drawn one.
+
+    Args:
+        env: the environment, or a wrapper of one.
+        sizes: the swarm size N, a list to draw from in each episode, or a function of a numpy
+            Generator.
+        within: (smallest, largest) size that a function gives.
+        leave: (robots, time [s]) pairs: how many more robots leave, and when.
+
+    Raises:
+        ScenarioError: such a swarm cannot be.
+        SetupError: a function without `within`, or more robots leave than there are.
+        FaultError: they leave at a time that cannot be.
+
+    Example:
+        >>> from swarm_logistics_env import swarm_logistics_v0
+        >>> env = SwarmSize(swarm_logistics_v0.parallel_env(), [5, 12], leave=[(2, 100.0)])
+        >>> observations, infos = env.reset(seed=0)
+        >>> len(observations) in (5, 12), len(env.possible_agents)
+        (True, 12)
+    """
+
+    def __init__(
+        self,
+        env: SwarmLogisticsEnv | Wrapper,
+        sizes: int | Sequence[int] | Distribution,
+        *,
+        within: tuple[int, int] | None = None,
+        leave: Sequence[tuple[int, float]] = (),
+    ) -> None:
+        super().__init__(env)
+        if isinstance(sizes, tuple | range):
+            sizes = list(sizes)
+        self._size = Drawn("n_robots", sizes, within)
+        pairs = _departures(leave)
+        self._leaving = sum(robots for robots, _ in pairs)
+        # The sets are nested, so the first m + k take with them the m who have left.
+        in_all = np.cumsum([robots for robots, _ in pairs], dtype=np.int64).tolist()
+        self._departures = tuple(
+            Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)
+        )
+        self.scenarios: tuple[Scenario, ...] = tuple(
+            dict.fromkeys(
+                known.replace(n_robots=size)
+                for known in self.env.scenarios
+                for size in self._size.ends
+            )
+        )
+        for scenario in self.scenarios:
+            self.cover(scenario)
+        largest = max(scenario.n_robots for scenario in self.scenarios)
+        self.unwrapped.possible_agents = agent_names(range(largest))
+
+    def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
+        """Return the options with this episode's size and departures among them."""
+        size = self._size.draw(generator(seed, "swarm size", self._place()))
+        faults = (*faults_among(options, self.unwrapped.faults), *self._departures)
+        scenario = {"n_robots": size, **scenario_fields(options)}
+        return {**options, "scenario": scenario, "faults": faults}
+
+    def cover(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.cover`.
+
+        Raises:
+            SetupError: more robots are to leave than it has.
+        """
+        if self._leaving > scenario.n_robots:
+            raise SetupError(
+                f"leave: {self._leaving} robots in all, should be at most n_robots = "
+                f"{scenario.n_robots}"
+            )
+        self.env.cover(scenario)
+
+
+def _departures(leave: Sequence[tuple[int, float]]) -> list[tuple[int, float]]:
+    try:
+        pairs = [(operator.index(robots), float(time)) for robots, time in leave]
+    except (TypeError, ValueError):
+        raise SetupError(
+            f"leave = {leave!r}: should be pairs (robots, time [s]), as [(2, 100.0)]"
+        ) from None
+    for robots, _ in pairs:
+        if robots < 1:
+            raise SetupError(f"leave = {leave!r}: should name at least one robot each time")
+    return sorted(pairs, key=lambda pair: pair[1])

@@ -1,0 +1,95 @@
+"""What the wrappers have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pettingzoo.utils import BaseParallelWrapper
+
+from swarm_logistics_env.dict_view import ArrayStep, DictView
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.reset_options import checked_options, checked_seed
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.scenario import Scenario
+
+
+class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo ships no types
+    """An environment around an environment, which leaves everything as it is; for subclasses.
+
+    They override `plan`, for what an episode should be like, `begun`, or the array methods; the
+    dict methods follow. Everything else is the wrapped environment's.
+
+    Args:
+        env: a `SwarmLogisticsEnv` or a wrapper of one.
+
+    Raises:
+        SetupError: it is something else.
+
+    Example:
+        >>> from swarm_logistics_env.env import SwarmLogisticsEnv
+        >>> env = Wrapper(SwarmLogisticsEnv(n_robots=2))
+        >>> env.reset_arrays(seed=0).shape == env.unwrapped.reset_arrays(seed=0).shape
+        True
+    """
+
+    def __init__(self, env: SwarmLogisticsEnv | Wrapper) -> None:
+        if not hasattr(env, "reset_arrays"):
+            raise SetupError(
+                f"env = {env}: should be a SwarmLogisticsEnv (swarm_logistics_v0.parallel_env) or "
+                "a wrapper of one; wrap before converting to AEC"
+            )
+        super().__init__(env)
+
+    def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
+        """Return the options to reset the wrapped environment with, those given taken in.
+
+        Pure: asked twice with the same seed and options it answers the same.
+        """
+        return options
+
+    def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
+        """Return the scenario of the episode that such a reset would begin; changes nothing."""
+        scenario: Scenario = self.env.scenario_of(seed, self.plan(seed, dict(options)))
+        return scenario
+
+    def reset_arrays(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> NDArray[np.float32]:
+        """Begin an episode, as planned, and return the first observations (N, D)."""
+        seed = self.env.next_seed if seed is None else checked_seed(seed)
+        observations: NDArray[np.float32] = self.env.reset_arrays(
+            seed, self.plan(seed, checked_options(options))
+        )
+        self.begun(seed)
+        return observations
+
+    def begun(self, seed: int) -> None:
+        """Note what there is to note of an episode that has begun."""
+
+    def step_arrays(self, commands: ArrayLike) -> ArrayStep:
+        """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
+        outcome: ArrayStep = self.env.step_arrays(commands)
+        return outcome
+
+    @property
+    def max_cycles(self) -> int | None:
+        """Steps after which an episode is truncated."""
+        cycles: int | None = self.env.max_cycles
+        return cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int | None) -> None:
+        self.unwrapped.max_cycles = cycles
+
+    def _place(self) -> int:
+        """Return how many wrappers of the same class lie inside, so that each draws for itself."""
+        place, env = 0, self.env
+        while env is not env.unwrapped:
+            place += type(env) is type(self)
+            env = env.env
+        return place

@@ -1,0 +1,104 @@
+"""Swarm sizes that change from episode to episode, and within one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault
+from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError
+from swarm_logistics_env.wrappers import SwarmSize
+
+
+def small(**fields: Any) -> SwarmLogisticsEnv:
+    return SwarmLogisticsEnv(**{"n_robots": 6, "n_items": 8, "duration": 6.0, **fields})
+
+
+def still(env: Any) -> dict[str, Any]:
+    return {agent: np.zeros(4) for agent in env.agents}
+
+
+def sizes_of(env: Any, seeds: range) -> list[int]:
+    return [len(env.reset(seed=seed)[0]) for seed in seeds]
+
+
+def test_a_list_is_drawn_from_by_the_seed() -> None:
+    env = SwarmSize(small(), [2, 5, 9])
+    sizes = sizes_of(env, range(20))
+    assert set(sizes) == {2, 5, 9}
+    assert sizes_of(SwarmSize(small(), (2, 5, 9)), range(20)) == sizes
+    assert env.possible_agents == [f"robot_{row}" for row in range(9)]
+
+
+def test_possible_agents_are_those_of_the_largest_swarm_not_of_the_environment() -> None:
+    env = SwarmSize(small(n_robots=6), [2, 3])
+    assert env.possible_agents == ["robot_0", "robot_1", "robot_2"]
+    env.reset(seed=0)
+    assert env.state_space.contains(env.state())
+
+
+def test_a_distribution_gives_sizes_within_its_bounds() -> None:
+    env = SwarmSize(small(), lambda rng: rng.integers(3, 8), within=(3, 7))
+    assert set(sizes_of(env, range(40))) == {3, 4, 5, 6, 7}
+    assert len(env.possible_agents) == 7
+    beyond = SwarmSize(small(), lambda rng: 8, within=(3, 7))
+    with pytest.raises(SetupError, match="n_robots = 8: the distribution should give numbers"):
+        beyond.reset(seed=0)
+
+
+def test_the_episode_is_that_of_a_swarm_of_this_size() -> None:
+    wrapped, plain = SwarmSize(small(), 9), small(n_robots=9)
+    np.testing.assert_array_equal(wrapped.reset_arrays(4), plain.reset_arrays(4))
+
+
+def test_a_size_among_the_options_and_an_outer_wrapper_come_first() -> None:
+    env = SwarmSize(SwarmSize(small(), 2), 4)
+    assert sizes_of(env, range(1)) == [4]
+    observations, _ = env.reset(options={"scenario": {"n_robots": 3, "n_items": 5}})
+    assert len(observations) == 3
+    assert env.warehouse.scenario.n_items == 5
+
+
+def test_who_leaves_terminates_and_is_gone_for_the_rest_of_the_episode() -> None:
+    env = SwarmSize(small(), 5, leave=[(2, 2.0), (1, 1.0)])
+    env.reset(seed=0)
+    first = small(n_robots=5, faults=[Fault("FM1", 1)])
+    first.reset(seed=0)
+    sizes, gone = [], set[str]()
+    while env.agents:
+        _, _, terminated, truncated, _ = env.step(still(env))
+        if not any(truncated.values()):
+            gone |= {agent for agent, is_over in terminated.items() if is_over}
+            assert not gone & set(env.agents)
+            sizes.append(len(env.agents))
+        if len(gone) == 1:
+            assert gone == {f"robot_{row}" for row in first.warehouse.struck_robots}
+    assert sizes == [5] * 9 + [4] * 10 + [2] * 40
+    env.reset(seed=1)
+    assert len(env.agents) == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "complaint"),
+    [
+        ({"sizes": [5, 0]}, ScenarioError, "Scenario.n_robots = 0: should be greater than 0"),
+        ({"sizes": [5, 4000]}, ScenarioError, "n_robots = 4000 of radius"),
+        ({"sizes": 2.5}, ScenarioError, "n_robots = 2.5"),
+        ({"sizes": []}, SetupError, r"n_robots = \[\]: should list at least one"),
+        ({"sizes": lambda rng: 4}, SetupError, "within = None: should be"),
+        ({"sizes": 4, "within": (3, 5)}, SetupError, "should be None but for a distribution"),
+        ({"sizes": [3, 9], "leave": [(4, 1.0)]}, SetupError, "4 robots in all, should be at most"),
+        ({"sizes": 9, "leave": [(4, -1.0)]}, FaultError, "Fault.onset = -1.0"),
+        ({"sizes": 9, "leave": [(0, 1.0)]}, SetupError, "at least one robot"),
+        ({"sizes": 9, "leave": [4]}, SetupError, r"should be pairs \(robots, time"),
+        ({"sizes": 9, "leave": 4}, SetupError, r"should be pairs \(robots, time"),
+    ],
+)
+def test_wrong_arguments_are_refused_at_once(
+    arguments: dict[str, Any], error: type[Exception], complaint: str
+) -> None:
+    with pytest.raises(error, match=complaint):
+        SwarmSize(small(), **arguments)
