@@ -34,14 +34,14 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` with numba.
 
     Without the interpreter's lock, so that several worlds step in threads; cached on disk, so
-    that a second process starts at once; and without fast-math, so that results are the same
-    bits wherever they run.
+    that a second process starts at once; without fast-math, so that results are the same bits
+    wherever they run; and with numpy's division, which needs no check for zero.
     """
     # numba notices a change of a kernel's own file only, not of the kernels and constants from
     # other files that were compiled into it. So their digest goes into the name of the cache.
     name = function.__qualname__
     function.__qualname__ = f"{name}-{_SOURCES}"
-    compiled = numba.njit(function, cache=True, nogil=True)
+    compiled = numba.njit(function, cache=True, nogil=True, error_model="numpy")
     function.__qualname__ = name
     return cast("Callable[P, R]", compiled)
 

@@ -14,7 +14,7 @@ from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-_TRIES = 20_000
+_ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
 _NO_DISCS = np.zeros((0, 2))
 
 
@@ -67,7 +67,11 @@ def place_restocked(
     keys = row_keys(seed, f"restock {count}", 1)
     clearance = max(scenario.item_radius, scenario.robot_radius)
     centres = np.vstack([taken, np.zeros((1, 2))])
-    _place(scenario, "items", keys, scenario.item_radius, clearance, centres, obstacles)
+    if not _place(scenario, keys, scenario.item_radius, clearance, centres, obstacles):
+        raise ScenarioError(
+            f"no room to restock an item at delivery {count}: should be fewer items or robots, or "
+            "a larger warehouse"
+        )
     return np.asarray(centres[-1])
 
 
@@ -80,29 +84,29 @@ def _strewn(
     obstacles: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     centres = np.zeros((count, 2))
-    keys = row_keys(seed, f"places of {what}", count)
-    _place(scenario, what, keys, radius, radius, centres, obstacles)
-    return centres
+    for arrangement in range(_ARRANGEMENTS):
+        again = f" {arrangement}" if arrangement else ""
+        keys = row_keys(seed, f"places of {what}{again}", count)
+        if _place(scenario, keys, radius, radius, centres, obstacles):
+            return centres
+    raise ScenarioError(
+        f"no room for {count} {what} of radius {radius} m: should be fewer {what}, fewer "
+        "obstacles or a larger warehouse"
+    )
 
 
 def _place(
     scenario: Scenario,
-    what: str,
     keys: NDArray[np.uint64],
     radius: float,
     clearance: float,
     centres: NDArray[np.float64],
     obstacles: NDArray[np.float64],
-) -> None:
+) -> bool:
     low = np.array([radius, radius])
     high = np.array([scenario.storage_width - radius, scenario.warehouse_height - radius])
     reach = scenario.obstacle_radius + radius
-    placed = strew(keys, centres, low, high, radius + clearance, obstacles, reach)
-    if placed < keys.shape[0]:
-        raise ScenarioError(
-            f"no room for number {placed} of {keys.shape[0]} {what} after {_TRIES} tries: should "
-            f"be fewer {what}, fewer obstacles or a larger warehouse"
-        )
+    return strew(keys, centres, low, high, radius + clearance, obstacles, reach)
 
 
 @kernel
@@ -114,14 +118,14 @@ def strew(
     spacing: float,
     obstacles: NDArray[np.float64],
     obstacle_spacing: float,
-) -> int:
+) -> bool:
     """Fill the last rows of `centres`, one per key, uniformly in the box, by rejection.
 
-    Returns how many were placed; fewer than there are keys when one found no room.
+    Returns whether there was room for all.
     """
     first = centres.shape[0] - keys.shape[0]
     for disc in range(keys.shape[0]):
-        for attempt in range(20_000):
+        for attempt in range(5_000):
             x = low[0] + (high[0] - low[0]) * uniform(keys[disc], 2 * attempt)
             y = low[1] + (high[1] - low[1]) * uniform(keys[disc], 2 * attempt + 1)
             if is_clear(x, y, centres[: first + disc], spacing) and is_clear(
@@ -131,8 +135,8 @@ def strew(
                 centres[first + disc, 1] = y
                 break
         else:
-            return disc
-    return len(keys)
+            return False
+    return True
 
 
 @kernel

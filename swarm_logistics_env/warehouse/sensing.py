@@ -80,18 +80,25 @@ def scan_walls(
 ) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall, for a robot at (x, y)."""
     reach = scan[0]
-    if x > reach and y > reach and width - x > reach and height - y > reach:
-        return
-    for beam in range(scan.shape[0]):
-        along_x = _BEAM_X[beam] * cosine - _BEAM_Y[beam] * sine
-        along_y = _BEAM_X[beam] * sine + _BEAM_Y[beam] * cosine
-        distance = math.inf
-        if along_x != 0.0:
-            distance = ((width if along_x > 0.0 else 0.0) - x) / along_x
-        if along_y != 0.0:
-            distance = min(distance, ((height if along_y > 0.0 else 0.0) - y) / along_y)
-        if distance < scan[beam]:
-            scan[beam] = max(distance, 0.0)
+    for wall in range(4):
+        # Its distance, and the way to it in the warehouse's frame.
+        if wall == 0:
+            distance, way_x, way_y = width - x, 1.0, 0.0
+        elif wall == 1:
+            distance, way_x, way_y = height - y, 0.0, 1.0
+        elif wall == 2:
+            distance, way_x, way_y = x, -1.0, 0.0
+        else:
+            distance, way_x, way_y = y, 0.0, -1.0
+        if distance >= reach:
+            continue
+        distance = max(distance, 0.0)
+        ahead, aside = way_x * cosine + way_y * sine, way_y * cosine - way_x * sine
+        for beam in range(_N_BEAMS):
+            towards = _BEAM_X[beam] * ahead + _BEAM_Y[beam] * aside
+            # Without a branch: all beams together are a few vector instructions.
+            found = distance / towards if towards > 0.0 else math.inf
+            scan[beam] = found if found < scan[beam] else scan[beam]
 
 
 @kernel
@@ -264,7 +271,7 @@ def sense(
             tells = is_heard and not math.isnan(told[other])
             out[column + 3] = 1.0 if tells else 0.0
             out[column + 4] = told[other] if tells else timer_limit
-            if is_heard:
+            if is_heard and message.shape[1] > 0:
                 first = row.MESSAGES + place * message.shape[1]
                 out[first : first + message.shape[1]] = message[other]
         if lowest != NOBODY:

@@ -117,7 +117,7 @@ class Warehouse:
                 f"commands[{bad[0]}, {bad[1]}] = {given[bad[0], bad[1]]}: should be finite"
             )
         self._log.append(given)
-        physics.advance()
+        physics.advance(int(np.count_nonzero(state.robot_contact)))
         if self.scenario.message_size:
             self._send_messages(given)
         state.step += 1
