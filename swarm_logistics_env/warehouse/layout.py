@@ -69,8 +69,8 @@ def place_restocked(
     centres = np.vstack([taken, np.zeros((1, 2))])
     if not _place(scenario, keys, scenario.item_radius, clearance, centres, obstacles):
         raise ScenarioError(
-            f"no room for items that come back (delivery {count}): should be fewer items or robots, or "
-            "a larger warehouse"
+            f"no room for items that come back (delivery {count}): should be fewer items or "
+            "robots, or a larger warehouse"
         )
     return np.asarray(centres[-1])
 
