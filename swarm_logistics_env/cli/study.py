@@ -120,6 +120,23 @@ def export_command(
     typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
 
 
+@study.command("import")
+def import_command(
+    file: Annotated[Path, typer.Argument(help="CSV file, one run a row.")],
+    out: Annotated[Path, typer.Option(help="Directory of the study made of it.")],
+) -> None:
+    """Judge results from elsewhere, e.g. a paper's tables.
+
+    Columns: kind (size, fault, parameter), name, value, delivered; n_robots for faults; policy and
+    seed where known. Without seeds the study is unpaired.
+    """
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.importing import import_results
+
+    typer.echo(f"{import_results(file, out)} runs in {out}\n")
+    _show(Study.stored(out))
+
+
 @study.command("merge")
 def merge_command(
     directories: Annotated[list[Path], typer.Argument(help="Directories of shards of a study.")],

@@ -45,10 +45,10 @@ def _parquet(store: Store, path: Path) -> int:
         "all_delivered": pa.bool_(),
         "delivery_times": pa.list_(pa.float64()),
     }
-    rows = [
-        {**row, "all_delivered": None if row["error"] else bool(row["all_delivered"])}
-        for row in store.rows()
-    ]
+    rows = list(store.rows())
+    for row in rows:
+        if row["all_delivered"] is not None:
+            row["all_delivered"] = bool(row["all_delivered"])
     names = list(rows[0]) if rows else []
     # Named types: a column of failed runs alone would have none.
     schema = pa.schema([(name, numbers.get(name, pa.string())) for name in names])

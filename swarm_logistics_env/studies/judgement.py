@@ -19,6 +19,7 @@ from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.reference import Reference, load_reference
 
 POWER = 0.8
+LEVEL = 0.95
 
 
 @dataclass(frozen=True)
@@ -104,9 +105,11 @@ class Findings:
         plan: of the study.
         cells: every P, in the order of the tables.
         judgements: every comparison, in the order of the tables.
-        exploratory: more seeds than were declared at the study's start, so the verdicts' error
-            level is not the nominal one.
+        exploratory: more seeds than were declared at the study's start, or a look that was not,
+            so the verdicts' error level is not the nominal one.
         outcomes: of the plan's runs, by key, for what P alone does not tell.
+        level: confidence level of the indicators' intervals and verdicts; above 0.95 at a
+            declared look, so that all looks together err in 5 %.
     """
 
     plan: Plan
@@ -115,9 +118,15 @@ class Findings:
     judgements: tuple[Judgement, ...]
     exploratory: bool
     outcomes: Mapping[str, Outcome]
+    level: float = LEVEL
 
 
-def judge(plan: Plan, outcomes: Mapping[str, Outcome], declared_seeds: int) -> Findings:
+def judge(
+    plan: Plan,
+    outcomes: Mapping[str, Outcome],
+    declared_seeds: int,
+    declared_looks: tuple[int, ...] = (),
+) -> Findings:
     """Judge a plan by the outcomes of its runs, keyed by run.
 
     A comparison that needs a run which failed or is missing is blocked, and with it the adjusted
@@ -129,15 +138,30 @@ def judge(plan: Plan, outcomes: Mapping[str, Outcome], declared_seeds: int) -> F
         _cell(policy, table, arm, results[arm.condition.key], reference)
         for policy, table, arm in plan.cells
     )
-    judgements = [_judgement(comparison, results, reference) for comparison in plan.comparisons]
+    level, exploratory = _level(plan, declared_seeds, declared_looks)
+    judgements = [
+        _judgement(comparison, results, reference, level=level, paired=plan.paired)
+        for comparison in plan.comparisons
+    ]
     return Findings(
         plan,
         reference,
         cells,
         _adjusted(judgements),
-        exploratory=len(plan.seeds) > declared_seeds,
+        exploratory=exploratory,
         outcomes=outcomes,
+        level=level,
     )
+
+
+def _level(plan: Plan, declared_seeds: int, declared_looks: tuple[int, ...]) -> tuple[float, bool]:
+    n_seeds = len(plan.seeds)
+    if not declared_looks:
+        return LEVEL, n_seeds > declared_seeds
+    if n_seeds not in declared_looks or plan.specification.looks != declared_looks:
+        return LEVEL, True
+    alphas = spi.look_levels(declared_looks, 1 - LEVEL)
+    return 1 - alphas[declared_looks.index(n_seeds)], False
 
 
 @dataclass(frozen=True)
@@ -152,6 +176,8 @@ def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -
     finished = [outcome for outcome in found if outcome is not None]
     succeeded = [outcome for outcome in finished if outcome.error is None]
     failed, missing = len(finished) - len(succeeded), len(found) - len(finished)
+    if not plan.paired and finished:
+        missing = 0  # such results need not be equally many everywhere
     parts = [
         f"{count} of {len(found)} runs {what}"
         for count, what in ((failed, "failed"), (missing, "missing"))
@@ -178,14 +204,21 @@ def _cell(policy: str, table: str, arm: Arm, result: _Result, reference: Referen
 
 
 def _judgement(
-    comparison: Comparison, results: Mapping[str, _Result], reference: Reference | None
+    comparison: Comparison,
+    results: Mapping[str, _Result],
+    reference: Reference | None,
+    *,
+    level: float,
+    paired: bool,
 ) -> Judgement:
     used = {arm: results[arm.condition.key] for arm in comparison.arms}
     problems = [f"{arm.level}: {used[arm].problem}" for arm in used if used[arm].problem]
     estimate = None
     if not problems:
         try:
-            estimate = comparison.estimate(lambda arm: used[arm].performance)
+            estimate = comparison.estimate(
+                lambda arm: used[arm].performance, level=level, paired=paired
+            )
         except spi.IndicatorError as error:
             problems = [str(error)]
     published = reference.estimate(comparison) if reference else None

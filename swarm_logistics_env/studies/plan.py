@@ -45,6 +45,7 @@ class Plan:
         identities: of the policies, by the part that each plays in the specification.
         twins: pairs without fault, one for the faults of each policy that begin during the run.
         paired: whether all conditions share their seeds.
+        imported_from: name of the file that the results came in; None: they are run here.
     """
 
     specification: Specification
@@ -53,6 +54,7 @@ class Plan:
     identities: Mapping[str, str]
     twins: tuple[Twins, ...] = ()
     paired: bool = True
+    imported_from: str | None = None
 
     @property
     def seeds(self) -> range:

@@ -123,15 +123,16 @@ class Store:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
         condition = run.condition
         failed = outcome.error is not None
-        times = outcome.delivery_times.astype("<f8").tobytes() if outcome.untimed is None else None
         result: tuple[object, ...] = (
             outcome.delivered,
-            times,
+            outcome.delivery_times.astype("<f8").tobytes(),
             outcome.ended_at,
             int(outcome.all_delivered),
             json.dumps(outcome.failed_robots),
             outcome.anchoring_seconds,
         )
+        if outcome.untimed is not None:
+            result = (outcome.untimed, *(None,) * (len(result) - 1))
         with self._transaction():
             self._database.execute(
                 "INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?, ?)",
@@ -208,15 +209,17 @@ class Store:
                 if error is not None:
                     found[run] = Outcome(run, error=error, wall_seconds=wall)
                     continue
+                if times is None:
+                    found[run] = Outcome(run, untimed=count)
+                    continue
                 found[run] = Outcome(
                     run,
-                    delivery_times=np.frombuffer(times or b"", dtype="<f8"),
+                    delivery_times=np.frombuffer(times, dtype="<f8"),
                     ended_at=ended_at,
                     all_delivered=bool(all_delivered),
                     failed_robots=tuple(json.loads(robots)),
                     anchoring_seconds=anchoring,
                     wall_seconds=wall,
-                    untimed=count if times is None else None,
                 )
         return found
 

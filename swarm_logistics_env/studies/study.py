@@ -13,6 +13,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import notes
 from swarm_logistics_env.studies.code_version import code_version
 from swarm_logistics_env.studies.engines import Engine, engine_named
+from swarm_logistics_env.studies.importing import Origin, imported_plan
 from swarm_logistics_env.studies.judgement import Findings, judge
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
@@ -96,7 +97,11 @@ class Study:
         out = Path(out)
         with Store.existing(out) as store:
             noted = notes.planned(store, out)
+            imported = store.note(notes.IMPORTED)
         study = cls._of(Specification.from_json(noted[notes.SPECIFICATION]), out)
+        if imported is not None:
+            study._plan = imported_plan(study.specification, Origin(**json.loads(imported)))
+            return study
         study._plan = make_plan(
             study.specification,
             code=noted[notes.CODE],
@@ -149,6 +154,8 @@ class Study:
             engine = engine_named(engine, processes, address)
         whole = list(shard.of(plan.runs()) if shard else plan.runs())
         with self._store() as store:
+            if store.note(notes.IMPORTED) is not None:
+                raise StudyError(f"the study in {self.out} was imported: run into a new directory")
             if store.note(notes.DECLARED_SEEDS) is None:
                 store.set_note(notes.DECLARED_SEEDS, str(len(plan.seeds)))
                 store.set_note(notes.DECLARED_LOOKS, json.dumps(self.specification.looks))
@@ -174,11 +181,11 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            declared = store.note(notes.DECLARED_SEEDS)
             return judge(
                 plan,
                 store.outcomes(plan.runs()),
-                len(plan.seeds) if declared is None else int(declared),
+                int(store.note(notes.DECLARED_SEEDS) or len(plan.seeds)),
+                tuple(json.loads(store.note(notes.DECLARED_LOOKS) or "[]")),
             )
 
     def results(self) -> pd.DataFrame:
