@@ -47,6 +47,10 @@ SMALL = [
         (["study", "run", "quick", "--out", "x", "--shard", "0/2"], "i/n with i from 1 to n"),
         (["study", "run", "quick", "--out", "x", "--engine", "slurm"], "no engine 'slurm'"),
         (["study", "merge", "nowhere", "--out", "x"], "no study in nowhere"),
+        (["study", "compare", "nowhere", "nowhere", "--fail-if", "R"], "should be [possibly]"),
+        (["study", "compare", "nowhere", "nowhere"], "no study in nowhere"),
+        (["study", "power", "quik"], "did you mean 'quick'?"),
+        (["study", "import", "none.csv", "--out", "x"], "cannot read none.csv"),
         (["study", "plan", "quik"], "did you mean 'quick'?"),
         (["study", "plan", "quick", "--policy", "nobody"], "'nobody'"),
         (["study", "report", "nowhere"], "no study in nowhere"),
@@ -228,6 +232,58 @@ def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
     shards = [str(out / f"shard-{number}-of-2") for number in (1, 2)]
     assert app.run(["study", "merge", *shards, "--out", str(out)]) == 0
     assert stored(out) == 34
+
+
+TABLE = "kind,name,value,n_robots,seed,delivered\n"
+
+
+def imported(path: Path, faulty: tuple[int, ...]) -> str:
+    """A study of four seeds of P_o, P_S and the P_F that are given."""
+    rows = [f"fault,none,0,25,{s},{40 + s}\nfault,removed,1,25,{s},{38 + s}\n" for s in range(4)]
+    rows += [f"fault,FM1,1,25,{seed},{p}\n" for seed, p in enumerate(faulty)]
+    path.with_suffix(".csv").write_text(TABLE + "".join(rows))
+    assert app.run(["study", "import", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
+    return str(path)
+
+
+def test_regression_gate_fails_with_exit_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = imported(tmp_path / "old", (40, 41, 43, 42))
+    new = imported(tmp_path / "new", (20, 22, 21, 23))
+    capsys.readouterr()
+    for arguments, code, words in (
+        ([old, new], 0, "change, FM1, m = 1"),
+        ([old, new, "--fail-if", "R < 0"], 1, "Gate 'R < 0' fails"),
+        ([old, new, "--fail-if", "change < -0.2 at FM1"], 1, "fails"),
+        ([new, old, "--fail-if", "R < 0", "--fail-if", "change < 0"], 0, "passes"),
+    ):
+        assert app.run(["study", "compare", *arguments]) == code
+        assert words in capsys.readouterr().out
+    assert app.run(["study", "compare", old, new, "--fail-if", "S < 0"]) == 2
+    assert "tests nothing" in capsys.readouterr().err
+
+
+def test_power_of_a_stored_study_and_of_a_pilot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored_study = imported(tmp_path / "old", (40, 41, 43, 42))
+    capsys.readouterr()
+    assert app.run(["study", "power", stored_study, "--effect", "-0.1", "--indicator", "R"]) == 0
+    printed = capsys.readouterr().out
+    assert "R > 0, FM1, m = 1 | -0.100 | " in printed
+    assert "FT" not in printed
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        "looks = [10, 20]\nseeds = 10\nscenario = { n_robots = 3, n_items = 4, "
+        "warehouse_width = 3, warehouse_height = 3, delivery_width = 1, duration = 20 }\n"
+        "[[sizes]]\nvalues = [2, 3]\n"
+    )
+    arguments = ["--pilot-seeds", "3", "--processes", "1", "--effect", "1"]
+    assert app.run(["study", "power", str(path), *arguments]) == 0
+    assert "Seeds needed, from 3 seeds" in capsys.readouterr().out
+    assert app.run(["study", "power", str(path), *arguments, "--at", "FM9"]) == 2
+    assert app.run(["study", "power", stored_study, "--power", "2"]) == 2
 
 
 def test_failed_runs_give_exit_code_1_and_a_report(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from swarm_logistics_env.cli import judging  # noqa: F401 - adds its commands to `study`
 from swarm_logistics_env.cli.application import Application
 from swarm_logistics_env.cli.options import PresetOption, SetOption, fault_of, scenario_of
 from swarm_logistics_env.cli.study import study

@@ -24,6 +24,9 @@ SeedsOption = Annotated[
 PolicyOption = Annotated[
     list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
 ]
+ProcessesOption = Annotated[
+    int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
+]
 
 study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
 
@@ -57,9 +60,7 @@ def run_command(
     out: Annotated[Path, typer.Option(help="Directory of its store and report.")],
     seeds: SeedsOption = None,
     policies: PolicyOption = None,
-    processes: Annotated[
-        int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
-    ] = None,
+    processes: ProcessesOption = None,
     engine: Annotated[
         str | None,
         typer.Option(help="local (this process), process, or ray; process if not given."),
@@ -148,15 +149,20 @@ def merge_command(
     typer.echo(f"{merge(directories, out)} runs in {out}")
 
 
-def study_of(asked: str, out: Path | None, seeds: int | None, policies: list[str] | None) -> Study:
-    """Return the study of a file or a preset with the options that were given.
+def study_of(
+    asked: str,
+    out: Path | None,
+    seeds: int | None,
+    policies: list[str] | None,
+    **fields: object,
+) -> Study:
+    """Return the study of a file or a preset with the options and fields that are given.
 
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
     from swarm_logistics_env.studies import Study
 
-    fields: dict[str, object] = {}
     if seeds is not None:
         fields["seeds"] = seeds
     if policies:

@@ -1,0 +1,133 @@
+"""`swarm-logistics study power` and `study compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_logistics_env.cli.study import PolicyOption, ProcessesOption, study, study_of
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.studies.comparing import Answer
+    from swarm_logistics_env.studies.judgement import Findings
+
+AtOption = Annotated[
+    str, typer.Option(metavar="TEXT", help="Only comparisons whose name holds this.")
+]
+
+
+@study.command("power")
+def power_command(
+    asked: Annotated[
+        str,
+        typer.Argument(
+            metavar="DIR|FILE|PRESET",
+            help="Study that was run; or one to play a pilot of, which is not kept.",
+        ),
+    ],
+    effect: Annotated[
+        float | None,
+        typer.Option(help="Assumed true value of the indicator; the paper's if not given."),
+    ] = None,
+    power: Annotated[float, typer.Option(help="Wanted probability of a verdict.")] = 0.8,
+    indicator: Annotated[str | None, typer.Option(help="Only S, FT, R, A or change.")] = None,
+    at: AtOption = "",
+    pilot_seeds: Annotated[int, typer.Option(min=2, help="Seeds of the pilot.")] = 5,
+    policies: PolicyOption = None,
+    processes: ProcessesOption = None,
+) -> None:
+    """Print how many seeds each verdict needs, from a pilot or a study that was run."""
+    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.errors import StudyError
+    from swarm_logistics_env.studies.power import demands
+    from swarm_logistics_env.studies.reporting.sections import Section
+
+    findings = _pilot(asked, pilot_seeds, policies, processes)
+    rows = []
+    for demand in demands(findings, effect, power):
+        comparison = demand.judgement.comparison
+        name = f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}"
+        if indicator not in (None, comparison.indicator) or at not in name:
+            continue
+        rows.append(
+            (
+                comparison.policy,
+                name,
+                "–" if demand.effect is None else f"{demand.effect:.3f}",
+                demand.problem or str(demand.seeds),
+                "–" if demand.detectable is None else f"{demand.detectable:.3f}",
+            )
+        )
+    if not rows:
+        raise StudyError("the study makes no such comparison: leave out --indicator and --at")
+    n_seeds = len(findings.plan.seeds)
+    columns = (
+        "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power",
+        f"distance that {n_seeds} seeds find",
+    )  # fmt: skip
+    show(Section(f"Seeds needed, from {n_seeds} seeds", columns, tuple(rows)))
+
+
+@study.command("compare")
+def compare_command(
+    old: Annotated[Path, typer.Argument(help="Directory of the study to compare with.")],
+    new: Annotated[Path, typer.Argument(help="Directory of the study that is judged.")],
+    fail_if: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="GATE",
+            help="[possibly] S|FT|R|A|change <|> NUMBER [at TEXT]; may be repeated. change is "
+            "(P_new - P_old) / P_old; the others are NEW's. Plain: fails where it is so beyond "
+            "chance; possibly: where that is not ruled out.",
+        ),
+    ] = None,
+) -> None:
+    """Compare two studies, condition by condition; end with 1 if a gate fails."""
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.comparing import answers
+    from swarm_logistics_env.studies.gate import Gate
+
+    gates = [Gate.parse(text) for text in fail_if or []]
+    before, after = (Study.stored(directory).findings() for directory in (old, new))
+    failed = False
+    # What is shown without a gate fails nothing.
+    for gate in gates or [Gate.parse("change < 0")]:
+        said = answers(gate, before, after)
+        fails = bool(gates) and any(answer.fails for answer in said)
+        failed |= fails
+        result = "fails" if fails else "passes"
+        _show_answers(f"Gate {gate.text!r} {result}" if gates else "Change of P", said)
+    raise typer.Exit(1 if failed else 0)
+
+
+def _pilot(asked: str, seeds: int, policies: list[str] | None, processes: int | None) -> Findings:
+    import os
+
+    from swarm_logistics_env.errors import StudyError
+    from swarm_logistics_env.studies import Study
+
+    if Path(asked).is_dir():
+        if policies:
+            raise StudyError("--policy is for a pilot: a study that was run has its own policies")
+        return Study.stored(asked).findings()
+    pilot = study_of(asked, None, seeds, policies, looks=())
+    pilot.run(processes=processes or os.cpu_count() or 1)
+    return pilot.findings()
+
+
+def _show_answers(title: str, said: tuple[Answer, ...]) -> None:
+    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.studies.reporting.sections import Section
+
+    rows = []
+    for answer in said:
+        estimate = answer.estimate
+        value, says = "–", answer.problem or ""
+        if estimate is not None:
+            value, says = f"{estimate.value:.3f}", f"above {estimate.threshold:g}: {answer.verdict}"
+            if estimate.low is not None and estimate.high is not None:
+                value += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
+        rows.append((answer.name, value, says))
+    show(Section(title, ("", "value [95 %]", "verdict under Holm"), tuple(rows)))

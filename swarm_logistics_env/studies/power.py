@@ -1,0 +1,63 @@
+"""Power: how many seeds the claims of a study need, from a pilot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.studies.judgement import Findings, Judgement
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What one comparison needs.
+
+    Attributes:
+        judgement: of the pilot.
+        effect: assumed true value of the indicator: the one named, or the published one.
+        seeds: for a verdict at that effect with the wanted power; None: `problem` says why.
+        detectable: distance from the threshold that the pilot's own seeds would find.
+        problem: why there is no number of seeds.
+    """
+
+    judgement: Judgement
+    effect: float | None
+    seeds: int | None
+    detectable: float | None
+    problem: str | None
+
+
+def demands(
+    findings: Findings, effect: float | None = None, power: float = 0.8
+) -> tuple[Demand, ...]:
+    """Return what every comparison of a study needs, from the spread that its runs show.
+
+    Only the spread is taken from them. The effect is to come from elsewhere: the least that
+    matters, or the published value; never the one that the pilot itself happened to show.
+
+    Args:
+        findings: of the pilot, from at least two seeds.
+        effect: assumed true value of every indicator, in its units; None: the published one.
+        power: wanted probability of a verdict, in (0, 1).
+
+    Raises:
+        IndicatorError: effect not finite, power outside (0, 1).
+    """
+    return tuple(_demand(judgement, effect, power) for judgement in findings.judgements)
+
+
+def _demand(judgement: Judgement, effect: float | None, power: float) -> Demand:
+    assumed = judgement.published if effect is None else effect
+    estimate = judgement.estimate
+    if estimate is None:
+        return Demand(judgement, assumed, None, None, judgement.problem)
+    detectable = spi.minimum_detectable_effect(estimate, power)
+    if assumed is None:
+        return Demand(judgement, None, None, detectable, "no effect is named")
+    return Demand(
+        judgement,
+        assumed,
+        spi.seeds_for_power(estimate, assumed, power),
+        detectable,
+        spi.no_plan_because(estimate, assumed),
+    )

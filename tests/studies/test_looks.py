@@ -1,0 +1,61 @@
+"""Looks declared before the first run: intervals and verdicts at O'Brien-Fleming levels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.studies import Study
+
+FIELDS: dict[str, Any] = {
+    "scenario": {
+        "n_items": 8,
+        "warehouse_width": 3.0,
+        "warehouse_height": 3.0,
+        "delivery_width": 1.0,
+        "duration": 20.0,
+    },
+    "sizes": [{"values": [2, 6]}],
+}
+
+
+def test_each_declared_look_is_taken_at_its_level(tmp_path: Path) -> None:
+    looks = (3, 6)
+    for seeds, alpha in zip(looks, spi.look_levels(looks), strict=True):
+        study = Study(out=tmp_path, seeds=seeds, looks=looks, **FIELDS)
+        study.run()
+        findings = study.findings()
+        assert not findings.exploratory
+        assert findings.level == pytest.approx(1 - alpha)
+        (judgement,) = findings.judgements
+        assert judgement.estimate is not None
+        assert judgement.estimate.level == findings.level
+        assert judgement.estimate.verdict == (
+            spi.verdict_at_look(
+                spi.scalability(
+                    *(cell.performance for cell in findings.cells), n=2, m=4, level=0.95
+                ),
+                looks,
+            ).verdict
+        )
+    assert findings.level < 0.96
+
+
+def test_look_that_was_not_declared_is_exploratory(tmp_path: Path) -> None:
+    Study(out=tmp_path, seeds=2, looks=(2, 4), **FIELDS).run()
+    undeclared: list[dict[str, Any]] = [{"seeds": 3}, {"seeds": 3, "looks": (2, 3)}]
+    for fields in undeclared:
+        study = Study(out=tmp_path, **fields, **FIELDS)
+        study.run()
+        assert study.findings().exploratory
+        assert study.findings().level == 0.95
+
+
+def test_looks_that_are_declared_late_change_nothing(tmp_path: Path) -> None:
+    Study(out=tmp_path, seeds=2, **FIELDS).run()
+    study = Study(out=tmp_path, seeds=3, looks=(3, 6), **FIELDS)
+    study.run()
+    assert study.findings().exploratory
