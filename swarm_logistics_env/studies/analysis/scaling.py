@@ -88,8 +88,8 @@ def steps(findings: Findings, policy: str, table: str) -> Iterator[Step]:
             n_1,
             n_2,
             _scaled(spi.mean_interval(large.performance), 1 / n_2),
-            difference_interval(n_2 / n_1 * small.performance, large.performance),
-            _karp_flatt(small, large, n_1, n_2),
+            _gain(small, large, n_1, n_2, paired=findings.plan.paired),
+            _karp_flatt(small, large, n_1, n_2, paired=findings.plan.paired),
             small.saturated or large.saturated,
         )
 
@@ -127,9 +127,16 @@ def _series(
     return SizeSeries(policy, table, sizes, means, saturated, tuple(fits), problem)
 
 
-def _karp_flatt(small: Cell, large: Cell, n_1: int, n_2: int) -> Interval | None:
+def _gain(small: Cell, large: Cell, n_1: int, n_2: int, *, paired: bool) -> Interval:
+    before, after = n_2 / n_1 * small.performance, large.performance
+    if paired:
+        return difference_interval(before, after)
+    return Interval(float(after.mean() - before.mean()), None, None)
+
+
+def _karp_flatt(small: Cell, large: Cell, n_1: int, n_2: int, *, paired: bool) -> Interval | None:
     try:
-        s = spi.scalability(small.performance, large.performance, n=n_1, m=n_2 - n_1)
+        s = spi.scalability(small.performance, large.performance, n=n_1, m=n_2 - n_1, paired=paired)
     except spi.IndicatorError:
         return None
     # The speed-up X = 1 + S m/N is S's, so Fieller's limits carry over; e falls as X rises.

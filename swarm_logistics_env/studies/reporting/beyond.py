@@ -46,7 +46,7 @@ def _law(fit: ScalingFit) -> tuple[str, ...]:
     law = {"usl": "USL", "power_exponential": "kN^p exp(-qN)"}[fit.law]
     parameters = ", ".join(f"{name} = {value:.3g}" for name, value in fit.parameters.items())
     if fit.peak is None:
-        peak = "none: P rises throughout"
+        peak = "none: the fitted law has no peak"
     else:
         peak = wording.bracketed(Interval(fit.peak, fit.peak_low, fit.peak_high), 1)
     aicc = wording.NOTHING if fit.aicc is None else f"{fit.aicc:.1f}"

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from swarm_logistics_env.studies.analysis.scaling import size_series
 from swarm_logistics_env.studies.judgement import Findings
 from swarm_logistics_env.studies.reporting.beyond import beyond
+from swarm_logistics_env.studies.reporting.beyond_faults import beyond_faults
+from swarm_logistics_env.studies.reporting.compared import compared
 from swarm_logistics_env.studies.reporting.figures import (
     Figure,
     indicator_figures,
@@ -16,7 +18,6 @@ from swarm_logistics_env.studies.reporting.figures import (
 from swarm_logistics_env.studies.reporting.sections import Section, tables, warnings
 from swarm_logistics_env.studies.reporting.sentences import sentence
 from swarm_logistics_env.studies.reporting.setup_sheet import setup_sheet
-
 
 _NAMES = {
     "S": "scalability S",
@@ -99,9 +100,15 @@ def _chapters(findings: Findings) -> Iterator[Chapter]:
         tuple(tables(findings)),
     )
     yield Chapter(
+        "Policies compared",
+        "Side by side, seed by seed; the first policy of the study is the one that the others are "
+        "measured against.",
+        tuple(compared(findings)),
+    )
+    yield Chapter(
         "Beyond the paper",
         "Measures that the paper does not define; none of them enters a verdict above.",
-        tuple(beyond(findings, series)),
+        (*beyond(findings, series), *beyond_faults(findings)),
     )
     yield Chapter("Set-up", "", setup_sheet(findings.plan))
 

@@ -7,18 +7,21 @@ paper `PAPER`, so that a page can put its own colours in their place.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from swarm_logistics_env.spi.scaling import ScalingFit
+from swarm_logistics_env.studies.analysis.resilience import RateCurve
 from swarm_logistics_env.studies.analysis.scaling import SizeSeries
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
+
+Draw: TypeAlias = "Callable[[Canvas], None]"
 
 INK, PAPER = "#1b1b1b", "#ffffff"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
@@ -66,7 +69,7 @@ def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
     for axes, panel in zip(grid[:, 0], panels):
         _panel(axes, panel)
     if len(panels[0].series) > 1:
-        _legend(canvas, grid[0, 0])
+        _legend(canvas, grid[0, 0], lines=False)
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
@@ -102,7 +105,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
             axes.annotate("†", (x, value), (-9, 3), textcoords="offset points", fontsize=9)
     axes.set_xticks(range(len(categories)), categories)
     if len(categories) > 6:
-        axes.tick_params(axis="x", labelsize=7.0)
+        axes.tick_params(axis="x", labelsize=8.0)
     if sum(map(len, categories)) > 75:
         axes.tick_params(axis="x", rotation=40)
     axes.set_xlim(-0.6, len(categories) - 0.4)
@@ -124,7 +127,7 @@ def _range(panel: Panel) -> tuple[float, float]:
     ends = [x for p in points for x in (p.low, p.high) if x is not None and math.isfinite(x)]
     low = max(low - reach, min([low, *ends]))
     high = min(high + reach, max([high, *ends]))
-    margin = 0.06 * (high - low)
+    margin = 0.06 * max(high - low, 0.5)
     return low - margin, high + margin
 
 
@@ -169,30 +172,30 @@ def scaling(canvas: Canvas, series: SizeSeries, fits: Sequence[ScalingFit]) -> N
     """Draw P(N), fitted laws, and N* with its interval at the foot."""
     axes = canvas.subplots()
     grid = size_grid(series.sizes)
-    highest = max([m.value if m.high is None else m.high for m in series.performance])
-    highest = max([highest, *(float(fit.predict(grid).max()) for fit in fits)])
     right = grid[-1]
-    for index, fit in enumerate(fits):
-        colour, line = COLOURS[index + 1], LINES[index]
-        axes.plot(grid, fit.predict(grid), line, color=colour, label=LAWS[fit.law], linewidth=1.6)
+    curves = {fit.law: fit.predict(grid) for fit in fits}
+    tops = [mean.value if mean.high is None else mean.high for mean in series.performance]
+    highest = max([*tops, *(float(curve.max()) for curve in curves.values()), 1.0])
+    for fit in sorted(fits, key=lambda fit: list(LAWS).index(fit.law)):
+        place = list(LAWS).index(fit.law)
+        colour, marker = COLOURS[place + 1], MARKERS[place + 1]
+        axes.plot(
+            grid, curves[fit.law], LINES[place], color=colour, label=LAWS[fit.law], linewidth=1.6
+        )
         if fit.peak is None or fit.peak_low is None or fit.peak_high is None:
             continue
-        height = -(0.06 + 0.07 * index) * highest
-        low, high = max(fit.peak_low, 0.0), min(fit.peak_high, right)
+        height = -(0.06 + 0.07 * place) * highest
+        low, high = min(fit.peak_low, right), min(fit.peak_high, right)
         axes.plot([low, high], [height, height], color=colour, linewidth=1.6)
         axes.plot(low, height, "|", color=colour, markersize=7)
+        goes_on = fit.peak_high > right
         axes.plot(
-            high,
-            height,
-            ">" if fit.peak_high > right else "|",
-            color=colour,
-            markersize=6,
-            clip_on=False,
+            high, height, ">" if goes_on else "|", color=colour, markersize=6, clip_on=not goes_on
         )
         if fit.peak <= right:
-            axes.plot(fit.peak, height, MARKERS[index + 1], color=colour, markersize=6)
+            axes.plot(fit.peak, height, marker, color=colour, markersize=6)
     means = [(float(size), mean) for size, mean in zip(series.sizes, series.performance)]
-    _bars(axes, [(n, mean.low, mean.high) for n, mean in means], (-math.inf, math.inf), COLOURS[0])
+    _bars(axes, [(n, mean.low, mean.high) for n, mean in means], (0.0, math.inf), COLOURS[0])
     axes.plot(
         *_columns([(n, mean.value) for n, mean in means]),
         MARKERS[0],
@@ -212,10 +215,10 @@ def scaling(canvas: Canvas, series: SizeSeries, fits: Sequence[ScalingFit]) -> N
     axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= 1.08 * highest])
     axes.set(xlabel="swarm size N [robots]", ylabel="P [items]")
     axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
-    _legend(canvas, axes)
+    _legend(canvas, axes, lines=True)
 
 
-def _legend(canvas: Canvas, axes: Axes) -> None:
+def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
     handles, labels = axes.get_legend_handles_labels()
     canvas.legend(
         handles,
@@ -223,6 +226,46 @@ def _legend(canvas: Canvas, axes: Axes) -> None:
         loc="outside upper left",
         ncols=min(len(labels), 3),
         frameon=False,
-        handletextpad=0.4,
+        handlelength=2.6 if lines else 1.0,
+        handletextpad=0.5,
         columnspacing=1.2,
     )
+
+
+@dataclass(frozen=True)
+class RatePanel:
+    """Delivery rates of paired runs around one fault."""
+
+    title: str
+    curves: tuple[RateCurve, ...]
+
+
+def rates(canvas: Canvas, panels: Sequence[RatePanel], onset: float, y_label: str) -> None:
+    """Draw deliveries over time, one panel below the other, on one scale."""
+    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
+    for axes, panel in zip(grid[:, 0], panels):
+        for index, curve in enumerate(panel.curves):
+            colour = COLOURS[index % len(COLOURS)]
+            known = [(r.low, r.high) for r in curve.rates]
+            if all(low is not None and high is not None for low, high in known):
+                low = [max(0.0, end or 0.0) for end, _ in known]
+                high = [end or 0.0 for _, end in known]
+                axes.fill_between(curve.seconds, low, high, color=colour, alpha=0.16, linewidth=0)
+            axes.plot(
+                curve.seconds,
+                [rate.value for rate in curve.rates],
+                LINES[index % len(LINES)],
+                color=colour,
+                marker=MARKERS[index % len(MARKERS)],
+                markevery=(index * 4, 12),
+                markersize=4.5,
+                linewidth=1.6,
+                label=curve.label,
+            )
+        axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
+        axes.set_ylim(bottom=0.0)
+        axes.set(ylabel=y_label)
+        axes.set_title(panel.title, fontsize="medium", loc="left")
+        axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
+    grid[-1, 0].set_xlabel("end of the window [s]")
+    _legend(canvas, grid[0, 0], lines=True)

@@ -5,16 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from swarm_logistics_env.studies.analysis.scaling import SizeSeries
 from swarm_logistics_env.studies.judgement import Findings, Judgement
 from swarm_logistics_env.studies.reporting import drawing
 from swarm_logistics_env.studies.reporting.drawing import Panel, Point, Series
 from swarm_logistics_env.studies.reporting.wording import decided, seeds_text
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Canvas
 
 _Key = TypeVar("_Key")
 Value = str | float | int | bool | None
@@ -37,7 +34,7 @@ class Figure:
     columns: tuple[str, ...]
     rows: tuple[tuple[Value, ...], ...]
     height: float
-    draw: Callable[[Canvas], None]
+    draw: drawing.Draw
 
 
 MARKS = (
@@ -64,7 +61,7 @@ def _scalability(findings: Findings) -> Iterator[Figure]:
         panel = Panel("", "scalability S", tuple(series), (0.0, 1.0), "swarm size N → N + m")
         yield _intervals(
             findings,
-            _slug("S", table),
+            slug("S", table),
             f"{table}: scalability S per step in N; above 0 scalable, above 1 superlinear.",
             here,
             (panel,),
@@ -95,7 +92,7 @@ def _faults(findings: Findings) -> Iterator[Figure]:
         start = f", faults from {onset:g} s" if onset else ""
         yield _intervals(
             findings,
-            _slug("FT-R", policy, table, f"{onset:g}s" if onset else ""),
+            slug("FT-R", policy, table, f"{onset:g}s" if onset else ""),
             f"{policy}, {table}, N = {swarm}{start}: fault tolerance FT and robustness R per "
             "failure mode and number m of faulty robots; above 0 tolerant, robust.",
             here,
@@ -143,7 +140,7 @@ def scaling_figure(findings: Findings, series: SizeSeries) -> Figure:
         else ("one run each, so no intervals")
     )
     return Figure(
-        _slug("P-N", series.policy or "published", series.table),
+        slug("P-N", series.policy or "published", series.table),
         f"{who}, {series.table}: P against swarm size N ({seeds}); lines: scaling laws fitted with "
         "weights 1/P; bars at the foot: N* of each with its 95 % interval, an arrow where it goes "
         "on." + _saturation(any(series.saturated)),
@@ -233,7 +230,7 @@ def _points(
 
 def _step(judgement: Judgement) -> str:
     before, after = judgement.comparison.original.level, judgement.comparison.changed.level
-    return f"{before.value:g} → {after.value:g}"
+    return f"{before.value:g}→{after.value:g}"
 
 
 def _tables(judgements: list[Judgement]) -> tuple[str, ...]:
@@ -249,5 +246,6 @@ def _grouped(
     return list(groups.items())
 
 
-def _slug(*parts: str) -> str:
+def slug(*parts: str) -> str:
+    """Return a name for files of letters, digits and hyphens."""
     return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(parts)).strip("-")

@@ -161,16 +161,11 @@ def _claims(findings: Findings, policy: str) -> Iterator[Section]:
         "seeds for 80 % power at the paper's value",
     )  # fmt: skip
     lines = (
-        f"Unadjusted: {_counted(plain)}.",
-        f"Under Holm, family = all comparisons of one indicator: {_counted(adjusted)}.",
+        f"Unadjusted: {wording.counted(plain)}.",
+        f"Under Holm, family = all comparisons of one indicator: {wording.counted(adjusted)}.",
         'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
     )
     yield Section(f"{policy}: claims", columns, tuple(rows), lines)
-
-
-def _counted(verdicts: Counter[str]) -> str:
-    order = ("supported", "refuted", "inconclusive", "blocked")
-    return ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in order if verdicts[verdict])
 
 
 def _reproduction(figure: Reproduction) -> Section:

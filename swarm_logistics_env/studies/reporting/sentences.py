@@ -64,7 +64,8 @@ def _interval(estimate: Estimate) -> str:
     level = f"{100 * estimate.level:g} %"
     if estimate.low is None or estimate.high is None:
         return f"{estimate.value:.3f} (no interval)"
-    return f"{estimate.value:.3f}, {level} interval [{estimate.low:.3f}, {estimate.high:.3f}]"
+    low, high = wording.fixed(estimate.low, 3), wording.fixed(estimate.high, 3)
+    return f"{wording.fixed(estimate.value, 3)}, {level} interval [{low}, {high}]"
 
 
 def _seeds(findings: Findings, estimate: Estimate) -> str:

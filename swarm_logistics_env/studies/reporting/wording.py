@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 
 from swarm_logistics_env.spi.estimate import Verdict
 from swarm_logistics_env.spi.summaries import Interval
@@ -53,11 +54,12 @@ def bracketed(interval: Interval | None, digits: int) -> str:
     """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
     if interval is None:
         return NOTHING
-    value, low, high = (None if x is None else _fixed(x, digits) for x in interval)
+    value, low, high = (None if x is None else fixed(x, digits) for x in interval)
     return f"{value}" if low is None or high is None else f"{value} [{low}, {high}]"
 
 
-def _fixed(value: float, digits: int) -> str:
+def fixed(value: float, digits: int) -> str:
+    """Return a number to so many digits; infinity as its sign."""
     if math.isinf(value):
         return "∞" if value > 0 else "-∞"
     # "+ 0.0" after rounding: no minus sign before a zero.
@@ -82,9 +84,7 @@ def ratio(judgement: Judgement) -> str:
     if estimate is None:
         return NOTHING
     mark = SATURATED if judgement.saturated else ""
-    if estimate.low is None or estimate.high is None:
-        return f"{estimate.value:.3f}{mark}"
-    return f"{estimate.value:.3f} [{estimate.low:.3f}, {estimate.high:.3f}]{mark}"
+    return bracketed(Interval(estimate.value, estimate.low, estimate.high), 3) + mark
 
 
 def verdict(judgement: Judgement) -> str:
@@ -118,6 +118,14 @@ def decided(judgement: Judgement) -> bool:
 def seeds_text(findings: Findings) -> str:
     """Return over which seeds everything is, e.g. "20 paired seeds (0 to 19)"."""
     seeds = findings.plan.seeds
+    if not findings.plan.paired:
+        return f"{len(seeds)} unpaired {'run' if len(seeds) == 1 else 'runs'} a condition"
     if len(seeds) == 1:
         return f"one seed ({seeds[0]})"
     return f"{len(seeds)} paired seeds ({seeds[0]} to {seeds[-1]})"
+
+
+def counted(verdicts: Counter[str]) -> str:
+    """Return how many of each verdict, e.g. "7 supported, 1 refuted"."""
+    order = ("supported", "refuted", "inconclusive", "blocked")
+    return ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in order if verdicts[verdict])
