@@ -41,6 +41,40 @@ def cell_along(coordinate: float, cell: float, n_cells: int) -> int:
 
 
 @kernel
+def look_around(
+    x: float,
+    y: float,
+    reach: float,
+    position: NDArray[np.float64],
+    cell: float,
+    size: NDArray[np.int64],
+    start: NDArray[np.int64],
+    members: NDArray[np.int64],
+    found: NDArray[np.int64],
+    squares: NDArray[np.float64],
+) -> int:
+    """List the points within `reach` [m] of (x, y); returns how many there are.
+
+    `found` and `squares`, longer than there are points, get their numbers and the squares of
+    their distances [m^2].
+    """
+    n_found, limit = 0, reach * reach
+    left = cell_along(x - reach, cell, size[0])
+    right = cell_along(x + reach, cell, size[0])
+    top = cell_along(y + reach, cell, size[1])
+    for row in range(cell_along(y - reach, cell, size[1]), top + 1):
+        for index in range(start[row * size[0] + left], start[row * size[0] + right + 1]):
+            point = members[index]
+            dx, dy = position[point, 0] - x, position[point, 1] - y
+            square = dx * dx + dy * dy
+            # Written always and counted only if near: no branch to mispredict.
+            found[n_found] = point
+            squares[n_found] = square
+            n_found += 1 if square <= limit else 0
+    return n_found
+
+
+@kernel
 def fill(
     position: NDArray[np.float64],
     included: NDArray[np.bool_],

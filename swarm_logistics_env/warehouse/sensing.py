@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, pair_key, uniform
-from swarm_logistics_env.warehouse.grid import cell_along
+from swarm_logistics_env.warehouse.grid import cell_along, look_around
 from swarm_logistics_env.warehouse.state import NOBODY
 
 _TOUCH = 0.01  # [m], gap below which two things touch
@@ -176,6 +176,7 @@ def sense(
     Returns how many robots that have not failed touch one that has.
     """
     n_things = max(position.shape[0], item_position.shape[0]) + 1
+    found, squares = np.empty(n_things, np.int64), np.empty(n_things)
     near, near_squares = np.empty(n_things, np.int64), np.empty(n_things)
     rows[:, :] = 0.0
     n_anchored = 0
@@ -287,30 +288,29 @@ def sense(
         touch_square = (touch + item_radius) ** 2
         reach = max(ranger_range[me] + item_radius, view_range[me], touch + item_radius)
         n_items = 0
-        left = cell_along(x - reach, item_cell, item_size[0])
-        right = cell_along(x + reach, item_cell, item_size[0])
-        for cells in range(
-            cell_along(y - reach, item_cell, item_size[1]),
-            cell_along(y + reach, item_cell, item_size[1]) + 1,
-        ):
-            first = item_start[cells * item_size[0] + left]
-            for index in range(first, item_start[cells * item_size[0] + right + 1]):
-                item = item_members[index]
+        scanned = (ranger_range[me] + item_radius) ** 2 if sees_ranges else 0.0
+        n_found = look_around(
+            x, y, reach, item_position, item_cell, item_size, item_start, item_members,
+            found, squares,
+        )  # fmt: skip
+        for index in range(n_found):
+            item, square = found[index], squares[index]
+            if square < scanned:
                 dx, dy = item_position[item, 0] - x, item_position[item, 1] - y
-                square = dx * dx + dy * dy
-                if square < scan_square:
-                    scan_disc(
-                        dx * cosine + dy * sine, dy * cosine - dx * sine,
-                        square, item_radius, scan_items,
-                    )  # fmt: skip
-                if square < touch_square and robot_item[me] != NOBODY:
-                    touches = True
-                is_seen = square <= view_square
-                if is_seen and dropout > 0.0:
-                    is_seen = not is_missed(keys[me], item, step, _ITEM_SEEN, dropout)
-                if is_seen:
-                    near[n_items], near_squares[n_items] = item, square
-                    n_items += 1
+                scan_disc(
+                    dx * cosine + dy * sine, dy * cosine - dx * sine,
+                    square, item_radius, scan_items,
+                )  # fmt: skip
+            if square > view_square and square >= touch_square:
+                continue
+            if square < touch_square and robot_item[me] != NOBODY:
+                touches = True
+            is_seen = square <= view_square
+            if is_seen and dropout > 0.0:
+                is_seen = not is_missed(keys[me], item, step, _ITEM_SEEN, dropout)
+            if is_seen:
+                near[n_items], near_squares[n_items] = item, square
+                n_items += 1
         for place in range(nearest_first(near_squares, near, n_items, _N_ITEMS)):
             item = near[place]
             dx, dy = item_position[item, 0] - x, item_position[item, 1] - y
