@@ -17,10 +17,10 @@ ROOT = Path(__file__).parents[1]
 
 FOUNDATION = {"errors", "records", "streams", "kernels", "scenario"}
 WORLD = FOUNDATION | {"warehouse", "observations"}
-RUNS = WORLD | {"policies", "episode"}
+RUNS = WORLD | {"hearing", "policies", "episode"}
 ENVIRONMENT = WORLD | {
     "rewards", "central_state", "dict_view", "reset_options", "env", "rendering",
-    "swarm_logistics_v0",
+    "swarm_logistics_v0", "hearing",
 }  # fmt: skip
 
 # What each part of the package (a module or folder of its top level) may import besides itself.
@@ -42,7 +42,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "swarm_logistics_v0": WORLD | {"rewards", "env"},
     "wrappers": ENVIRONMENT | {"spi"},
     "adapters": ENVIRONMENT | {"wrappers"},
-    "policies": WORLD,
+    "hearing": FOUNDATION | {"warehouse"},
+    "policies": WORLD | {"hearing"},
     "episode": WORLD | {"policies"},
     "spi": set(),
     "studies": RUNS | {"spi"},

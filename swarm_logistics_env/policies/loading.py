@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env.errors import PolicyError, suggest
+from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.records import Record
@@ -24,6 +25,7 @@ NAMES: dict[str, Callable[..., Policy]] = {
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
     # Swarm D-T without its taxis: the ablation.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
+    "central": Central,
 }
 
 

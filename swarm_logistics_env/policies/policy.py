@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.hearing import as_heard
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -18,7 +19,8 @@ class Policy(Protocol):
     A policy may also have
 
     * `needs_state = True`: `act` gets the WarehouseState as a second argument (a central
-      controller that sees everything);
+      controller that sees everything); robots that do not hear get no commands then, see
+      `as_heard`;
     * `configure(scenario)`: called before `reset`, for what a robot's maker writes into it, such
       as its control period;
     * `identity`: text that names everything its behaviour depends on (see `identity`).
@@ -44,11 +46,11 @@ def decide(
 ) -> NDArray[np.float64]:
     """Return the commands of `policy`, with the state for those that need it.
 
+    A policy that needs the state is a central controller: its commands reach robots that hear.
+
     Raises:
         PolicyError: it returned something other than finite numbers of shape (N, >= 4).
     """
     if getattr(policy, "needs_state", False):
-        commands = policy.act(observations, state)  # type: ignore[call-arg]
-    else:
-        commands = policy.act(observations)
-    return commands
+        return as_heard(policy.act(observations, state), state)  # type: ignore[call-arg]
+    return policy.act(observations)

@@ -1,0 +1,237 @@
+"""A central controller that sees the whole warehouse: what a swarm is compared with.
+
+One robot at a time works on the request: the best one fetches the item and takes it home, on the
+cheapest way around free items and other robots. All others wait right under free items, spread
+out, so that somebody is always near, and nobody is where a laden robot could drive. Who fails is
+not known to it; a robot that gets no further is not trusted for a while and another one is sent.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, ahead, costs, ways
+from swarm_logistics_env.policies.waiting import WaitingPlaces
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+
+CELL = 0.125  # [m]
+MARGIN = 0.03  # [m] kept from what a laden robot must not touch
+LOOKAHEAD = 16  # cells
+REPLAN = 0.3  # [s]
+PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
+DISTRUST = 30.0  # [s]
+PERSONAL_SPACE = 0.6  # [m] between centres, which waiting robots try to keep
+
+
+class Central:
+    """Scripted central controller; needs the state.
+
+    Example:
+        >>> from swarm_logistics_env import run_episode
+        >>> run_episode(Scenario(n_robots=5, duration=20.0), Central(), seed=0).delivered > 0
+        True
+    """
+
+    needs_state = True
+
+    def __init__(self) -> None:
+        self._scenario = Scenario()
+        self.reset(0, 0)
+
+    def configure(self, scenario: Scenario) -> None:
+        """Take the building's plan and the robots' build."""
+        self._scenario = scenario
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode; nothing here is random."""
+        self._trusted_from = np.full(n_robots, -np.inf)  # [s]
+        self._waiting = WaitingPlaces(n_robots)
+        self._worker = NOBODY
+        self._task: tuple[int, bool] = (NOBODY, False)
+        self._best, self._best_at = np.inf, 0.0
+        self._planned_at = -np.inf
+
+    def act(
+        self, observations: NDArray[np.float32], state: WarehouseState | None = None
+    ) -> NDArray[np.float64]:
+        """Return commands (N, 4) from the state alone.
+
+        Raises:
+            PolicyError: there is no state, or one of more or fewer robots than `reset` was told.
+        """
+        if state is None:
+            raise PolicyError("state = None: should be the WarehouseState, as needs_state says")
+        if state.n_robots != len(self._trusted_from):
+            raise PolicyError(
+                f"a state of {state.n_robots} robots: reset was told {len(self._trusted_from)}"
+            )
+        worker = self._assign(state)
+        goals, is_under_item = self._waiting.places(state, worker, self._scenario)
+        velocity = self._drift(state, goals, is_under_item, worker)
+        gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
+        if worker != NOBODY:
+            velocity[worker] = self._on_its_way(state, worker)
+            gripper[worker] = 1.0 if self._may_hold(state, worker) else 0.0
+        return self._steer(state, velocity, gripper)
+
+    # -- who -----------------------------------------------------------------------------------
+
+    def _assign(self, state: WarehouseState) -> int:
+        item = state.requested
+        if item == NOBODY:
+            return NOBODY
+        carrier = int(state.item_carrier[item])
+        if self._worker != NOBODY and self._task == (item, carrier != NOBODY):
+            self._judge(state)
+        is_trusted = self._trusted_from <= state.time
+        if carrier != NOBODY:
+            worker = carrier if is_trusted[carrier] else NOBODY
+        else:
+            worker = self._nearest(state, item, is_trusted)
+        task = (item, carrier != NOBODY)
+        if worker != self._worker or task != self._task:
+            self._worker, self._task = worker, task
+            self._best, self._best_at = np.inf, state.time
+            self._planned_at = -np.inf
+        return worker
+
+    def _nearest(self, state: WarehouseState, item: int, is_trusted: NDArray[np.bool_]) -> int:
+        free = state.robot_present & (state.robot_item == NOBODY)
+        if not free.any():
+            return NOBODY
+        able = free & is_trusted if (free & is_trusted).any() else free
+        away = np.linalg.norm(state.robot_position - state.item_position[item], axis=1)
+        if self._worker != NOBODY and able[self._worker]:
+            away[self._worker] -= 0.5  # no dithering between two that are as near
+        return int(np.where(able, away, np.inf).argmin())
+
+    def _judge(self, state: WarehouseState) -> None:
+        """Lose trust in a worker that gets no nearer to where it should."""
+        left = self._left(state)
+        if left < self._best - 0.05:
+            self._best, self._best_at = left, state.time
+        elif state.time > self._best_at + PATIENCE:
+            self._trusted_from[self._worker] = state.time + DISTRUST
+
+    def _left(self, state: WarehouseState) -> float:
+        x, y = state.robot_position[self._worker].tolist()
+        if not self._task[1]:
+            return math.dist((x, y), state.item_position[self._task[0]].tolist())
+        if self._planned_at < 0:
+            return np.inf
+        row = min(max(int(y / CELL), 0), len(self._far) - 1)
+        column = min(max(int(x / CELL), 0), self._far.shape[1] - 1)
+        return float(self._far[row, column]) * CELL
+
+    def _may_hold(self, state: WarehouseState, worker: int) -> bool:
+        if self._task[1]:
+            return True
+        away = state.robot_position[worker] - state.item_position[self._task[0]]
+        # The requested item comes first where several are in reach, so nothing else gets lifted.
+        return math.hypot(*away.tolist()) <= self._scenario.pickup_range
+
+    # -- where to ------------------------------------------------------------------------------
+
+    def _on_its_way(self, state: WarehouseState, worker: int) -> NDArray[np.float64]:
+        scenario, (item, carries) = self._scenario, self._task
+        x, y = state.robot_position[worker].tolist()
+        if carries and x >= scenario.storage_width:
+            return np.array([1.0, 0.0])  # the area may have become narrower
+        if not carries and math.dist((x, y), state.item_position[item].tolist()) < 0.3:
+            return self._towards(state.robot_position[worker], state.item_position[item])
+        if state.time >= self._planned_at + REPLAN - 1e-6:
+            self._plan(state, worker)
+        waypoint = ahead(self._cost, self._far, CELL, x, y, LOOKAHEAD)
+        if carries and waypoint[0] >= scenario.storage_width - CELL:
+            waypoint = (waypoint[0] + 1.0, waypoint[1])  # no braking at the edge
+        return self._towards(state.robot_position[worker], np.array(waypoint))
+
+    def _plan(self, state: WarehouseState, worker: int) -> None:
+        scenario, (item, carries) = self._scenario, self._task
+        others = state.robot_present.copy()
+        others[worker] = False
+        discs = [_discs(state.robot_position[others], scenario.robot_radius, CROWDED)]
+        discs += [_discs(state.obstacle_position, scenario.obstacle_radius, BLOCKED)]
+        if carries:
+            stored = state.item_position[state.item_status == STORED]
+            discs += [_discs(stored, scenario.item_radius, BLOCKED)]
+        around = np.vstack(discs)
+        around[:, 2] += scenario.robot_radius + MARGIN
+        self._cost = costs(
+            scenario.warehouse_width,
+            scenario.warehouse_height,
+            CELL,
+            scenario.robot_radius,
+            around,
+        )
+        goal = np.zeros(self._cost.shape, np.bool_)
+        if carries:
+            goal[:, int(scenario.storage_width / CELL) :] = True
+        else:
+            x, y = state.item_position[item].tolist()
+            goal[min(int(y / CELL), goal.shape[0] - 1), min(int(x / CELL), goal.shape[1] - 1)] = (
+                True
+            )
+        self._far = ways(self._cost, goal)
+        self._planned_at = state.time
+
+    # -- how -----------------------------------------------------------------------------------
+
+    def _drift(
+        self,
+        state: WarehouseState,
+        goals: NDArray[np.float64],
+        is_under_item: NDArray[np.bool_],
+        worker: int,
+    ) -> NDArray[np.float64]:
+        """Return velocities (N, 2), in top speeds, of robots on their way to where they wait."""
+        position = state.robot_position
+        velocity = self._towards(position, goals)
+        between = position[:, None] - position  # from other to robot
+        away = np.linalg.norm(between, axis=2)
+        away[:, ~state.robot_present] = np.inf
+        np.fill_diagonal(away, np.inf)
+        push = np.clip(1.0 - away / PERSONAL_SPACE, 0.0, None) / np.maximum(away, 1e-6)
+        if worker != NOBODY:
+            push[:, worker] *= 3.0
+        shove = np.einsum("ij,ijk->ik", push, between)
+        is_there = is_under_item & (np.linalg.norm(position - goals, axis=1) < 0.1)
+        # Whoever waits under an item is in nobody's way that the item is not in.
+        shove[is_there] = 0.0
+        # Pass on the right, so that two who meet get past each other.
+        velocity += shove + 0.5 * np.stack([shove[:, 1], -shove[:, 0]], axis=1)
+        norm = np.linalg.norm(velocity, axis=1, keepdims=True)
+        return np.asarray(velocity / np.maximum(norm, 1.0))
+
+    def _towards(
+        self, position: NDArray[np.float64], goal: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the velocity, in top speeds, that gets there in one control step if it can."""
+        way = (goal - position) / (self._scenario.max_speed * self._scenario.control_period)
+        return np.asarray(way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1.0))
+
+    def _steer(
+        self,
+        state: WarehouseState,
+        velocity: NDArray[np.float64],
+        gripper: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        cosine, sine = np.cos(state.robot_heading), np.sin(state.robot_heading)
+        forward = cosine * velocity[:, 0] + sine * velocity[:, 1]
+        left = cosine * velocity[:, 1] - sine * velocity[:, 0]
+        turn = np.zeros(len(forward))
+        if self._scenario.drive == "differential":
+            full_turn = self._scenario.max_turn_rate * self._scenario.control_period
+            turn = np.clip(np.arctan2(left, forward) / full_turn, -1.0, 1.0)
+            forward = np.maximum(forward, 0.0)
+            left[:] = 0.0
+        return np.stack([forward, left, turn, gripper], axis=1)
+
+
+def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:
+    return np.column_stack([centres, np.tile([radius, cost], (len(centres), 1))])

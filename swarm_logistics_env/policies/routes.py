@@ -1,0 +1,126 @@
+"""Ways around obstacles on a grid of cells, for a controller that sees the whole warehouse."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.kernels import kernel
+
+BLOCKED = 40.0  # times the cost of an open cell: a way through is better than none
+CROWDED = 4.0
+
+
+@kernel
+def costs(
+    width: float, height: float, cell: float, radius: float, discs: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return what it costs a robot of `radius` to have its centre in each cell, (rows, columns).
+
+    1 in the open, `BLOCKED` along the walls, and what they say within `discs` (S, 4): x, y and
+    radius [m], cost.
+    """
+    rows, columns = math.ceil(height / cell), math.ceil(width / cell)
+    cost = np.ones((rows, columns))
+    for disc in range(discs.shape[0]):
+        x, y, reach = discs[disc, 0], discs[disc, 1], discs[disc, 2]
+        for row in range(max(int((y - reach) / cell), 0), min(int((y + reach) / cell) + 1, rows)):
+            for column in range(
+                max(int((x - reach) / cell), 0), min(int((x + reach) / cell) + 1, columns)
+            ):
+                dx, dy = (column + 0.5) * cell - x, (row + 0.5) * cell - y
+                if dx * dx + dy * dy < reach * reach:
+                    cost[row, column] = max(cost[row, column], discs[disc, 3])
+    for row in range(rows):
+        y = (row + 0.5) * cell
+        for column in range(columns):
+            x = (column + 0.5) * cell
+            if x < radius or y < radius or x > width - radius or y > height - radius:
+                cost[row, column] = BLOCKED
+    return cost
+
+
+@kernel
+def ways(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the cost of the cheapest way from each cell to a `goal` cell, in cells.
+
+    Sweeps over the grid in four orders until nothing gets cheaper, which in the open takes few.
+    """
+    rows, columns = cost.shape
+    far = np.where(goal, 0.0, np.inf)
+    while True:
+        has_changed = False
+        for order in range(4):
+            for i in range(rows):
+                row = i if order % 2 == 0 else rows - 1 - i
+                for j in range(columns):
+                    column = j if order < 2 else columns - 1 - j
+                    best = far[row, column]
+                    for down in range(-1, 2):
+                        for right in range(-1, 2):
+                            r, c = row + down, column + right
+                            if r < 0 or c < 0 or r >= rows or c >= columns:
+                                continue
+                            length = 1.4142135623730951 if down != 0 and right != 0 else 1.0
+                            through = far[r, c] + length * cost[row, column]
+                            best = min(best, through)
+                    if best < far[row, column] - 1e-9:
+                        far[row, column] = best
+                        has_changed = True
+        if not has_changed:
+            return far
+
+
+@kernel
+def ahead(
+    cost: NDArray[np.float64],
+    far: NDArray[np.float64],
+    cell: float,
+    x: float,
+    y: float,
+    n_cells: int,
+) -> tuple[float, float]:
+    """Return where to head for from (x, y) [m]: the farthest of the next cells in a straight line.
+
+    A line counts as straight as long as no cell on it costs more than those the way leads through.
+    """
+    rows, columns = cost.shape
+    first_row = row = min(max(int(y / cell), 0), rows - 1)
+    first_column = column = min(max(int(x / cell), 0), columns - 1)
+    goal_x, goal_y = (column + 0.5) * cell, (row + 0.5) * cell
+    dearest = 1.0
+    for step in range(n_cells):
+        next_row, next_column, least = row, column, far[row, column] + 1e-9
+        for down in range(-1, 2):
+            for right in range(-1, 2):
+                r, c = row + down, column + right
+                if r < 0 or c < 0 or r >= rows or c >= columns or (down == 0 and right == 0):
+                    continue
+                length = 1.4142135623730951 if down != 0 and right != 0 else 1.0
+                through = far[r, c] + length * cost[row, column]
+                if through < least:
+                    next_row, next_column, least = r, c, through
+        if next_row == row and next_column == column:
+            break
+        row, column = next_row, next_column
+        dearest = max(dearest, cost[row, column])
+        to_x, to_y = (column + 0.5) * cell, (row + 0.5) * cell
+        length = math.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
+        n_samples = int(length / (0.4 * cell)) + 1
+        is_open = True
+        for sample in range(1, n_samples + 1):
+            part = sample / n_samples
+            r = min(max(int((y + part * (to_y - y)) / cell), 0), rows - 1)
+            c = min(max(int((x + part * (to_x - x)) / cell), 0), columns - 1)
+            is_first = r == first_row and c == first_column
+            if not is_first and cost[r, c] > dearest:
+                is_open = False
+                break
+        if not is_open and step > 0:
+            break
+        goal_x, goal_y = to_x, to_y
+        if cost[row, column] >= BLOCKED:
+            break
+    return goal_x, goal_y

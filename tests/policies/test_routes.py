@@ -1,0 +1,84 @@
+"""Ways on a grid."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, ahead, costs, ways
+
+CELL = 0.1
+NOTHING = np.zeros((0, 2))
+
+
+def grid(solid: NDArray[np.float64], crowd: NDArray[np.float64] = NOTHING) -> NDArray[np.float64]:
+    discs = [[*place, 0.25, BLOCKED] for place in solid.tolist()]
+    discs += [[*place, 0.25, CROWDED] for place in crowd.tolist()]
+    return costs(4.0, 2.0, CELL, 0.1, np.array(discs).reshape(-1, 4))
+
+
+def travelled(cost: NDArray[np.float64], x: float, y: float) -> list[tuple[float, float]]:
+    """Follow the way to the right-hand edge."""
+    goal = np.zeros(cost.shape, np.bool_)
+    goal[:, -3:] = True
+    far = ways(cost, goal)
+    places = [(x, y)]
+    while x < 3.7 and len(places) < 400:
+        to_x, to_y = ahead(cost, far, CELL, x, y, 10)
+        length = math.dist((x, y), (to_x, to_y))
+        stride = min(0.05, length)
+        x, y = x + stride * (to_x - x) / length, y + stride * (to_y - y) / length
+        places.append((x, y))
+    return places
+
+
+def test_costs_mark_what_is_in_the_way() -> None:
+    cost = grid(np.array([[1.0, 1.0]]), np.array([[3.0, 1.0]]))
+    assert cost.shape == (20, 40)
+    assert cost[10, 10] == BLOCKED
+    assert cost[10, 30] == CROWDED
+    assert cost[10, 20] == 1.0
+    assert cost[0, 20] == cost[19, 20] == cost[10, 0] == cost[10, 39] == BLOCKED
+    marked = np.argwhere(cost[2:18, 2:20] == BLOCKED) + 2.5
+    distances = np.hypot(*(marked * CELL - 1.0).T)
+    assert len(marked) > 10
+    assert (distances < 0.25).all()
+
+
+def test_a_way_in_the_open_is_as_long_as_it_looks() -> None:
+    goal = np.zeros((20, 40), np.bool_)
+    goal[10, 30] = True
+    far = ways(np.ones((20, 40)), goal)
+    assert far[10, 10] == 20.0
+    assert far[15, 30] == 5.0
+    np.testing.assert_allclose(far[0, 30 - 12], 2 + 10 * math.sqrt(2))
+
+
+def test_it_goes_straight_where_nothing_is_in_the_way() -> None:
+    places = travelled(grid(NOTHING), 0.35, 0.95)
+    assert places[-1][0] >= 3.7
+    assert sum(math.dist(*pair) for pair in itertools.pairwise(places)) < 3.45
+
+
+def test_it_goes_around_what_is_in_the_way_and_keeps_clear_of_it() -> None:
+    # A wall of discs with a gap at the top.
+    wall = np.array([[2.0, y] for y in np.arange(0.0, 1.3, 0.2)])
+    places = travelled(grid(wall), 0.35, 0.35)
+    assert places[-1][0] >= 3.7
+    nearest = min(math.dist(place, disc) for place in places for disc in wall.tolist())
+    assert nearest > 0.2
+    assert max(y for _, y in places) > 1.4
+
+
+def test_it_passes_on_the_side_where_nobody_stands() -> None:
+    disc, crowd = np.array([[2.0, 1.0]]), np.array([[2.0, 1.45]])
+    assert min(y for _, y in travelled(grid(disc, crowd), 0.35, 1.05)) < 0.8
+    assert max(y for _, y in travelled(grid(disc, 2.0 - crowd + [2.0, 0.0]), 0.35, 0.95)) > 1.2
+
+
+def test_it_tries_to_get_through_where_there_is_no_way_around() -> None:
+    wall = np.array([[2.0, y] for y in np.arange(0.0, 2.1, 0.2)])
+    assert travelled(grid(wall), 0.35, 0.35)[-1][0] >= 3.7
