@@ -11,6 +11,12 @@ from swarm_logistics_env.studies.judgement import Findings
 from swarm_logistics_env.studies.reporting import wording
 from swarm_logistics_env.studies.reporting.sections import Section
 
+_WORTH = (
+    "Marginal gain: P(N2) - (N2/N1) P(N1), in items; above 0 where S > 1. Karp-Flatt e: the share "
+    "of the work that is not shared; 0 where P grows as N does, 1 where it does not grow, below 0 "
+    "where it grows faster."
+)
+
 
 def beyond(findings: Findings, series: tuple[SizeSeries, ...]) -> Iterator[Section]:
     """Yield the second table of a report, topic by topic."""
@@ -76,11 +82,5 @@ def _sizes(findings: Findings, series: tuple[SizeSeries, ...]) -> Iterator[Secti
                     "Karp-Flatt e [95 %]",
                 ),
                 tuple(rows),
-                (
-                    (
-                        "Marginal gain: P(N2) - (N2/N1) P(N1), in items; above 0 where S > 1. "
-                        "Karp-Flatt e: the share of the work that is not shared; 0 where P grows "
-                        "as N does, 1 where it does not grow, below 0 where it grows faster."
-                    ),
-                ),
+                (_WORTH,),
             )

@@ -16,6 +16,20 @@ from swarm_logistics_env.studies.judgement import Findings
 from swarm_logistics_env.studies.reporting import wording
 from swarm_logistics_env.studies.reporting.sections import Section
 
+_HOW_TO_READ = (
+    "How many questions got which Holm-adjusted verdict; the questions themselves follow.",
+    (
+        "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
+        "differences are paired by seed, their intervals jackknifed."
+    ),
+    (
+        "P: IQM is the mean without the lowest and the highest quarter of the seeds, worst tenth "
+        "the mean of the lowest tenth, rounded up to whole seeds. Differences are paired by seed "
+        "(t-interval); the last column is the share of seeds with more deliveries, ties counting "
+        "half (Wilson)."
+    ),
+)
+
 
 def compared(findings: Findings) -> Iterator[Section]:
     """Yield policy x indicator: verdicts counted, values with differences, P cell by cell."""
@@ -26,9 +40,9 @@ def compared(findings: Findings) -> Iterator[Section]:
     contests = tuple(indicator_contests(findings))
     for table in dict.fromkeys(contest.table for contest in contests):
         here = [contest for contest in contests if contest.table == table]
-        yield from _indicators(findings, table, here, policies)
+        yield _indicators(table, here, policies)
     for table, cells in cell_contests(findings).items():
-        yield _cells(findings, table, cells, policies[0])
+        yield _cells(table, cells, policies[0])
 
 
 def _matrix(findings: Findings, policies: tuple[str, ...]) -> Section:
@@ -50,13 +64,14 @@ def _matrix(findings: Findings, policies: tuple[str, ...]) -> Section:
         "Policy x indicator",
         ("policy", *properties),
         tuple(rows),
-        ("How many questions got which Holm-adjusted verdict; the questions themselves follow.",),
+        (
+            *_HOW_TO_READ,
+            f"All over {wording.seeds_text(findings)}.",
+        ),
     )
 
 
-def _indicators(
-    findings: Findings, table: str, contests: list[IndicatorContest], policies: tuple[str, ...]
-) -> Iterator[Section]:
+def _indicators(table: str, contests: list[IndicatorContest], policies: tuple[str, ...]) -> Section:
     columns = ["question", *(f"{policy} [95 %]" for policy in policies)]
     columns += [f"{policy} - {policies[0]} [95 %]" for policy in policies[1:]]
     rows = []
@@ -69,20 +84,14 @@ def _indicators(
         ]
         differences = [wording.bracketed(d, 3) for d in contest.differences[1:]]
         rows.append((label, *values, *differences))
-    yield Section(
+    return Section(
         f"Indicators side by side: {table}",
         tuple(columns),
         tuple(rows),
-        (
-            (
-                "Verdict: unadjusted, Holm's in brackets where it differs. Differences "
-                f"are paired by seed, their intervals jackknifed; {wording.seeds_text(findings)}."
-            ),
-        ),
     )
 
 
-def _cells(findings: Findings, table: str, contests: list[CellContest], baseline: str) -> Section:
+def _cells(table: str, contests: list[CellContest], baseline: str) -> Section:
     rows = tuple(
         (
             str(contest.cell.arm.level),
@@ -103,10 +112,4 @@ def _cells(findings: Findings, table: str, contests: list[CellContest], baseline
             f"P - {baseline}'s [95 %]", f"delivers more than {baseline} [95 %]",
         ),
         rows,
-        (
-            ("IQM: mean of P without the lowest and the highest quarter of the seeds; worst tenth: "
-            "mean of the lowest tenth, rounded up to whole seeds. Differences are paired by seed "
-            "(t-interval); the last column is the share of seeds with more deliveries, ties "
-            f"counting half (Wilson). {wording.seeds_text(findings).capitalize()}."),
-        ),
     )  # fmt: skip

@@ -27,13 +27,12 @@ def sentence(findings: Findings, judgement: Judgement) -> Sentence:
         return Sentence(head, f"Blocked: {judgement.problem}.", "blocked")
     plain = wording.on_property(judgement, estimate.verdict)
     adjusted = wording.on_property(judgement, judgement.adjusted_verdict) or "blocked"
+    # One seed gives no p, and Holm's placeholder of 1 says nothing.
+    adjusted_p = None if estimate.p_value is None else judgement.adjusted_p
     mark = wording.SATURATED if judgement.saturated else ""
     parts = [
         f"{comparison.indicator}{mark} = {_interval(estimate)} over {_seeds(findings, estimate)}.",
-        (
-            f"Unadjusted: {plain}{_p(estimate.p_value)}; "
-            f"Holm-adjusted: {adjusted}{_p(judgement.adjusted_p)}."
-        ),
+        (f"Unadjusted: {plain}{_p(estimate.p_value)}; Holm-adjusted: {adjusted}{_p(adjusted_p)}."),
         *_claim(judgement, estimate),
         *_what_it_takes(judgement, estimate, adjusted),
     ]
