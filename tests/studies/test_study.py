@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import sqlite3
 import subprocess
@@ -19,6 +20,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.conditions import Run
+from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.reporting.files import export_rows
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
@@ -42,8 +45,7 @@ from swarm_logistics_env.studies import Study
 
 if __name__ == "__main__":
     study = Study(out=sys.argv[1], **json.loads(sys.argv[2]))
-    study.run(processes=2)
-    study.report()
+    study.run(processes=int(sys.argv[3]))
 """
 
 
@@ -63,6 +65,15 @@ class Steady(SwarmDT):
     """Swarm D-T under a name that nothing can load."""
 
     identity = "steady"
+
+
+class Dizzy(SwarmDT):
+    """Loses its numbers."""
+
+    identity = "dizzy"
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        return np.full((len(observations), 4), np.nan)
 
 
 ONE: dict[str, Any] = {"sizes": [{"values": [2, 4]}]}
@@ -124,26 +135,30 @@ def test_processes_give_the_same_bytes(undisturbed: Path, tmp_path: Path) -> Non
     assert reports(tmp_path) == reports(undisturbed)
 
 
-def test_killed_study_goes_on(undisturbed: Path, tmp_path: Path) -> None:
+def test_study_killed_at_ten_random_moments_goes_on(undisturbed: Path, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     out = tmp_path / "out"
     command = [sys.executable, str(script), str(out), json.dumps(SMALL)]
-    finished = 0
     total = len(list(Study(**SMALL).plan().runs()))
-    for goal in (1, total // 2):
-        process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE)
-        while stored(out) < goal:
+    chance = random.Random()
+    kept = 0
+    for kill in range(10):
+        # Mostly of one process: it starts the faster.
+        processes = "2" if kill in (3, 7) else "1"
+        process = subprocess.Popen(
+            [*command, processes], start_new_session=True, stderr=subprocess.PIPE
+        )
+        while stored(out) == kept:
             assert process.poll() is None, process.communicate()
             time.sleep(0.002)
+        time.sleep(chance.uniform(0, 0.02))
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
-        now = stored(out)
-        assert finished < now < total
-        finished = now
-    subprocess.run(command, check=True)
+        assert kept < stored(out) < total
+        kept = stored(out)
+    subprocess.run([*command, "2"], check=True)
     assert export(out) == export(undisturbed)
-    assert reports(out) == reports(undisturbed)
 
 
 def stored(directory: Path) -> int:
@@ -239,6 +254,38 @@ def test_one_failed_run_blocks_its_family_under_holm(tmp_path: Path) -> None:
     assert first.estimate is not None
     assert first.adjusted_verdict is None
     assert second.problem == "N = 6: 1 of 3 runs failed"
+
+
+def test_policy_that_returns_nan_fails_in_words_and_spoils_nothing_else() -> None:
+    study = Study(**{**SMALL, **ONE, "policies": [Dizzy(), "swarm-dt"], "faults": []})
+    tally = study.run()
+    assert 0 < tally.failed < tally.played
+    results = study.results()
+    dizzy = results["policy"] == "Dizzy"
+    assert results.loc[dizzy, "error"].str.contains("PolicyError: Dizzy at 0 s").all()
+    assert results.loc[~dizzy, "error"].isna().all()
+
+
+def test_disk_that_fills_up_stops_the_study_in_words_and_keeps_what_is_finished(
+    undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add = Store.add
+
+    def add_until_full(store: Store, run: Run, outcome: Outcome) -> None:
+        if len(store) == 5:
+            (pages,) = store._database.execute("PRAGMA page_count").fetchone()
+            store._database.execute(f"PRAGMA max_page_count = {pages}")
+        add(store, run, outcome)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "add", add_until_full)
+        with pytest.raises(StudyError, match="disk is full"):
+            Study(out=tmp_path, **SMALL).run()
+    before = stored(tmp_path)
+    assert before >= 5
+    study = Study(out=tmp_path, **SMALL)
+    assert study.run().kept == before
+    assert export(tmp_path) == export(undisturbed)
 
 
 @pytest.mark.parametrize("always", ["no", "yes"])
