@@ -50,8 +50,8 @@ def test_the_papers_own_tables_give_its_values_unpaired_and_without_intervals(
     assert set(table["verdict"]) == {"inconclusive"}
     study.report()
     report = (tmp_path / "out" / "report.md").read_text()
-    assert "unpaired" in report
-    assert "table.csv" in report
+    assert "imported from table.csv. Unpaired: it names no seeds." in report
+    assert "the same seeds for every condition" not in report
 
 
 MANY = """kind,name,value,delivered

@@ -36,7 +36,5 @@ def test_size_bounds_that_of_the_store(small: dict[str, Any], tmp_path: Path) ->
 
 
 def test_policy_that_fails_is_named(small: dict[str, Any]) -> None:
-    with pytest.raises(
-        StudyError, match=r"'Broken' fails .*a wheel came off"
-    ):
+    with pytest.raises(StudyError, match=r"'Broken' fails .*a wheel came off"):
         expect(Study(**{**small, "policies": [Broken()]}).plan())

@@ -36,6 +36,17 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
 
 def _study(plan: Plan) -> tuple[str, ...]:
     name = plan.specification.name
+    if plan.imported_from is not None:
+        shared = (
+            "Paired by the seeds that it names" if plan.paired else "Unpaired: it names no seeds"
+        )
+        return (
+            (
+                f"Study {name!r}: {len(plan.conditions)} conditions, imported from "
+                f"{plan.imported_from}. {shared}. Of their conditions only what varies is known: "
+                "the scenario below is this package's default, not theirs."
+            ),
+        )
     return (
         (
             f"Study {name!r}: {len(plan.conditions)} conditions x {len(plan.seeds)} seeds "
