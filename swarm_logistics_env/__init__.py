@@ -11,11 +11,19 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.episode import Episode, run_episode
+from swarm_logistics_env.registration import register
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
 
 if TYPE_CHECKING:
-    from swarm_logistics_env import policies, spi, studies, swarm_logistics_v0
+    from swarm_logistics_env import (
+        adapters,
+        policies,
+        spi,
+        studies,
+        swarm_logistics_v0,
+        wrappers,
+    )
 
     __version__: str
 
@@ -26,15 +34,19 @@ __all__ = [
     "Fault",
     "Scenario",
     "Warehouse",
+    "adapters",
     "policies",
     "run_episode",
     "spi",
     "studies",
     "swarm_logistics_v0",
+    "wrappers",
 ]
 
 # Imported when first asked for, so that a training script does not pay for a study's machinery.
 _LAZY = frozenset({"adapters", "policies", "spi", "studies", "swarm_logistics_v0", "wrappers"})
+
+register()
 
 
 def __getattr__(name: str) -> ModuleType | str:

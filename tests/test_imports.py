@@ -42,6 +42,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "swarm_logistics_v0": WORLD | {"rewards", "env"},
     "wrappers": ENVIRONMENT | {"spi"},
     "adapters": ENVIRONMENT | {"wrappers"},
+    "registration": set(),
     "hearing": FOUNDATION | {"warehouse"},
     "policies": WORLD | {"hearing"},
     "episode": WORLD | {"policies"},

@@ -1,0 +1,130 @@
+"""The whole swarm as one agent: a Gymnasium environment for one central controller."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.hearing import as_heard
+from swarm_logistics_env.reset_options import checked_options
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.wrappers import Wrapper
+
+
+class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """One controller senses what all robots sense and commands them all.
+
+    Observations are the swarm's rows (N, D), actions its commands (N, 4 + message_size), for the
+    largest swarm there may be; rows of robots that are absent are zeros, their commands ignored.
+    The reward is the mean of the rewards of the robots present: 1 per delivery by default. An
+    episode terminates when everything is delivered or nobody is left, and is truncated when the
+    time is up. A robot that hears nothing gets no commands, see `as_heard`.
+
+    Args:
+        env: a `SwarmLogisticsEnv` or a wrapper of one; default: one made with the arguments.
+        **arguments: those of `SwarmLogisticsEnv`.
+
+    Raises:
+        SetupError: both are given, or an argument cannot be.
+        ScenarioError, FaultError: an argument cannot be.
+
+    Example:
+        >>> env = gymnasium.make("SwarmLogistics-v0", n_robots=3)
+        >>> observation, info = env.reset(seed=0)
+        >>> observation.shape == env.observation_space.shape, env.action_space.shape
+        (True, (3, 4))
+    """
+
+    metadata: dict[str, Any] = SwarmLogisticsEnv.metadata
+
+    def __init__(self, env: SwarmLogisticsEnv | Wrapper | None = None, **arguments: Any) -> None:
+        if env is not None and any(value is not None for value in arguments.values()):
+            raise SetupError(
+                f"env = {env} and {', '.join(arguments)}: should be an environment or the "
+                "arguments of one, not both"
+            )
+        if env is not None and not hasattr(env, "reset_arrays"):
+            raise SetupError(f"env = {env!r}: should be a SwarmLogisticsEnv or a wrapper of one")
+        self.env = SwarmLogisticsEnv(**arguments) if env is None else env
+        self.metadata = self.env.metadata
+        self.render_mode = self.env.render_mode
+        self._n_rows = len(self.env.possible_agents)
+        robot = self.env.possible_agents[0]
+        seen, told = self.env.observation_space(robot), self.env.action_space(robot)
+        rows = (self._n_rows, 1)
+        self.observation_space = Box(np.tile(seen.low, rows), np.tile(seen.high, rows))
+        self.action_space = Box(np.tile(told.low, rows), np.tile(told.high, rows))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin an episode; see `SwarmLogisticsEnv.reset_arrays`.
+
+        Raises:
+            SetupError: the options ask for more robots than the spaces have rows.
+        """
+        super().reset(seed=seed)
+        asked = seed if seed is not None else self.env.next_seed
+        n_robots = self.env.scenario_of(asked, checked_options(options)).n_robots
+        if n_robots > self._n_rows:
+            raise SetupError(
+                f"n_robots = {n_robots}: should be at most {self._n_rows}, which the spaces are "
+                "made for; a wrapper such as SwarmSize announces more"
+            )
+        return self._padded(self.env.reset_arrays(seed, options)), self._info()
+
+    def step(
+        self, action: ArrayLike
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Take one control period.
+
+        Raises:
+            CommandError: the action's shape is not that of the action space, or it is not finite.
+        """
+        world = self.env.warehouse
+        try:
+            commands = np.array(action, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise CommandError(f"action should be an array of numbers: {error}") from None
+        if commands.shape != self.action_space.shape:
+            raise CommandError(
+                f"action of shape {commands.shape}: should be {self.action_space.shape}"
+            )
+        n_present = np.count_nonzero(world.state.robot_present)
+        heard = as_heard(commands[: world.state.n_robots], world.state)
+        observations, rewards, _, truncations = self.env.step_arrays(heard)
+        is_cut = bool(truncations.any())
+        is_over = not self.env.agents and not is_cut
+        reward = float(rewards.sum() / max(n_present, 1))
+        return self._padded(observations), reward, is_over, is_cut, self._info()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture or show it; see `SwarmLogisticsEnv.render`."""
+        picture: NDArray[np.uint8] | None = self.env.render()
+        return picture
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the whole warehouse as one vector, see `SwarmLogisticsEnv.state`."""
+        state: NDArray[np.float32] = self.env.state()
+        return state
+
+    def close(self) -> None:
+        """Release what rendering holds; harmless when called twice."""
+        self.env.close()
+
+    def _padded(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        rows = np.zeros(self.observation_space.shape or (), np.float32)
+        rows[: len(observations)] = observations
+        return rows
+
+    def _info(self) -> dict[str, Any]:
+        state = self.env.warehouse.state
+        modes = {robot: names for robot, names in enumerate(state.failure_modes) if names}
+        return {"delivered": state.delivered, "failure_modes": modes}

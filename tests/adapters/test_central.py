@@ -1,0 +1,177 @@
+"""The whole swarm as one Gymnasium environment."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from swarm_logistics_env import Fault
+from swarm_logistics_env.adapters import CentralEnv
+from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
+
+SMALL: dict[str, Any] = {
+    "warehouse_width": 6.0,
+    "warehouse_height": 5.0,
+    "n_items": 10,
+    "duration": 4.0,
+}
+
+
+def with_faults(env: Any) -> Any:
+    return FaultInjection(env, "FM3_hear", onset=[0.0, 1.0])
+
+
+def with_sizes(env: Any) -> Any:
+    n = env.unwrapped.scenario.n_robots
+    return SwarmSize(env, [n, n + 3])
+
+
+def with_changes(env: Any) -> Any:
+    return ParameterChange(env, "delivery_width", [1.0, 3.0], at=0.0)
+
+
+WRAPPED: dict[str, Callable[[Any], Any]] = {
+    "plain": lambda env: env,
+    "faults": with_faults,
+    "sizes": with_sizes,
+    "changes": with_changes,
+    "changes(sizes(faults))": lambda env: with_changes(with_sizes(with_faults(env))),
+    "faults(sizes(changes))": lambda env: with_faults(with_sizes(with_changes(env))),
+}
+
+
+@pytest.mark.parametrize("n_robots", [1, 5, 25])
+def test_gymnasiums_check_passes(n_robots: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    check_env(gymnasium.make("SwarmLogistics-v0", n_robots=n_robots).unwrapped)
+
+
+@pytest.mark.parametrize("n_robots", [1, 5, 25])
+@pytest.mark.parametrize("stack", WRAPPED)
+def test_gymnasiums_check_passes_for_every_wrapper(stack: str, n_robots: int) -> None:
+    with warnings.catch_warnings():
+        # No name in a registry stands for it.
+        warnings.filterwarnings("ignore", ".*Not able to test alternative render modes")
+        check_env(CentralEnv(WRAPPED[stack](SwarmLogisticsEnv(n_robots=n_robots, **SMALL))))
+
+
+@pytest.mark.parametrize("stack", WRAPPED)
+def test_it_is_the_parallel_environment_in_one_piece(stack: str) -> None:
+    inner = WRAPPED[stack](SwarmLogisticsEnv(n_robots=5, **SMALL))
+    central = CentralEnv(copy.deepcopy(inner))
+    rng = np.random.default_rng(0)
+    for seed in (0, 1, None, None):
+        if seed is None:
+            inner.unwrapped.next_seed = central.env.next_seed
+        rows = inner.reset_arrays(seed)
+        observation, info = central.reset(seed=seed)
+        ended = cut = False
+        while not (ended or cut):
+            assert central.observation_space.contains(observation)
+            np.testing.assert_array_equal(observation[: len(rows)], rows)
+            assert not observation[len(rows) :].any()
+            action = rng.uniform(-1, 1, central.action_space.shape).astype(np.float32)
+            observation, reward, ended, cut, info = central.step(action)
+            failures = inner.warehouse.state.failure_modes
+            deaf = [row for row, modes in enumerate(failures) if modes]
+            action[deaf] = 0.0
+            rows, rewards, _, _ = inner.step_arrays(action[: len(rows)])
+            assert reward == rewards.mean()
+        assert (ended, cut) == (False, True)
+        assert info["delivered"] == inner.warehouse.state.delivered
+        assert not inner.agents
+
+
+def test_the_reward_is_one_per_delivery_and_all_delivered_terminates() -> None:
+    env = CentralEnv(n_robots=3, n_items=2, pickup_range=14.0, duration=60.0)
+    env.reset(seed=0)
+    total, ended, cut, steps = 0.0, False, False, 0
+    while not (ended or cut):
+        heading = env.env.warehouse.state.robot_heading
+        east = np.stack([np.cos(heading), -np.sin(heading), 0 * heading, 1 + 0 * heading], axis=1)
+        _, reward, ended, cut, info = env.step(east)
+        assert isinstance(reward, float)
+        total += reward
+        steps += 1
+    assert (ended, cut) == (True, False)
+    assert total == 2.0
+    assert info["delivered"] == 2
+
+
+def test_it_terminates_when_nobody_is_left() -> None:
+    env = CentralEnv(n_robots=2, faults=[Fault("removed", 2, onset=0.2)], duration=9.0)
+    env.reset(seed=0)
+    assert env.step(np.zeros((2, 4)))[2:4] == (False, False)
+    assert env.step(np.zeros((2, 4)))[2:4] == (True, False)
+
+
+def test_a_robot_that_does_not_hear_stands_still_and_infos_say_who() -> None:
+    env = CentralEnv(n_robots=3, faults=[Fault("FM3_hear", (1,))])
+    _, info = env.reset(seed=0)
+    assert info == {"delivered": 0, "failure_modes": {1: ("FM3_hear",)}}
+    before = env.env.warehouse.state.robot_position.copy()
+    for _ in range(3):
+        env.step(np.tile([0.3, 0.0, 0.0, 0.0], (3, 1)))
+    moved = np.linalg.norm(env.env.warehouse.state.robot_position - before, axis=1)
+    assert moved[1] == 0.0
+    assert (moved[[0, 2]] > 0.05).all()
+
+
+def test_more_robots_than_rows_are_refused_and_announced_ones_are_not() -> None:
+    options = {"scenario": {"n_robots": 4}}
+    with pytest.raises(SetupError, match="n_robots = 4: should be at most 3"):
+        CentralEnv(n_robots=3).reset(options=options)
+    env = CentralEnv(SwarmSize(SwarmLogisticsEnv(n_robots=3), [3, 4]))
+    assert env.reset(seed=0, options=options)[0].shape[0] == 4
+
+
+@pytest.mark.parametrize(
+    "action", [np.zeros(4), np.zeros((2, 4)), np.full((3, 4), np.nan), "go", [[1], [2, 3]], None]
+)
+def test_wrong_actions_are_refused(action: Any) -> None:
+    env = CentralEnv(n_robots=3)
+    env.reset(seed=0)
+    with pytest.raises(CommandError):
+        env.step(action)
+
+
+def test_wrong_arguments_are_refused() -> None:
+    with pytest.raises(SetupError, match="not both"):
+        CentralEnv(SwarmLogisticsEnv(), n_robots=3)
+    with pytest.raises(SetupError, match="should be a SwarmLogisticsEnv or a wrapper"):
+        CentralEnv(env=3)  # type: ignore[arg-type]
+    with pytest.raises(SwarmLogisticsError, match="did you mean 'n_robots'"):
+        gymnasium.make("SwarmLogistics-v0", n_robot=3)
+    with pytest.raises(SetupError, match="options = 5"):
+        CentralEnv(n_robots=3).reset(options=5)  # type: ignore[arg-type]
+
+
+def test_messages_are_part_of_the_action() -> None:
+    env = CentralEnv(n_robots=2, message_size=3)
+    assert env.action_space.shape == (2, 7)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+
+
+def test_state_rendering_and_closing_are_the_environments() -> None:
+    pytest.importorskip("pygame")
+    env = gymnasium.make("SwarmLogistics-v0", n_robots=2, render_mode="rgb_array")
+    env.reset(seed=0)
+    picture = env.render()
+    assert isinstance(picture, np.ndarray)
+    assert picture.shape[2] == 3
+    central = env.unwrapped
+    assert isinstance(central, CentralEnv)
+    np.testing.assert_array_equal(central.state(), central.env.state())
+    env.close()
+    env.close()
