@@ -123,7 +123,7 @@ def _range(panel: Panel) -> tuple[float, float]:
     if values and max(values) > 0.5 * panel.thresholds[-1]:
         inner.append(panel.thresholds[-1])
     low, high = min(inner), max(inner)
-    reach = max(2.0 * (high - low), 0.2)
+    reach = max(2.0 * (high - low), 1.5)
     ends = [x for p in points for x in (p.low, p.high) if x is not None and math.isfinite(x)]
     low = max(low - reach, min([low, *ends]))
     high = min(high + reach, max([high, *ends]))

@@ -62,7 +62,7 @@ def _scalability(findings: Findings) -> Iterator[Figure]:
         yield _intervals(
             findings,
             slug("S", table),
-            f"{table}: scalability S per step in N; above 0 scalable, above 1 superlinear.",
+            f"{_policies(here)}, {table}: scalability S per step in N; above 0 scalable, above 1 superlinear.",
             here,
             (panel,),
         )
@@ -116,7 +116,7 @@ def _adaptability(findings: Findings) -> Iterator[Figure]:
     yield _intervals(
         findings,
         "A",
-        "Adaptability A per parameter; above 0 adaptable, above 1 P has grown.",
+        f"{_policies(asked)}: adaptability A per parameter; above 0 adaptable, above 1 P has grown.",
         asked,
         tuple(panels),
     )
@@ -235,6 +235,10 @@ def _step(judgement: Judgement) -> str:
 
 def _tables(judgements: list[Judgement]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(judgement.comparison.table for judgement in judgements))
+
+
+def _policies(judgements: list[Judgement]) -> str:
+    return " and ".join(dict.fromkeys(judgement.comparison.policy for judgement in judgements))
 
 
 def _grouped(
