@@ -13,6 +13,7 @@ SOURCES = (
     "streams.py",
     "kernels.py",
     "observations.py",
+    "hearing.py",
     "episode.py",
     "policies/policy.py",
     "warehouse",
