@@ -62,7 +62,8 @@ def _scalability(findings: Findings) -> Iterator[Figure]:
         yield _intervals(
             findings,
             slug("S", table),
-            f"{_policies(here)}, {table}: scalability S per step in N; above 0 scalable, above 1 superlinear.",
+            f"{_policies(here)}, {table}: scalability S per step in N; above 0 scalable, above 1 "
+            "superlinear.",
             here,
             (panel,),
         )
@@ -116,7 +117,8 @@ def _adaptability(findings: Findings) -> Iterator[Figure]:
     yield _intervals(
         findings,
         "A",
-        f"{_policies(asked)}: adaptability A per parameter; above 0 adaptable, above 1 P has grown.",
+        f"{_policies(asked)}: adaptability A per parameter; above 0 adaptable, above 1 "
+        "P has grown.",
         asked,
         tuple(panels),
     )
