@@ -103,7 +103,10 @@ def handle_items(
     members: NDArray[np.int64],
     events: NDArray[np.int64],
 ) -> int:
-    """Take over where the bodies are, then let go and lift; returns the number of events."""
+    """Take over where the bodies are, then let go and lift; returns the number of events.
+
+    The last row of `events` begins with 1 if the requested item can now be delivered, else 0.
+    """
     for robot in range(len(position)):
         is_there = 1.0 if flags[at.PRESENT, robot] else 0.0
         for axis in range(2):
@@ -118,11 +121,17 @@ def handle_items(
         commands[:, 3], able, flags[at.IN_DELIVERY], requested, links[at.ITEM], memory,
         item_links[at.STATUS], item_links[at.CARRIER], events,
     )  # fmt: skip
-    return close_grippers(
+    n_events = close_grippers(
         commands[:, 3], able & flags[at.LIFTS], position, requested, constants[PICKUP_RANGE],
         links[at.ITEM], memory, item_position, item_links[at.STATUS], item_links[at.CARRIER],
         claim, claim_square, constants[ITEM_CELL], size, start, members, events, n_events,
     )  # fmt: skip
+    events[-1, 0] = 0
+    if requested != at.NOBODY and item_links[at.CARRIER, requested] != at.NOBODY:
+        carrier = item_links[at.CARRIER, requested]
+        if flags[at.IN_DELIVERY, carrier] and flags[at.DELIVERS, carrier]:
+            events[-1, 0] = 1
+    return n_events
 
 
 @kernel

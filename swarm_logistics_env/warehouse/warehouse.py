@@ -123,7 +123,8 @@ class Warehouse:
         state.step += 1
         state.time = state.step * self.scenario.control_period
         self._handle_items(given)
-        self._deliver()
+        if self._events[-1, 0]:
+            self._deliver()
         if self._fault_times and self._fault_times[0] <= state.time + 5e-7:
             self._apply_faults()
         anchored = self._perceive()
@@ -203,7 +204,7 @@ class Warehouse:
         self._item_grid = Grid(width, height, cell, items)
         self._claim = np.full(items, NOBODY)
         self._claim_square = np.zeros(items)
-        self._events = np.zeros((2 * n, 3), np.int64)
+        self._events = np.zeros((2 * n + 1, 3), np.int64)
         size = n * (len(COMMAND_COLUMNS) + scenario.message_size)
         self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
 
@@ -266,7 +267,7 @@ class Warehouse:
 
     def _deliver(self) -> None:
         state = self.state
-        while (item := state.requested) != NOBODY and state.item_carrier[item] != NOBODY:
+        while (item := state.requested) != NOBODY:
             robot = stepping.deliver_requested(
                 item, state.flags, state.links, state.robot_memory, state.item_links
             )

@@ -231,7 +231,7 @@ def check_changes(world: Warehouse, before: WarehouseState) -> None:
             assert state.robot_item[robot] == before.robot_item[robot]
             assert state.robot_heading[robot] == before.robot_heading[robot]
         if {"motor_dead", "dead"} & set(modes) and is_left_alone(world, before, robot):
-            assert moved[robot] < 1e-6
+            assert moved[robot] < 1e-4  # what the solver still corrects of an old overlap
         if "FM1" in modes and "FM1" in state.failure_modes[robot] and state.robot_present[robot]:
             assert state.robot_told[robot] == 0.0
         assert "removed" not in modes or not state.robot_present[robot]
