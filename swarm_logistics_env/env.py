@@ -76,6 +76,8 @@ class SwarmLogisticsEnv(DictView):
     ) -> None:
         self.scenario = (scenario or Scenario()).replace(**fields)
         self.faults = tuple(faults)
+        if max_cycles is not None and max_cycles < 1:
+            raise SetupError(f"max_cycles = {max_cycles}: should be None or at least 1")
         self.max_cycles = max_cycles
         modes = self.metadata["render_modes"]
         if render_mode is not None and render_mode not in modes:
