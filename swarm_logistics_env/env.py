@@ -134,7 +134,9 @@ class SwarmLogisticsEnv(DictView):
         self._rewards.begin(self.warehouse)
         if scenario.n_robots > len(self.possible_agents):
             self.possible_agents = agent_names(range(scenario.n_robots))
-        self.agents = agent_names(np.flatnonzero(self.warehouse.state.robot_present).tolist())
+        self._present = self.warehouse.state.robot_present.copy()
+        self._n_removed = self.warehouse.n_removed
+        self.agents = agent_names(np.flatnonzero(self._present).tolist())
         return observations
 
     def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
@@ -164,20 +166,24 @@ class SwarmLogisticsEnv(DictView):
         Raises:
             CommandError: wrong shape or not finite; nothing has happened then.
         """
-        world = self.warehouse
-        was_present = world.state.robot_present.copy()
+        world, was_present = self.warehouse, self._present
         observations = world.step(commands)
-        rewards = self._rewards.pay(world) * was_present
-        terminations = was_present ^ world.state.robot_present
-        if world.all_delivered:
-            terminations |= was_present
+        rewards = self._rewards.pay(world)
+        if len(self.agents) < len(was_present):
+            rewards *= was_present
+        terminations = np.zeros(len(was_present), np.bool_)
+        truncations = np.zeros(len(was_present), np.bool_)
         is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
-        truncations = np.zeros_like(terminations)
-        if world.is_over_time or is_cut:
-            truncations = was_present & ~terminations
-        is_done = terminations | truncations
-        if is_done.any():
-            self.agents = agent_names(np.flatnonzero(was_present & ~is_done).tolist())
+        is_over_time = world.is_over_time or is_cut
+        # Seldom, so that the other steps do not pay for it.
+        if world.all_delivered or is_over_time or world.n_removed != self._n_removed:
+            self._n_removed = world.n_removed
+            self._present = world.state.robot_present.copy()
+            terminations |= was_present & (~self._present | world.all_delivered)
+            if is_over_time:
+                truncations |= was_present & ~terminations
+            is_left = was_present & ~(terminations | truncations)
+            self.agents = agent_names(np.flatnonzero(is_left).tolist())
         return observations, rewards, terminations, truncations
 
     def cover(self, scenario: Scenario) -> None:

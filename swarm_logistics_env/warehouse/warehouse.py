@@ -35,6 +35,7 @@ class Warehouse:
         scenario: the conditions of this episode.
         state: what is true now, see `WarehouseState`.
         faults: what befalls whom in this episode.
+        n_removed: how many robots were taken out of the arena so far.
 
     Example:
         >>> world = Warehouse(Scenario(n_robots=3))
@@ -77,7 +78,7 @@ class Warehouse:
             scenario, seed, state.obstacle_position
         )
         self.scenario, self.state, self._seed = scenario, state, seed
-        self.faults, self._struck = tuple(faults), struck
+        self.faults, self._struck, self.n_removed = tuple(faults), struck, 0
         self._order = layout.request_order(scenario, seed)
         state.requested = int(self._order[0])
         self._sensor_keys = row_keys(seed, "sensors", scenario.n_robots)
@@ -315,6 +316,7 @@ class Warehouse:
             state.item_carrier[item] = NOBODY
             self._physics.put_down(robot, item, *state.item_position[item].tolist())
         self._physics.remove(robot)
+        self.n_removed += 1
         state.robot_present[robot] = False
         state.robot_in_delivery[robot] = False
         state.robot_item[robot] = NOBODY
