@@ -67,8 +67,10 @@ def set_out(
     flags: NDArray[np.bool_],
     bodies: NDArray[np.float64],
     velocities: NDArray[np.float64],
-) -> bool:
-    """Turn commands into the velocities to be written to the bodies; False if one is not finite.
+) -> int:
+    """Turn commands into the velocities to be written to the bodies.
+
+    Returns how many robots touch something now, or -1 if a command is not finite.
 
     `bodies` (2N + 1, 4) is what was read of them, `velocities` (2N + 1, 2) what will be written.
     """
@@ -76,11 +78,12 @@ def set_out(
     able = flags[at.PRESENT] & flags[at.OBEYS]
     # What was just read, so that writing it back changes nothing for the robots themselves.
     velocities[:n] = bodies[:n, 2:4]
-    return drive(
+    is_done = drive(
         commands, able, numbers[at.MAX_SPEED], numbers[at.MAX_TURN_RATE],
         constants[CONTROL_PERIOD], numbers[at.HEADING], velocities[n : 2 * n],
         constants[SIDEWAYS] > 0.0,
     )  # fmt: skip
+    return int(np.count_nonzero(flags[at.CONTACT])) if is_done else -1
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from collections.abc import Sequence
 from typing import Any
@@ -109,16 +110,17 @@ class Warehouse:
         """
         given = self._checked(commands)
         state, physics = self.state, self._physics
-        if not stepping.set_out(
+        n_touching = stepping.set_out(
             given, self._constants, state.numbers, state.flags, physics.bodies, physics.velocities
-        ):
+        )
+        if n_touching < 0:
             obeying = state.robot_present & state.obeys
             bad = np.argwhere(~np.isfinite(given) & obeying[:, None])[0]
             raise CommandError(
                 f"commands[{bad[0]}, {bad[1]}] = {given[bad[0], bad[1]]}: should be finite"
             )
         self._log.append(given)
-        physics.advance(int(np.count_nonzero(state.robot_contact)))
+        physics.advance(n_touching)
         if self.scenario.message_size:
             self._send_messages(given)
         state.step += 1
@@ -191,6 +193,8 @@ class Warehouse:
             given = np.array(commands, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
             raise CommandError(f"commands should be an array of numbers: {error}") from None
+        if given.shape == self._command_shape:
+            return given
         plain = (self.state.n_robots, len(COMMAND_COLUMNS))
         full = (plain[0], plain[1] + self.scenario.message_size)
         if given.shape not in (plain, full):
@@ -206,7 +210,8 @@ class Warehouse:
         self._claim = np.full(items, NOBODY)
         self._claim_square = np.zeros(items)
         self._events = np.zeros((2 * n + 1, 3), np.int64)
-        size = n * (len(COMMAND_COLUMNS) + scenario.message_size)
+        self._command_shape = (n, len(COMMAND_COLUMNS) + scenario.message_size)
+        size = math.prod(self._command_shape)
         self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
 
     def _take_constants(self, scenario: Scenario) -> None:
