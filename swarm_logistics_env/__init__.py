@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         spi,
         studies,
         swarm_logistics_v0,
+        testing,
         wrappers,
     )
 
@@ -40,11 +41,14 @@ __all__ = [
     "spi",
     "studies",
     "swarm_logistics_v0",
+    "testing",
     "wrappers",
 ]
 
 # Imported when first asked for, so that a training script does not pay for a study's machinery.
-_LAZY = frozenset({"adapters", "policies", "spi", "studies", "swarm_logistics_v0", "wrappers"})
+_LAZY = frozenset(
+    {"adapters", "policies", "spi", "studies", "swarm_logistics_v0", "testing", "wrappers"}
+)
 
 register()
 

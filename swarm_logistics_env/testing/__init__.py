@@ -1,0 +1,39 @@
+"""Checks to run on an environment with wrappers or a policy of one's own.
+
+Each takes `make`, a function that returns a new parallel environment, plays one episode of it, and
+raises an AssertionError of its own kind with one sentence about the first thing that is wrong.
+
+Example:
+    >>> import functools
+    >>> from swarm_logistics_env import swarm_logistics_v0, testing
+    >>> make = functools.partial(swarm_logistics_v0.parallel_env, n_robots=3)
+    >>> testing.check_spaces(make, steps=20)
+"""
+
+from swarm_logistics_env.testing.determinism import check_determinism
+from swarm_logistics_env.testing.errors import (
+    ConformanceError,
+    ConservationError,
+    DeterminismError,
+    FaultsError,
+    OverlapError,
+    SpaceError,
+)
+from swarm_logistics_env.testing.faults import check_faults
+from swarm_logistics_env.testing.items import check_conservation
+from swarm_logistics_env.testing.overlap import check_overlap
+from swarm_logistics_env.testing.spaces import check_spaces
+
+__all__ = [
+    "ConformanceError",
+    "ConservationError",
+    "DeterminismError",
+    "FaultsError",
+    "OverlapError",
+    "SpaceError",
+    "check_conservation",
+    "check_determinism",
+    "check_faults",
+    "check_overlap",
+    "check_spaces",
+]

@@ -1,0 +1,27 @@
+"""What the checks raise: one kind of AssertionError each."""
+
+from __future__ import annotations
+
+
+class ConformanceError(AssertionError):
+    """An environment does not hold what this package promises of one."""
+
+
+class DeterminismError(ConformanceError):
+    """The same seed gave two trajectories."""
+
+
+class SpaceError(ConformanceError):
+    """An observation or a state that its space does not contain."""
+
+
+class ConservationError(ConformanceError):
+    """An item was lost, doubled or conjured up."""
+
+
+class OverlapError(ConformanceError):
+    """Two robots stand in one place."""
+
+
+class FaultsError(ConformanceError):
+    """A failed robot did what it can no longer do, or nobody failed at all."""
