@@ -53,7 +53,8 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         """Take one control period; see `step_arrays`.
 
         Args:
-            actions: one command (4,) for every agent in `agents`.
+            actions: one command (4,) for every agent in `agents`; those of possible agents who
+                are not there are ignored, as trainers of fixed size send them.
 
         Raises:
             CommandError: an agent's command is missing, for an unknown agent, of the wrong shape
@@ -65,7 +66,7 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         rows = [_row(agent) for agent in agents]
         wanted = self.action_space(agents[0]).shape
         commands = np.zeros((self.warehouse.state.n_robots, *wanted))
-        commands[rows] = _gathered(actions, agents, wanted)
+        commands[rows] = _gathered(actions, agents, self.possible_agents, wanted)
         outcome = self.step_arrays(commands)
         observations, rewards, terminations, truncations = (part[rows] for part in outcome)
         infos = self._infos(agents)
@@ -101,16 +102,20 @@ def _row(agent: str) -> int:
 
 
 def _gathered(
-    actions: Mapping[str, ArrayLike], agents: Sequence[str], wanted: tuple[int, ...]
+    actions: Mapping[str, ArrayLike],
+    agents: Sequence[str],
+    possible_agents: Sequence[str],
+    wanted: tuple[int, ...],
 ) -> NDArray[np.float64]:
     if actions.keys() != set(agents):
         for agent in actions:
-            if agent not in agents:
+            if agent not in possible_agents:
                 raise CommandError(
                     f"a command for {agent!r}, who is not there{suggest(str(agent), agents)}"
                 )
-        missing = next(agent for agent in agents if agent not in actions)
-        raise CommandError(f"no command for {missing!r}: should be one for every agent")
+        for agent in agents:
+            if agent not in actions:
+                raise CommandError(f"no command for {agent!r}: should be one for every agent")
     for agent in agents:
         if np.shape(actions[agent]) != wanted:
             raise CommandError(
