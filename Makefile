@@ -7,13 +7,18 @@ OUT    ?= results/paper
 DEV   := .venvs/dev
 STUDY := .venvs/study
 
-.PHONY: help paper test check benchmark format clean
+TORCHRL   := .venvs/torchrl
+RLLIB     := .venvs/rllib
+SUPERSUIT := .venvs/supersuit
+
+.PHONY: help paper test check benchmark interop format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make check           lint and types only"
 	@echo "make benchmark       cost of a control step beside the bare physics"
+	@echo "make interop         TorchRL, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -31,6 +36,12 @@ check: $(DEV)/installed
 benchmark: $(STUDY)/installed
 	$(STUDY)/bin/python -m benchmarks
 
+interop: $(TORCHRL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
+	$(TORCHRL)/bin/python -m interop.torchrl_specs
+	$(TORCHRL)/bin/python -m interop.plain_ppo
+	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
+	$(RLLIB)/bin/python -m interop.rllib_ppo
+
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .
 	$(DEV)/bin/ruff format .
@@ -41,9 +52,12 @@ clean:
 
 $(DEV)/installed: EXTRAS := dev,study,render
 $(STUDY)/installed: EXTRAS := study
+$(TORCHRL)/installed: OTHERS := torch torchrl
+$(RLLIB)/installed: OTHERS := torch "ray[rllib]"
+$(SUPERSUIT)/installed: OTHERS := supersuit
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
 .venvs/%/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venvs/$*
-	.venvs/$*/bin/python -m pip install --constraint constraints.txt --editable ".[$(EXTRAS)]"
+	.venvs/$*/bin/python -m pip install --constraint constraints.txt --editable ".$(EXTRAS:%=[%])" $(OTHERS)
 	@touch $@

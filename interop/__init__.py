@@ -1,0 +1,1 @@
+"""Third parties' code, unchanged, on this environment: see README.md here."""

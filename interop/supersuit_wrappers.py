@@ -1,0 +1,55 @@
+"""SuperSuit: frame stacking, padding and black death around the parallel and the AEC form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import supersuit
+from pettingzoo.test import api_test, parallel_api_test
+
+from interop.versions import versions
+from swarm_logistics_env import swarm_logistics_v0
+from swarm_logistics_env.wrappers import SwarmSize
+
+FRAMES = 4
+MAX_CYCLES = 50
+FIELDS: dict[str, Any] = {"n_robots": 5, "max_cycles": MAX_CYCLES}
+
+
+def main() -> None:
+    """Run PettingZoo's own API tests on the wrapped environments."""
+    print(versions("supersuit", "pettingzoo", "gymnasium"))
+    plain = swarm_logistics_v0.parallel_env(**FIELDS)
+    width = plain.observation_space("robot_0").shape[0]
+
+    def stacked(env: Any) -> Any:
+        return supersuit.frame_stack_v1(env, FRAMES)
+
+    def padded(env: Any) -> Any:
+        return supersuit.pad_action_space_v0(supersuit.pad_observations_v0(env))
+
+    for name, wrap, shape in (
+        ("frame_stack_v1", stacked, (FRAMES * width,)),
+        ("pad_observations_v0, pad_action_space_v0", padded, (width,)),
+    ):
+        env = wrap(swarm_logistics_v0.parallel_env(**FIELDS))
+        observations, _ = env.reset(seed=0)
+        assert {row.shape for row in observations.values()} == {shape}, observations
+        parallel_api_test(env, num_cycles=200)
+        print(f"{name}, parallel: parallel_api_test passes, rows of shape {shape}")
+        api_test(wrap(swarm_logistics_v0.env(**FIELDS)), num_cycles=200)
+        print(f"{name}, AEC: api_test passes")
+
+    leaving = SwarmSize(swarm_logistics_v0.parallel_env(**FIELDS), 5, leave=[(2, 1.0)])
+    constant = supersuit.black_death_v3(leaving)
+    constant.reset(seed=0)
+    steps = 0
+    while constant.agents:
+        assert constant.agents == leaving.possible_agents, constant.agents
+        constant.step({name: leaving.action_space(name).sample() for name in constant.agents})
+        steps += 1
+    print(f"black_death_v3 while 2 robots leave: 5 agents for {steps} steps of {MAX_CYCLES}")
+
+
+if __name__ == "__main__":
+    main()
