@@ -19,6 +19,9 @@ from swarm_logistics_env.records import Record
 
 # The densest that discs are strewn at random: well below random sequential addition's .547.
 DENSEST_COVER = 0.4
+# Numbers beyond this do not survive in float32 observations, nor does a loop over them end.
+LARGEST = 1e9
+MOST_SUBSTEPS = 1000
 
 
 Probability = Annotated[float, Field(ge=0, le=1)]
@@ -146,6 +149,7 @@ class Scenario(Record):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
+        self._check_sizes()
         self._check_periods()
         self._check_storage()
         area = self.storage_width * self.warehouse_height
@@ -165,8 +169,19 @@ class Scenario(Record):
                 )
         return self
 
+    def _check_sizes(self) -> None:
+        for name in type(self).model_fields:
+            value = getattr(self, name)
+            if isinstance(value, int | float) and not value <= LARGEST:
+                raise ValueError(f"{name} = {value}: should be at most {LARGEST:g}")
+
     def _check_periods(self) -> None:
         ratio = self.control_period / self.physics_period
+        if ratio > MOST_SUBSTEPS:
+            raise ValueError(
+                f"physics_period = {self.physics_period} s makes {ratio:g} physics steps of a "
+                f"control_period: should be at most {MOST_SUBSTEPS}"
+            )
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
             raise ValueError(
                 f"control_period = {self.control_period} s should be a whole multiple of "

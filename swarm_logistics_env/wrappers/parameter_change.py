@@ -62,7 +62,7 @@ class ParameterChange(Wrapper):
         at_within: tuple[float, float] | None = None,
     ) -> None:
         super().__init__(env)
-        if name not in Scenario.model_fields:
+        if not isinstance(name, str) or name not in Scenario.model_fields:
             raise ScenarioError(
                 f"Scenario has no field {name!r}{suggest(str(name), Scenario.model_fields)}. What "
                 f"a policy decides by is set where it is made, as policies.load(.., {name}=..)"
