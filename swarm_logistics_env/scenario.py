@@ -19,8 +19,8 @@ from swarm_logistics_env.records import Record
 
 # The densest that discs are strewn at random: well below random sequential addition's .547.
 DENSEST_COVER = 0.4
-# Numbers beyond this do not survive in float32 observations, nor does a loop over them end.
-LARGEST = 1e9
+# Numbers beyond these do not survive in float32 observations, or vanish when squared.
+SMALLEST, LARGEST = 1e-9, 1e9
 MOST_SUBSTEPS = 1000
 
 
@@ -174,6 +174,8 @@ class Scenario(Record):
             value = getattr(self, name)
             if isinstance(value, int | float) and not value <= LARGEST:
                 raise ValueError(f"{name} = {value}: should be at most {LARGEST:g}")
+            if isinstance(value, float) and 0.0 < value < SMALLEST:
+                raise ValueError(f"{name} = {value}: should be at least {SMALLEST:g}")
 
     def _check_periods(self) -> None:
         ratio = self.control_period / self.physics_period

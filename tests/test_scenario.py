@@ -201,7 +201,8 @@ def test_every_preset_runs(name: str) -> None:
         ({"duration": 1e308}, "duration = 1e.308: should be at most 1e.09"),
         ({"timer_limit": 1e308}, "timer_limit = 1e.308: should be at most 1e.09"),
         ({"control_period": 1e308}, "control_period = 1e.308: should be at most"),
-        ({"physics_period": 1e-300}, "physics steps of a control_period: should be at most 1000"),
+        ({"obstacle_radius": 1e-300}, "obstacle_radius = 1e-300: should be at least 1e-09"),
+        ({"physics_period": 1e-8}, "physics steps of a control_period: should be at most 1000"),
     ],
 )
 def test_numbers_that_no_run_survives_are_refused(fields: dict[str, float], complaint: str) -> None:
