@@ -144,12 +144,11 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
         FaultError: more robots than there are, or a robot that is not there.
     """
     if isinstance(fault.robots, tuple):
-        chosen = np.unique(np.array(fault.robots, dtype=np.int64))
-        if chosen[-1] >= n_robots:
+        if max(fault.robots) >= n_robots:  # before numpy, whose integers end at 2**63
             raise FaultError(
                 f"Fault.robots = {fault.robots}: robots are numbered 0 to {n_robots - 1}"
             )
-        return chosen
+        return np.unique(np.array(fault.robots, dtype=np.int64))
     if fault.robots > n_robots:
         raise FaultError(f"Fault.robots = {fault.robots}: should be at most n_robots = {n_robots}")
     # Ranked by a key of seed and robot alone: nested in m, the same for every mode and any N.
