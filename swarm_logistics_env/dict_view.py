@@ -116,12 +116,22 @@ def _gathered(
         for agent in agents:
             if agent not in actions:
                 raise CommandError(f"no command for {agent!r}: should be one for every agent")
-    for agent in agents:
-        if np.shape(actions[agent]) != wanted:
-            raise CommandError(
-                f"command of {agent!r} of shape {np.shape(actions[agent])}: should be {wanted}"
-            )
     try:
-        return np.array([actions[agent] for agent in agents], dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise CommandError(f"commands should be numbers: {error}") from None
+        given = np.array([actions[agent] for agent in agents])
+    except (TypeError, ValueError):
+        given = np.array([])
+    if given.shape != (len(agents), *wanted):
+        agent = next(agent for agent in agents if _shape(actions[agent]) != wanted)
+        raise CommandError(
+            f"command of {agent!r} of shape {_shape(actions[agent])}: should be {wanted}"
+        )
+    if given.dtype.kind not in "fiub":
+        raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
+    return given.astype(np.float64)
+
+
+def _shape(command: ArrayLike) -> tuple[int, ...] | str:
+    try:
+        return np.shape(command)
+    except ValueError:
+        return "ragged"

@@ -377,3 +377,21 @@ def test_an_absent_robot_earns_nothing() -> None:
             break
     assert paid[0] == 1.0
     assert terminated.tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        ([[1.0, 2.0], [3.0]], r"of shape ragged: should be \(4,\)"),
+        (np.zeros(4, complex), "should be numbers"),
+        ([None] * 4, "should be numbers"),
+        (["left"] * 4, "should be numbers"),
+    ],
+)
+def test_a_command_that_is_no_row_of_real_numbers_is_refused(command: Any, sentence: str) -> None:
+    env = parallel_env(n_robots=1)
+    env.reset(seed=0)
+    with pytest.raises(CommandError, match=sentence):
+        env.step({"robot_0": command})
+    with pytest.raises(CommandError, match="should be"):
+        env.step_arrays([command])

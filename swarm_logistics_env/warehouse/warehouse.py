@@ -190,7 +190,11 @@ class Warehouse:
         if self._seed is None:
             raise SetupError("step before reset: call reset(seed) first")
         try:
+            if np.iscomplexobj(commands):
+                raise CommandError("commands should be numbers: real ones, not complex")
             given = np.array(commands, dtype=np.float64, order="C")
+        except CommandError:
+            raise
         except (TypeError, ValueError) as error:
             raise CommandError(f"commands should be an array of numbers: {error}") from None
         if given.shape == self._command_shape:
