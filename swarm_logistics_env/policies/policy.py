@@ -47,9 +47,7 @@ def decide(
     """Return the commands of `policy`, with the state for those that need it.
 
     A policy that needs the state is a central controller: its commands reach robots that hear.
-
-    Raises:
-        PolicyError: it returned something other than finite numbers of shape (N, >= 4).
+    They are checked where they are used, by `Warehouse.step`.
     """
     if getattr(policy, "needs_state", False):
         return as_heard(policy.act(observations, state), state)  # type: ignore[call-arg]
