@@ -104,6 +104,24 @@ def test_run_prints_what_the_episode_gave(capsys: pytest.CaptureFixture[str]) ->
     assert capsys.readouterr().out.splitlines()[:-1] == first.splitlines()[:-1]
 
 
+def test_policy_of_ones_own_is_found_where_the_command_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "lazy_policy.py").write_text(
+        "import numpy as np\n"
+        "class Lazy:\n"
+        "    def reset(self, n_robots, seed):\n"
+        "        self.n_robots = n_robots\n"
+        "    def act(self, observations):\n"
+        "        return np.zeros((self.n_robots, 4))\n"
+    )
+    # As the installed script is started: without the folder it is run in.
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    monkeypatch.chdir(tmp_path)
+    assert app.run(["run", "--policy", "lazy_policy:Lazy", *SMALL]) == 0
+    assert "P = 0 items" in capsys.readouterr().out
+
+
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["--version"]) == 0
     assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__

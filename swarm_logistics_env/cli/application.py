@@ -20,6 +20,9 @@ class Application(typer.Typer):
 
     def run(self, arguments: list[str] | None = None) -> int:
         """Run a command line and return the exit code."""
+        # A policy of one's own lies where the command is run. Last: it shadows nothing installed.
+        if "" not in sys.path:
+            sys.path.append("")
         try:
             code = super().__call__(arguments, standalone_mode=False)
         except (KeyboardInterrupt, typer.Abort):
