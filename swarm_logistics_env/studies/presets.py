@@ -37,11 +37,7 @@ QUICK = Specification(
 RESILIENCE = Specification(
     name="resilience",
     scenario=Scenario(duration=2000.0, restock=True),
-    faults=(
-        Faults(
-            title="Faults in mid-run", modes=("FM1", "FM4", "dead"), robots=(3,), onsets=(666.7,)
-        ),
-    ),
+    faults=(Faults(title="Faults in mid-run", modes=("FM1", "FM4", "dead"), onsets=(666.7,)),),
 )
 
 

@@ -23,7 +23,8 @@ def test_quick_asks_every_indicator_at_four_seeds() -> None:
 
 def test_resilience_has_both_references_and_a_null() -> None:
     plan = Study.preset("resilience").plan()
-    assert len(plan.conditions) == 6
+    # No fault, its twin, and m = 1, 2, 3 of the removed and of three modes.
+    assert len(plan.conditions) == 2 + 3 * 4
     (twins,) = plan.twins
     assert twins.other.level == OTHER_BEHAVIOUR
     assert twins.other.condition.scenario == twins.original.condition.scenario
