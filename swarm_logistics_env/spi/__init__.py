@@ -18,7 +18,7 @@ from .multiplicity import adjust, holm
 from .power import minimum_detectable_effect, no_plan_because, seeds_for_power
 from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
-from .self_repair import SelfRepair, self_repair
+from .self_repair import SelfRepair, repair_times, self_repair
 from .sequential import LookVerdict, look_levels, verdict_at_look
 from .summaries import (
     Interval,
@@ -61,6 +61,7 @@ __all__ = [
     "prediction_interval",
     "probability_of_improvement",
     "relative_change",
+    "repair_times",
     "resilience_index",
     "robustness",
     "scalability",

@@ -12,7 +12,7 @@ from .errors import IndicatorError
 from .inputs import between_0_and_1, delivery_times
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -86,28 +86,13 @@ def self_repair(
             onset + window and end, or no delivery at all in a reference.
     """
     between_0_and_1("level", level)
-    if not (window > 0.0 and onset >= 0.0 and onset + window < end < math.inf):
-        raise IndicatorError(
-            f"onset = {onset}, window = {window}, end = {end}: should leave more than one window "
-            "between onset and end"
-        )
-    grid = np.arange(onset, end + _STEP / 2, _STEP)
-    hold = math.ceil(window / _STEP)
+    hold = _hold(window)
 
     def observed_and_resampled(
         runs: Sequence[ArrayLike], others: Sequence[ArrayLike], names: tuple[str, str]
     ) -> tuple[float, NDArray[np.float64]]:
-        lead = _windowed(names[0], runs, grid, window, end)
-        other = _windowed(names[1], others, grid, window, end)
-        if len(lead) != len(other):
-            raise IndicatorError(
-                f"unequal seed sets ({names[0]} has {len(lead)}, {names[1]} has {len(other)}): "
-                "should be the same seeds in the same order"
-            )
-        if not other.any():
-            raise IndicatorError(f"{names[1]}: should deliver something after the onset")
-        behind = lead - RECOVERED * other
-        n = len(lead)
+        behind = _behind({names[0]: runs, names[1]: others}, onset, end, window)
+        n = len(behind)
         drawn = generator.integers(n, size=(resamples, n))
         times_drawn = (drawn[:, :, np.newaxis] == np.arange(n)).sum(axis=1)
         observed = float(_first_hold(behind.sum(axis=0)[np.newaxis], hold)[0])
@@ -122,11 +107,85 @@ def self_repair(
         seconds=None if math.isinf(repair) else repair,
         low=low,
         high=high,
-        followed=(grid.size - 1 - hold) * _STEP,
+        followed=_followed(onset, end, window),
         null_seconds=None if math.isinf(null) else null,
         null_limit=null_limit,
         distinguishable=repair > null_limit,
     )
+
+
+def repair_times(
+    faulty: Sequence[ArrayLike],
+    reference: Sequence[ArrayLike],
+    *,
+    onset: float,
+    end: float,
+    window: float = 100.0,
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Self-repair time of every seed's own run, for `kaplan_meier`; see `self_repair`.
+
+    A single run's rate scatters: most of such a time is noise, and it says little without the same
+    of a pair without faults beside it.
+
+    Args:
+        faulty: Delivery times [s] of each seed's run with faults.
+        reference: Delivery times [s] of the same seeds' reference runs.
+        onset: When the faults begin [s].
+        end: When all runs end [s]; they must not run out of items before.
+        window: Length of the trailing window [s].
+
+    Returns:
+        Seconds from the onset and whether the rate came back, shapes (n_seeds,); where it did not,
+        the longest time that the run could have shown.
+
+    Raises:
+        IndicatorError: As for `self_repair`.
+    """
+    behind = _behind({"faulty": faulty, "reference": reference}, onset, end, window)
+    seconds = _first_hold(behind, _hold(window))
+    back = np.isfinite(seconds)
+    return np.where(back, seconds, _followed(onset, end, window)), back
+
+
+def _hold(window: float) -> int:
+    return math.ceil(window / _STEP)
+
+
+def _followed(onset: float, end: float, window: float) -> float:
+    """Longest self-repair time that runs can show [s]: a window has to fit in behind it."""
+    return (_grid(onset, end).size - 1 - _hold(window)) * _STEP
+
+
+def _grid(onset: float, end: float) -> NDArray[np.float64]:
+    return np.arange(onset, end + _STEP / 2, _STEP)
+
+
+def _behind(
+    pair: Mapping[str, Sequence[ArrayLike]], onset: float, end: float, window: float
+) -> NDArray[np.float64]:
+    """Deliveries in the window less the share of the reference's that counts as back.
+
+    Args:
+        pair: Name and runs of the led, then of the reference.
+
+    Returns:
+        One row per seed on the grid from onset to end, shape (seeds, points); below 0: not back.
+    """
+    if not (window > 0.0 and onset >= 0.0 and onset + window < end < math.inf):
+        raise IndicatorError(
+            f"onset = {onset}, window = {window}, end = {end}: should leave more than one window "
+            "between onset and end"
+        )
+    grid = _grid(onset, end)
+    lead, other = (_windowed(name, runs, grid, window, end) for name, runs in pair.items())
+    if len(lead) != len(other):
+        counts = ", ".join(f"{name} has {len(runs)}" for name, runs in pair.items())
+        raise IndicatorError(
+            f"unequal seed sets ({counts}): should be the same seeds in the same order"
+        )
+    if not other.any():
+        raise IndicatorError(f"{list(pair)[1]}: should deliver something after the onset")
+    return lead - RECOVERED * other
 
 
 def _windowed(

@@ -100,6 +100,20 @@ def test_equal_generators_give_equal_results() -> None:
     assert one.seconds == other.seconds
 
 
+def test_each_run_on_its_own_is_timed_or_censored() -> None:
+    reference = regular(3)
+    halved = np.concatenate([reference[2][reference[2] < ONSET], reference[2][400:][::2]])
+    faulty = [*without(reference[:2], 1_000, 1_200), halved]
+    faulty[0] = reference[0]
+    seconds, back = spi.repair_times(faulty, reference, onset=ONSET, end=END)
+    assert back.tolist() == [True, True, False]
+    assert seconds == pytest.approx([0, 290, 900], abs=6)
+    curve = spi.kaplan_meier(seconds, back)
+    assert curve.share == pytest.approx([2 / 3, 1 / 3])
+    with pytest.raises(IndicatorError, match="unequal seed sets"):
+        spi.repair_times(faulty, reference[:2], onset=ONSET, end=END)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

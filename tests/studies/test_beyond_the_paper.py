@@ -14,7 +14,8 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.analysis.faulty_runs import anchoring_loads, fault_budgets
 from swarm_logistics_env.studies.analysis.paired import jackknife_interval
 from swarm_logistics_env.studies.analysis.policies import cell_contests, indicator_contests
-from swarm_logistics_env.studies.analysis.resilience import Resilience, rate_curves, resiliences
+from swarm_logistics_env.studies.analysis.rates import rate_curves
+from swarm_logistics_env.studies.analysis.resilience import Resilience, resiliences
 from swarm_logistics_env.studies.analysis.scaling import steps
 from swarm_logistics_env.studies.comparisons import NO_FAULT, OTHER_BEHAVIOUR, Level
 from swarm_logistics_env.studies.execution import Outcome
@@ -95,6 +96,14 @@ def test_swarm_that_comes_back_has_a_self_repair_time(repaired: Findings) -> Non
     assert one.repair.null_limit < 400
     ((*_, reading),) = table(repaired, "Self-repair time")
     assert reading == "longer than chance makes it"
+    assert one.single is not None
+    fault, null = one.single
+    assert (fault.runs, null.runs) == (SEEDS, SEEDS)
+    medians = fault.curve.median(), null.curve.median()
+    assert None not in medians
+    assert medians[0] > 550 > medians[1]  # type: ignore[operator]
+    names = [figure.name for figure in figures_of(document(repaired))]
+    assert "self-repair-swarm-dt-Fault-tolerance-and-robustness-dead-600s" in names
 
 
 def test_swarm_that_never_comes_back_is_censored() -> None:
@@ -110,6 +119,8 @@ def test_swarm_that_never_comes_back_is_censored() -> None:
     assert float(null) < 400
     assert longest == "1300"
     assert reading == "censored: not back within the run"
+    ((_, _, median, censored, *_),) = table(found, "Self-repair run by run")
+    assert (median, censored) == ("not reached", f"{SEEDS} of {SEEDS} runs")
 
 
 def test_no_loss_is_not_distinguishable_from_no_fault() -> None:

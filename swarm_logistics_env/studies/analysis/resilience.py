@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env import spi, streams
+from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.self_repair import SelfRepair
-from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.analysis.runs import outcomes_of
-from swarm_logistics_env.studies.comparisons import Arm, Comparison
+from swarm_logistics_env.spi.survival import SurvivalCurve
+from swarm_logistics_env.studies.analysis.rates import window_of
+from swarm_logistics_env.studies.analysis.runs import Times, outcomes_of, times_of
+from swarm_logistics_env.studies.comparisons import Comparison
 from swarm_logistics_env.studies.judgement import Findings
 
-_LONGEST_WINDOW = 100.0  # s
-_STEP = 5.0  # s, between the points of a curve
-
-Times = tuple[NDArray[np.float64], ...]
+Pair = tuple[Times, Times]
 
 
 @dataclass(frozen=True)
@@ -33,28 +32,40 @@ class Resilience:
         against_whole: over those of the whole swarm: R local in time, above 1 - m/N.
         repair: self-repair time against the swarm with the robots removed; None: `problem` says
             why.
+        single: the same run by run, of the fault and of its null; None as `repair`.
     """
 
     comparison: Comparison
     against_removed: Estimate | None
     against_whole: Estimate | None
     repair: SelfRepair | None
+    single: SingleRepairs | None
     problem: str | None
 
 
 @dataclass(frozen=True)
-class RateCurve:
-    """Deliveries in the trailing window, mean over seeds with pointwise 95 % t-intervals.
+class RepairCurve:
+    """Kaplan and Meier's curve of the self-repair times of single runs.
 
     Attributes:
         label: which runs.
-        seconds: end of the window [s]; shape (k,).
-        rates: [items a window], shape (k,).
+        curve: share of runs that are not back yet.
+        followed: until when the runs were watched, from the onset [s].
+        censored: how many were not back by then; runs: of how many.
     """
 
     label: str
-    seconds: tuple[float, ...]
-    rates: tuple[Interval, ...]
+    curve: SurvivalCurve
+    followed: float
+    censored: int
+    runs: int
+
+
+class SingleRepairs(NamedTuple):
+    """Self-repair run by run: with the fault, and of the pair without."""
+
+    fault: RepairCurve
+    null: RepairCurve
 
 
 def resiliences(findings: Findings) -> Iterator[Resilience]:
@@ -63,18 +74,27 @@ def resiliences(findings: Findings) -> Iterator[Resilience]:
         assert comparison.removed is not None
         m, n = comparison.changed.level.value, comparison.original.condition.scenario.n_robots
         faulty, removed, whole = (
-            _times(findings, arm)
+            times_of(findings, arm)
             for arm in (comparison.changed, comparison.removed, comparison.original)
         )
         if faulty is None or removed is None or whole is None:
             continue
         onset = comparison.changed.level.onset
-        repair, problem = _self_repair(findings, comparison, faulty, removed)
+        repair: SelfRepair | None = None
+        single: SingleRepairs | None = None
+        problem: str | None = None
+        try:
+            repair, single = _self_repair(
+                comparison, (faulty, removed), _null(findings, comparison)
+            )
+        except (StudyError, spi.IndicatorError) as error:
+            problem = str(error)
         yield Resilience(
             comparison,
             _index(faulty, removed, onset, 1.0),
             _index(faulty, whole, onset, 1.0 - m / n),
             repair,
+            single,
             problem,
         )
 
@@ -86,45 +106,6 @@ def mid_run_faults(findings: Findings) -> Iterator[Comparison]:
             yield comparison
 
 
-def window_of(comparison: Comparison) -> float:
-    """Return the trailing window [s]: 100, or a third of what is left after the onset."""
-    left = comparison.original.condition.scenario.duration - comparison.changed.level.onset
-    return min(_LONGEST_WINDOW, left / 3)
-
-
-def rate_curves(findings: Findings, comparison: Comparison) -> tuple[RateCurve, ...]:
-    """Return the delivery rates without fault, with the robots removed, and with the fault."""
-    assert comparison.removed is not None
-    arms = {
-        "no fault": comparison.original,
-        "removed": comparison.removed,
-        "fault": comparison.changed,
-    }
-    window = window_of(comparison)
-    end = comparison.original.condition.scenario.duration
-    seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
-    curves = []
-    for label, arm in arms.items():
-        if (times := _times(findings, arm)) is not None:
-            counts = np.array([_in_window(run, seconds, window) for run in times])
-            rates = tuple(spi.mean_interval(column) for column in counts.T)
-            curves.append(RateCurve(label, tuple(seconds.tolist()), rates))
-    return tuple(curves)
-
-
-def _in_window(
-    times: NDArray[np.float64], seconds: NDArray[np.float64], window: float
-) -> NDArray[np.float64]:
-    until = np.searchsorted(times, seconds, side="right")
-    since = np.searchsorted(times, seconds - window, side="right")
-    return np.asarray(until - since, dtype=np.float64)
-
-
-def _times(findings: Findings, arm: Arm) -> Times | None:
-    outcomes = outcomes_of(findings, arm)
-    return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)
-
-
 def _index(faulty: Times, reference: Times, onset: float, threshold: float) -> Estimate | None:
     try:
         return spi.resilience_index(faulty, reference, onset=onset, threshold=threshold)
@@ -132,9 +113,12 @@ def _index(faulty: Times, reference: Times, onset: float, threshold: float) -> E
         return None
 
 
-def _self_repair(
-    findings: Findings, comparison: Comparison, faulty: Times, removed: Times
-) -> tuple[SelfRepair | None, str | None]:
+def _null(findings: Findings, comparison: Comparison) -> Pair:
+    """Return the pair without fault.
+
+    Raises:
+        StudyError: why there can be no self-repair time.
+    """
     twins = next(
         (
             twins
@@ -143,23 +127,32 @@ def _self_repair(
         ),
         None,
     )
-    null = (
-        None if twins is None else (_times(findings, twins.original), _times(findings, twins.other))
-    )
-    if null is None or null[0] is None or null[1] is None:
-        return None, "the runs of the no-fault null are missing"
+    original = None if twins is None else times_of(findings, twins.original)
+    other = None if twins is None else times_of(findings, twins.other)
+    if original is None or other is None:
+        raise StudyError("the runs of the no-fault null are missing")
     arms = comparison.arms
     if any(outcome.all_delivered for arm in arms for outcome in outcomes_of(findings, arm) or ()):
-        return None, "the items ran out, and the rate with them: use restock"
-    try:
-        return spi.self_repair(
-            faulty,
-            removed,
-            (null[0], null[1]),
-            onset=comparison.changed.level.onset,
-            end=comparison.original.condition.scenario.duration,
-            generator=streams.generator(0, "self-repair"),
-            window=window_of(comparison),
-        ), None
-    except spi.IndicatorError as error:
-        return None, str(error)
+        raise StudyError("the items ran out, and the rate with them: use restock")
+    return original, other
+
+
+def _self_repair(
+    comparison: Comparison, pair: Pair, null: Pair
+) -> tuple[SelfRepair, SingleRepairs]:
+    onset, window = comparison.changed.level.onset, window_of(comparison)
+    end = comparison.original.condition.scenario.duration
+    generator = streams.generator(0, "self-repair")
+    pooled = spi.self_repair(*pair, null, onset=onset, end=end, generator=generator, window=window)
+    times = [spi.repair_times(*runs, onset=onset, end=end, window=window) for runs in (pair, null)]
+    fault, without = (
+        RepairCurve(
+            label,
+            spi.kaplan_meier(seconds, back),
+            pooled.followed,
+            int(np.count_nonzero(~back)),
+            back.size,
+        )
+        for label, (seconds, back) in zip(("fault", "no fault"), times)
+    )
+    return pooled, SingleRepairs(fault, without)

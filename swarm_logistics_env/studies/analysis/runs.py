@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swarm_logistics_env.studies.comparisons import Arm
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.judgement import Findings
+
+Times = tuple[NDArray[np.float64], ...]
 
 
 def outcomes_of(findings: Findings, arm: Arm) -> tuple[Outcome, ...] | None:
@@ -17,3 +22,9 @@ def outcomes_of(findings: Findings, arm: Arm) -> tuple[Outcome, ...] | None:
         if outcome is not None and outcome.error is None and outcome.untimed is None
     )
     return complete if len(complete) == len(found) else None
+
+
+def times_of(findings: Findings, arm: Arm) -> Times | None:
+    """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""
+    outcomes = outcomes_of(findings, arm)
+    return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from swarm_logistics_env.spi.scaling import ScalingFit
-from swarm_logistics_env.studies.analysis.resilience import RateCurve
 from swarm_logistics_env.studies.analysis.scaling import SizeSeries
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
     for axes, panel in zip(grid[:, 0], panels):
         _panel(axes, panel)
     if len(panels[0].series) > 1:
-        _legend(canvas, grid[0, 0], lines=False)
+        legend(canvas, grid[0, 0], lines=False)
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
@@ -215,10 +214,11 @@ def scaling(canvas: Canvas, series: SizeSeries, fits: Sequence[ScalingFit]) -> N
     axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= 1.08 * highest])
     axes.set(xlabel="swarm size N [robots]", ylabel="P [items]")
     axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
-    _legend(canvas, axes, lines=True)
+    legend(canvas, axes, lines=True)
 
 
-def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
+def legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
+    """Put the legend of one pair of axes above all of them."""
     handles, labels = axes.get_legend_handles_labels()
     canvas.legend(
         handles,
@@ -230,42 +230,3 @@ def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
         handletextpad=0.5,
         columnspacing=1.2,
     )
-
-
-@dataclass(frozen=True)
-class RatePanel:
-    """Delivery rates of paired runs around one fault."""
-
-    title: str
-    curves: tuple[RateCurve, ...]
-
-
-def rates(canvas: Canvas, panels: Sequence[RatePanel], onset: float, y_label: str) -> None:
-    """Draw deliveries over time, one panel below the other, on one scale."""
-    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
-    for axes, panel in zip(grid[:, 0], panels):
-        for index, curve in enumerate(panel.curves):
-            colour = COLOURS[index % len(COLOURS)]
-            known = [(r.low, r.high) for r in curve.rates]
-            if all(low is not None and high is not None for low, high in known):
-                low = [max(0.0, end or 0.0) for end, _ in known]
-                high = [end or 0.0 for _, end in known]
-                axes.fill_between(curve.seconds, low, high, color=colour, alpha=0.16, linewidth=0)
-            axes.plot(
-                curve.seconds,
-                [rate.value for rate in curve.rates],
-                LINES[index % len(LINES)],
-                color=colour,
-                marker=MARKERS[index % len(MARKERS)],
-                markevery=(index * 4, 12),
-                markersize=4.5,
-                linewidth=1.6,
-                label=curve.label,
-            )
-        axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
-        axes.set_ylim(bottom=0.0)
-        axes.set(ylabel=y_label)
-        axes.set_title(panel.title, fontsize="medium", loc="left")
-        axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
-    grid[-1, 0].set_xlabel("end of the window [s]")
-    _legend(canvas, grid[0, 0], lines=True)

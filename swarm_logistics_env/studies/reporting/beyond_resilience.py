@@ -1,0 +1,207 @@
+"""Sections on faults that begin during the run: resilience, self-repair, deliveries over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.self_repair import RECOVERED, SelfRepair
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.analysis.rates import rate_curves, window_of
+from swarm_logistics_env.studies.analysis.resilience import (
+    RepairCurve,
+    Resilience,
+    mid_run_faults,
+    resiliences,
+)
+from swarm_logistics_env.studies.comparisons import Comparison
+from swarm_logistics_env.studies.judgement import Findings
+from swarm_logistics_env.studies.reporting import drawing_time, wording
+from swarm_logistics_env.studies.reporting.drawing import Draw
+from swarm_logistics_env.studies.reporting.figures import Figure, slug
+from swarm_logistics_env.studies.reporting.sections import Section
+
+
+def beyond_resilience(findings: Findings) -> Iterator[Section]:
+    """Yield what there is to say of faults that begin during the run."""
+    found = tuple(resiliences(findings))
+    if not found:
+        return
+    rows, repairs, singles, problems = [], [], [], []
+    for one in found:
+        who = one.comparison.policy, str(one.comparison.changed.level)
+        rows.append((*who, *_index(one.against_removed), *_index(one.against_whole)))
+        if one.repair is not None:
+            repairs.append((*who, *_repair(one.repair, window_of(one.comparison))))
+        if one.single is not None:
+            singles.append((*who, *_single(one.single.fault), *_single(one.single.null)))
+        if one.problem:
+            problems.append(f"{who[0]}, {who[1]}: no self-repair time: {one.problem}.")
+    yield Section(
+        "Resilience: deliveries after the onset",
+        (
+            "policy", "fault", "over the removed robots' [95 %]", "above 1",
+            "over the whole swarm's [95 %]", "above 1 - m/N",
+        ),
+        tuple(rows),
+        (
+            ("Deliveries after the onset over those of the paired reference. Reference with the "
+            "robots removed at the onset: fault tolerance local in time; whole swarm: robustness "
+            f"local in time. Verdicts unadjusted; {wording.seeds_text(findings)}."),
+        ),
+    )  # fmt: skip
+    yield Section(
+        "Self-repair time",
+        (
+            "policy", "fault", "window [s]", "self-repair [s, 95 %]", "no-fault null [s]",
+            "95 % of the null below [s]", "longest that could show [s]", "reading",
+        ),
+        tuple(repairs),
+        (
+            ("From the onset until the delivery rate, pooled over seeds in a trailing window, is "
+            f"back at {100 * RECOVERED:g} % of that with the robots removed, for a whole window. "
+            "The null is the same statistic of a pair without fault that differs in behaviour "
+            "seeds alone: a time that does not exceed 95 % of its resamples measures noise. "
+            "Intervals: bootstrap over seeds; ∞ and \"censored\": not back within the run."),
+            *problems,
+        ),
+    )  # fmt: skip
+    yield Section("Deliveries over time", figures=tuple(rate_figures(findings)))
+    if singles:
+        yield Section(
+            "Self-repair run by run",
+            (
+                "policy",
+                "fault",
+                "median [s]",
+                "not back",
+                "null's median [s]",
+                "null not back",
+            ),
+            tuple(singles),
+            (
+                (
+                    "Kaplan and Meier's curves of each run's own time, those that are not back "
+                    "censored at the last moment that could show it. A single run's rate scatters, "
+                    "so what counts is the distance from the no-fault null, not the times."
+                ),
+            ),
+            figures=tuple(repair_figures(findings, found)),
+        )
+
+
+def _index(estimate: Estimate | None) -> tuple[str, str]:
+    if estimate is None:
+        return wording.NOTHING, "undefined"
+    interval = Interval(estimate.value, estimate.low, estimate.high)
+    return wording.bracketed(interval, 3), estimate.verdict
+
+
+def _repair(repair: SelfRepair, window: float) -> tuple[str, ...]:
+    seconds = math.inf if repair.seconds is None else repair.seconds
+    null = math.inf if repair.null_seconds is None else repair.null_seconds
+    if not repair.distinguishable:
+        reading = "not distinguishable from no fault"
+    elif repair.censored:
+        reading = "censored: not back within the run"
+    else:
+        reading = "longer than chance makes it"
+    return (
+        f"{window:g}",
+        wording.bracketed(Interval(seconds, repair.low, repair.high), 0),
+        wording.bracketed(Interval(null, None, None), 0),
+        wording.bracketed(Interval(repair.null_limit, None, None), 0),
+        f"{repair.followed:g}",
+        reading,
+    )
+
+
+def _single(curve: RepairCurve) -> tuple[str, str]:
+    median = curve.curve.median()
+    return (
+        "not reached" if median is None else f"{median:g}",
+        f"{curve.censored} of {curve.runs} runs",
+    )
+
+
+def repair_figures(findings: Findings, found: tuple[Resilience, ...]) -> Iterator[Figure]:
+    """Yield the curves of single runs' self-repair times, a figure per failure mode."""
+    groups: dict[tuple[str, str, str, float], list[Resilience]] = {}
+    for one in found:
+        if one.single is not None:
+            groups.setdefault(_fault_of(one.comparison), []).append(one)
+    for (policy, table, mode, onset), members in groups.items():
+        panels = [
+            drawing_time.RepairPanel(f"m = {one.comparison.changed.level.value:g}", one.single)
+            for one in members
+            if one.single is not None
+        ]
+        rows = tuple(
+            (panel.title, curve.label, *values)
+            for panel in panels
+            for curve in panel.curves
+            for values in zip(*(column.tolist() for column in curve.curve))
+        )
+        if not rows:
+            continue
+        swarm = members[0].comparison.original.condition.scenario.n_robots
+        yield Figure(
+            slug("self-repair", policy, table, mode, f"{onset:g}s"),
+            f"{policy}, {table}, N = {swarm}: share of runs whose delivery rate is not back yet "
+            f"after failure mode {mode} from {onset:g} s, beside pairs of runs without fault that "
+            "differ in behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals "
+            f"(Greenwood, log-log); {wording.seeds_text(findings)}; a cross where runs are "
+            "censored.",
+            ("panel", "runs", "seconds", "share_not_back", "low", "high"),
+            rows,
+            0.6 + 2.1 * len(panels),
+            _draw_repairs(panels),
+        )
+
+
+def _draw_repairs(panels: list[drawing_time.RepairPanel]) -> Draw:
+    return lambda canvas: drawing_time.repairs(canvas, panels)
+
+
+def _fault_of(comparison: Comparison) -> tuple[str, str, str, float]:
+    level = comparison.changed.level
+    return comparison.policy, comparison.table, level.name, level.onset
+
+
+def rate_figures(findings: Findings) -> Iterator[Figure]:
+    """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
+    groups: dict[tuple[str, str, str, float], list[Comparison]] = {}
+    for comparison in mid_run_faults(findings):
+        groups.setdefault(_fault_of(comparison), []).append(comparison)
+    for (policy, table, mode, onset), comparisons in groups.items():
+        panels = [
+            drawing_time.RatePanel(
+                f"m = {comparison.changed.level.value:g}", rate_curves(findings, comparison)
+            )
+            for comparison in comparisons
+        ]
+        window = window_of(comparisons[0])
+        rows = tuple(
+            (panel.title, curve.label, second, rate.value, rate.low, rate.high)
+            for panel in panels
+            for curve in panel.curves
+            for second, rate in zip(curve.seconds, curve.rates)
+        )
+        if not rows:
+            continue
+        swarm = comparisons[0].original.condition.scenario.n_robots
+        yield Figure(
+            slug("deliveries", policy, table, mode, f"{onset:g}s"),
+            f"{policy}, {table}, N = {swarm}: deliveries in the trailing {window:g} s around "
+            f"failure mode {mode} from {onset:g} s (dotted line). Mean over "
+            f"{wording.seeds_text(findings)} with pointwise 95 % t-intervals.",
+            ("panel", "runs", "seconds", "deliveries", "low", "high"),
+            rows,
+            0.6 + 2.3 * len(panels),
+            _draw(panels, onset, f"deliveries in {window:g} s"),
+        )
+
+
+def _draw(panels: list[drawing_time.RatePanel], onset: float, y_label: str) -> Draw:
+    return lambda canvas: drawing_time.rates(canvas, panels, onset, y_label)
