@@ -1,5 +1,21 @@
 """Adapters: the environment in the forms that other libraries ask for."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from swarm_logistics_env.adapters.central import CentralEnv
 
-__all__ = ["CentralEnv"]
+if TYPE_CHECKING:
+    from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
+
+__all__ = ["CentralEnv", "SwarmVecEnv"]
+
+
+def __getattr__(name: str) -> type[SwarmVecEnv]:
+    # When first asked for: it loads stable-baselines3, and that torch.
+    if name == "SwarmVecEnv":
+        from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
+
+        return SwarmVecEnv
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

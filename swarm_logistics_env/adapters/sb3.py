@@ -1,0 +1,443 @@
+"""Stable-baselines3's VecEnv over the array methods: every robot of every world is a row."""
+
+from __future__ import annotations
+
+import operator
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any, TypeAlias
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.streams import key
+from swarm_logistics_env.wrappers import Wrapper
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        f"SwarmVecEnv needs stable-baselines3 ({error}): pip install 'swarm-logistics-env[train]'"
+    ) from error
+
+World: TypeAlias = SwarmLogisticsEnv | Wrapper
+Infos: TypeAlias = list[dict[str, Any]]
+
+
+class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of the type check
+    """Several worlds as one `VecEnv`: each robot is a row, so one policy is learned by all of them.
+
+    World 0's robots come first, then world 1's, and so on: (sum N, D) observations, (sum N, 4)
+    actions. A world that ends begins its next episode at once, as stable-baselines3 expects.
+    Every random event follows from `seed` and the world's number alone: not from `n_worlds`, nor
+    from `threads`.
+
+    How rows end:
+
+    * time up: done with `TimeLimit.truncated`, so that learners bootstrap the value;
+    * everything delivered: done without it;
+    * a robot that is removed, while its world goes on: done without it, once. Until the world ends
+      its row is padding: zeros, reward 0, its action is ignored. So are rows of robots that are
+      not in a world's episode, where a wrapper plays sizes smaller than its largest. When the
+      world ends padding is done too, so that the padding is an episode by itself with return 0,
+      of which nothing reaches the next one. `present` tells padding from robots.
+
+    The info of a done row holds, beside `terminal_observation` and `TimeLimit.truncated`:
+    `delivered` (the paper's P, so far), `n_robots`, `failure_modes` (of the row's robot),
+    `padding`, `world`, and what the environment has to say as `episode_info` (see
+    `wrappers.IndicatorReward`). Name them as `info_keywords` of a `VecMonitor` to log them; its
+    mean return counts padding as episodes of return 0.
+
+    Args:
+        scenario: the conditions; default: the paper's.
+        n_worlds: how many worlds run side by side.
+        threads: how many of them step at the same time; the results are the same bits.
+        n_robots: the swarm size, or several that the worlds have in turn, e.g. [5, 25, 50].
+        make_env: instead of scenario and fields: world number -> environment, for wrappers.
+        seed: of all episodes, as `seed()`; None: another one every time.
+        **fields: arguments of `SwarmLogisticsEnv` and fields of the scenario.
+
+    Attributes:
+        worlds: the environments.
+
+    Raises:
+        SetupError: arguments that exclude each other or cannot be; environments whose rows or
+            commands differ in length, or that are one and the same.
+        ScenarioError, FaultError: a field cannot be.
+        ModuleNotFoundError: stable-baselines3 is not installed.
+
+    Example:
+        >>> from stable_baselines3 import PPO
+        >>> env = SwarmVecEnv(n_worlds=3, n_robots=[5, 10], duration=20.0)
+        >>> env.num_envs
+        20
+        >>> PPO("MlpPolicy", env, n_steps=32, seed=0).learn(640).num_timesteps
+        640
+        >>> from swarm_logistics_env.wrappers import FaultInjection
+        >>> def make_env(world):
+        ...     return FaultInjection(SwarmLogisticsEnv(n_robots=5), "FM1", robots=world + 1)
+        >>> SwarmVecEnv(make_env=make_env, n_worlds=2).num_envs
+        10
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        *,
+        n_worlds: int = 8,
+        threads: int = 1,
+        n_robots: int | Sequence[int] | None = None,
+        make_env: Callable[[int], World] | None = None,
+        seed: int | None = None,
+        **fields: Any,
+    ) -> None:
+        n_worlds, self._threads = _count("n_worlds", n_worlds), _count("threads", threads)
+        if make_env is None:
+            make_env = _maker(scenario, n_worlds, n_robots, fields)
+        elif scenario is not None or n_robots is not None or fields:
+            raise SetupError(
+                "make_env and conditions: should be one or the other; make_env decides what its "
+                "environments are like"
+            )
+        self.worlds = [make_env(world) for world in range(n_worlds)]
+        observations, actions = _spaces(self.worlds)
+        sizes = [len(env.possible_agents) for env in self.worlds]
+        ends = np.cumsum(sizes).tolist()
+        self._rows = [slice(end - size, end) for end, size in zip(ends, sizes)]
+        self._world_of = np.repeat(np.arange(n_worlds), sizes)
+        # Largest first, so that no thread is left with much work at the end.
+        self._order = sorted(range(n_worlds), key=lambda world: -sizes[world])
+        self._n_robots = [0] * n_worlds
+        self._is_over = [False] * n_worlds
+        self._present = np.zeros(ends[-1], np.bool_)
+        self._silence: Infos = [{"TimeLimit.truncated": False} for _ in range(ends[-1])]
+        self._pool = self._new_pool()
+        super().__init__(ends[-1], observations, actions)
+        if seed is not None:
+            self.seed(seed)
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Which rows of the latest observations are a robot's, (num_envs,); others are zeros."""
+        return self._present.copy()
+
+    def seed(self, seed: int | None = None) -> list[int]:
+        """Fix all episodes from the next `reset` on; returns each row's world's seed.
+
+        Raises:
+            SetupError: the seed is no integer.
+        """
+        if seed is None:
+            seed = int(np.random.default_rng().integers(2**63))
+        try:
+            seed = operator.index(seed)
+        except TypeError:
+            raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
+        self._seeds = [key(seed, "world", world) >> 1 for world in self._world_of.tolist()]
+        return list(self._seeds)
+
+    def set_options(self, options: Mapping[str, Any] | Sequence[Any] | None = None) -> None:
+        """Give the next `reset` options: the same to all worlds, or a list of one for each.
+
+        Raises:
+            SetupError: a list of another length. One of a length of `num_envs`, which
+                stable-baselines3 passes, should have the same for all rows of a world.
+        """
+        if options is None or isinstance(options, Mapping):
+            self._options = [dict(options or {})] * self.num_envs
+            return
+        if len(options) == len(self.worlds):
+            options = [options[world] for world in self._world_of.tolist()]
+        firsts = [rows.start for rows in self._rows]
+        if len(options) != self.num_envs or any(
+            options[row] != options[firsts[world]] for row, world in enumerate(self._world_of)
+        ):
+            raise SetupError(
+                f"{len(options)} options: should be one dict, or a dict for each of the "
+                f"{len(self.worlds)} worlds"
+            )
+        self._options = [dict(given or {}) for given in options]
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode in every world; returns the observations (num_envs, D)."""
+        observations = self._blank()
+        for world, rows in enumerate(self._rows):
+            seed, options = self._seeds[rows.start], self._options[rows.start]
+            self._begin(world, observations[rows], seed, options)
+        self._reset_seeds()
+        self._reset_options()
+        return observations
+
+    def step_async(self, actions: ArrayLike) -> None:
+        """Take the commands (num_envs, 4) of the step that `step_wait` makes.
+
+        Raises:
+            CommandError: wrong shape or not finite; nothing has happened in any world then.
+        """
+        given = np.asarray(actions)
+        wanted = (self.num_envs, *self.action_space.shape)
+        if given.shape != wanted or given.dtype.kind not in "fiub":
+            raise CommandError(
+                f"actions of shape {given.shape} and type {given.dtype}: should be {wanted} numbers"
+            )
+        if not np.isfinite(given).all():
+            row = int(np.argwhere(~np.isfinite(given))[0, 0])
+            world = int(self._world_of[row])
+            raise CommandError(
+                f"actions[{row}] = {given[row]} (world {world}, robot_"
+                f"{row - self._rows[world].start}): should be finite"
+            )
+        self._actions = given
+
+    def step_wait(
+        self,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Infos]:
+        """Step every world; returns observations, rewards and dones by row, and infos.
+
+        The arrays are the caller's own. The infos of rows that are not done are always the same
+        dicts: to be read only.
+        """
+        # New memory every time: learners keep the observations before these.
+        self._observations = self._blank()
+        self._rewards = np.zeros(self.num_envs, np.float32)
+        self._terminated = np.zeros(self.num_envs, np.bool_)
+        self._truncated = np.zeros(self.num_envs, np.bool_)
+        self._step_worlds()
+        dones = self._terminated | self._truncated
+        infos = self._silence.copy()
+        # Here and in the worlds' order: what episodes share must not depend on the threads.
+        if dones.any() or any(self._is_over):
+            for world, rows in enumerate(self._rows):
+                if self._is_over[world] or dones[rows].any():
+                    self._end(world, dones, infos)
+        return self._observations, self._rewards, dones, infos
+
+    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
+        """Return an attribute of the world of each row."""
+        return self._of_rows(lambda env: getattr(env, attr_name), indices)
+
+    def set_attr(
+        self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None
+    ) -> None:
+        """Set an attribute of the worlds of these rows, on the wrapper that has it."""
+
+        def set_it(env: World) -> None:
+            layers = _layers(env)
+            holders = (e for e in layers if attr_name in vars(e) or hasattr(type(e), attr_name))
+            setattr(next(holders, env), attr_name, value)
+
+        self._of_rows(set_it, indices)
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: int | Iterable[int] | None = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Call a method of the worlds of these rows, once each; returns the answer by row."""
+        return self._of_rows(
+            lambda env: getattr(env, method_name)(*method_args, **method_kwargs), indices
+        )
+
+    def env_is_wrapped(
+        self, wrapper_class: type, indices: int | Iterable[int] | None = None
+    ) -> list[bool]:
+        """Return by row whether its world has such a wrapper around it."""
+        return self._of_rows(
+            lambda env: any(isinstance(layer, wrapper_class) for layer in _layers(env)), indices
+        )
+
+    def get_images(self) -> list[NDArray[np.uint8]]:
+        """Return a picture of each world, all of the largest one's size."""
+        pictures = [env.render() for env in self.worlds]
+        shown = [picture for picture in pictures if picture is not None]
+        height, width = np.max([picture.shape[:2] for picture in shown], axis=0)
+        return [
+            np.pad(p, ((0, height - p.shape[0]), (0, width - p.shape[1]), (0, 0))) for p in shown
+        ]
+
+    def render(self, mode: str | None = None) -> NDArray[np.uint8] | None:
+        """Return a picture of all worlds, as tiles; in mode "human" show world 0 in its window."""
+        if self.render_mode == "human":
+            self.worlds[0].render()
+            return None
+        picture: NDArray[np.uint8] | None = super().render(mode)
+        return picture
+
+    def close(self) -> None:
+        """Release threads and what rendering holds; harmless when called twice."""
+        if self._pool is not None:
+            self._pool.shutdown()
+        for env in self.worlds:
+            env.close()
+
+    def _new_pool(self) -> ThreadPoolExecutor | None:
+        # One fewer: the thread that asks for the step works as well.
+        helpers = min(self._threads, len(self.worlds)) - 1
+        return ThreadPoolExecutor(helpers, "swarm-worlds") if helpers else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_pool": None}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        self.__dict__.update(saved)
+        self._pool = self._new_pool()
+
+    def _blank(self) -> NDArray[np.float32]:
+        return np.zeros((self.num_envs, *self.observation_space.shape), np.float32)
+
+    def _of_rows(
+        self, answer: Callable[[World], Any], indices: int | Iterable[int] | None
+    ) -> list[Any]:
+        chosen = range(self._world_of.size) if indices is None else indices
+        worlds = self._world_of[np.atleast_1d(np.fromiter(_each(chosen), np.int64))].tolist()
+        answers = {world: answer(self.worlds[world]) for world in dict.fromkeys(worlds)}
+        return [answers[world] for world in worlds]
+
+    def _step_worlds(self) -> None:
+        waiting = deque(self._order)
+        if self._pool is None:
+            self._work(waiting)
+            return
+        helpers = min(self._threads, len(self.worlds)) - 1
+        futures = [self._pool.submit(self._work, waiting) for _ in range(helpers)]
+        try:
+            self._work(waiting)
+        finally:
+            wait(futures)
+        for future in futures:
+            future.result()
+
+    def _work(self, waiting: deque[int]) -> None:
+        while True:
+            try:
+                world = waiting.popleft()
+            except IndexError:
+                return
+            env, first = self.worlds[world], self._rows[world].start
+            rows = slice(first, first + self._n_robots[world])
+            (
+                self._observations[rows],
+                self._rewards[rows],
+                self._terminated[rows],
+                self._truncated[rows],
+            ) = env.step_arrays(self._actions[rows])
+            self._is_over[world] = not env.agents
+
+    def _end(self, world: int, dones: NDArray[np.bool_], infos: Infos) -> None:
+        """Tell of the rows that are done, and begin the next episode if the world is over."""
+        env, rows = self.worlds[world], self._rows[world]
+        state = env.warehouse.state
+        if self._is_over[world]:
+            dones[rows] = True
+        about = {"delivered": state.delivered, "n_robots": state.n_robots, "world": world}
+        about |= getattr(env, "episode_info", {})
+        for robot in np.flatnonzero(dones[rows]).tolist():
+            row = rows.start + robot
+            infos[row] = {
+                **about,
+                "terminal_observation": self._observations[row].copy(),
+                "TimeLimit.truncated": bool(self._truncated[row] and not self._terminated[row]),
+                "failure_modes": state.failure_modes[robot] if robot < state.n_robots else (),
+                "padding": not self._present[row],
+            }
+        if self._is_over[world]:
+            self._observations[rows] = 0.0
+            self._begin(world, self._observations[rows])
+        else:
+            self._note_present(world)
+
+    def _begin(
+        self,
+        world: int,
+        observations: NDArray[np.float32],
+        seed: int | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        env = self.worlds[world]
+        first = env.reset_arrays(seed, options or None)
+        if len(first) > len(observations):
+            raise SetupError(
+                f"n_robots = {len(first)}: should be at most {len(observations)}, for which world "
+                f"{world} has rows; a wrapper such as SwarmSize announces more"
+            )
+        observations[: len(first)] = first
+        self._n_robots[world], self._is_over[world] = len(first), False
+        self._note_present(world)
+
+    def _note_present(self, world: int) -> None:
+        present, rows = self.worlds[world].warehouse.state.robot_present, self._rows[world]
+        self._present[rows] = False
+        self._present[rows.start : rows.start + len(present)] = present
+
+
+def _count(name: str, value: int) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = 0
+    if number < 1:
+        raise SetupError(f"{name} = {value!r}: should be an integer of at least 1")
+    return number
+
+
+def _maker(
+    scenario: Scenario | None,
+    n_worlds: int,
+    n_robots: int | Sequence[int] | None,
+    fields: Mapping[str, Any],
+) -> Callable[[int], World]:
+    if isinstance(n_robots, Sequence | np.ndarray):
+        sizes: list[Any] = [int(size) for size in n_robots]
+    else:
+        sizes = [n_robots]
+    if not 1 <= len(sizes) <= n_worlds:
+        raise SetupError(
+            f"n_robots = {n_robots!r}: should be 1 to {n_worlds} sizes, as there are {n_worlds} "
+            "worlds to have them"
+        )
+
+    def make_env(world: int) -> World:
+        size = sizes[world % len(sizes)]
+        sized = {} if size is None else {"n_robots": size}
+        return SwarmLogisticsEnv(scenario, **sized, **fields)
+
+    return make_env
+
+
+def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
+    for env in worlds:
+        if not hasattr(env, "reset_arrays"):
+            raise SetupError(
+                f"make_env gave {env!r}: should be a SwarmLogisticsEnv or a wrapper of one"
+            )
+    if len({id(env.unwrapped) for env in worlds}) < len(worlds):
+        raise SetupError("make_env gave the same environment twice: should make one each time")
+    seen = [env.observation_space("robot_0") for env in worlds]
+    told = [env.action_space("robot_0") for env in worlds]
+    if len({(space.shape, command.shape) for space, command in zip(seen, told)}) > 1:
+        raise SetupError(
+            f"observations {[space.shape for space in seen]} and commands "
+            f"{[command.shape for command in told]}: should be of one length in all worlds, so of "
+            "one message_size"
+        )
+    low = np.min([space.low for space in seen], axis=0)
+    high = np.max([space.high for space in seen], axis=0)
+    return Box(low, high, dtype=np.float32), told[0]
+
+
+def _layers(env: World) -> list[Any]:
+    layers: list[Any] = [env]
+    while layers[-1] is not env.unwrapped:
+        layers.append(layers[-1].env)
+    return layers
+
+
+def _each(indices: int | Iterable[int]) -> Iterable[int]:
+    return indices if isinstance(indices, Iterable) else (indices,)
