@@ -133,7 +133,12 @@ class Comparison:
         return str(after)
 
     def estimate(
-        self, performance: Performance, *, level: float = 0.95, paired: bool = True
+        self,
+        performance: Performance,
+        *,
+        level: float = 0.95,
+        paired: bool = True,
+        bootstrap: np.random.Generator | None = None,
     ) -> Estimate:
         """Return the indicator over seeds.
 
@@ -141,6 +146,7 @@ class Comparison:
             performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
             level: confidence level of interval and verdict, in (0, 1).
             paired: whether the arms share their seeds, row by row.
+            bootstrap: random source for the studentised bootstrap, run from ten paired seeds on.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
@@ -148,7 +154,12 @@ class Comparison:
         before, after = self.original.level.value, self.changed.level.value
         p_o, p_new = performance(self.original), performance(self.changed)
         swarm = self.original.condition.scenario.n_robots
-        asked: _Asked = {"threshold": self.threshold, "level": level, "paired": paired}
+        asked: _Asked = {
+            "threshold": self.threshold,
+            "level": level,
+            "paired": paired,
+            "bootstrap": bootstrap,
+        }
         if self.indicator == "S":
             return spi.scalability(p_o, p_new, n=int(before), m=int(after - before), **asked)
         if self.indicator == "FT":
@@ -166,3 +177,4 @@ class _Asked(TypedDict):
     threshold: float
     level: float
     paired: bool
+    bootstrap: np.random.Generator | None

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import spi
+from swarm_logistics_env import spi, streams
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
@@ -110,6 +110,7 @@ class Findings:
         outcomes: of the plan's runs, by key, for what P alone does not tell.
         level: confidence level of the indicators' intervals and verdicts; above 0.95 at a
             declared look, so that all looks together err in 5 %.
+        looks: numbers of seeds at which the study was declared to be judged, before its first run.
     """
 
     plan: Plan
@@ -119,6 +120,7 @@ class Findings:
     exploratory: bool
     outcomes: Mapping[str, Outcome]
     level: float = LEVEL
+    looks: tuple[int, ...] = ()
 
 
 def judge(
@@ -151,6 +153,7 @@ def judge(
         exploratory=exploratory,
         outcomes=outcomes,
         level=level,
+        looks=declared_looks,
     )
 
 
@@ -217,7 +220,11 @@ def _judgement(
     if not problems:
         try:
             estimate = comparison.estimate(
-                lambda arm: used[arm].performance, level=level, paired=paired
+                lambda arm: used[arm].performance,
+                level=level,
+                paired=paired,
+                # The same stream for each: a verdict does not hang on the order of the questions.
+                bootstrap=streams.generator(0, "bootstrap") if paired else None,
             )
         except spi.IndicatorError as error:
             problems = [str(error)]

@@ -77,13 +77,24 @@ class Study:
         return cls._of(load_preset(name).replace(**fields), out)
 
     @classmethod
-    def from_file(cls, path: str | Path, *, out: str | Path | None = None, **fields: Any) -> Self:
+    def from_file(
+        cls,
+        path: str | Path,
+        *,
+        out: str | Path | None = None,
+        trust_code: bool = False,
+        **fields: Any,
+    ) -> Self:
         """Return the study that a TOML file describes (`read_study_file`), some fields changed.
+
+        Args:
+            trust_code: whether the file may name policies as classes, which runs their modules.
 
         Raises:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
         """
-        return cls._of(read_study_file(Path(path)).replace(**fields), out)
+        found = read_study_file(Path(path), trust_code=trust_code)
+        return cls._of(found.replace(**fields), out)
 
     @classmethod
     def stored(cls, out: str | Path) -> Self:

@@ -9,7 +9,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.studies.specification import Specification
 
 
-def read_study_file(path: Path) -> Specification:
+def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
     """Return the specification in a TOML file, named after the file where it has no name.
 
     Example of a file:
@@ -25,8 +25,13 @@ def read_study_file(path: Path) -> Specification:
         name = "delivery_width"
         values = [2.0, 1.0]
 
+    Args:
+        trust_code: whether its policies may be classes ("package.module:Class"), whose modules run
+            when they are loaded.
+
     Raises:
-        StudyError: the file cannot be read, is not TOML, or a field of it is unknown or cannot be.
+        StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
+            it is unknown or cannot be.
     """
     try:
         fields = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -36,6 +41,14 @@ def read_study_file(path: Path) -> Specification:
         reason = str(error).splitlines()[0]
         raise StudyError(f"the study file {path} is not TOML: {reason}") from error
     try:
-        return Specification(**{"name": path.stem, **fields})
+        specification = Specification(**{"name": path.stem, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise StudyError(f"{path}: {error}") from error
+    named = [*specification.policies, *(ablation.policy for ablation in specification.ablations)]
+    for policy in named:
+        if ":" in policy and not trust_code:
+            raise StudyError(
+                f"{path}: policy {policy!r} is a class, and to load it runs code: should be a "
+                "policy's name, or be allowed by --trust-code (trust_code=True)"
+            )
+    return specification

@@ -61,6 +61,21 @@ def test_a_lasting_loss_is_censored() -> None:
     assert result.distinguishable
 
 
+def test_a_loss_that_begins_late_counts() -> None:
+    # The rate holds for 300 s after the onset, three windows long, then half of it is gone.
+    late = [np.concatenate([run[run < 1_300], run[run >= 1_300][::2]]) for run in regular()]
+    assert repair(late, regular(), QUIET).censored
+    passing = without(regular(), 1_300, 1_500)
+    assert repair(passing, regular(), QUIET).seconds == pytest.approx(590, abs=6)
+
+
+def test_a_short_dip_long_before_the_end_does_not_outweigh_the_rest() -> None:
+    # Behind for 30 s in mid-run, ahead at all other times: nothing is lost.
+    ahead = [np.sort(np.concatenate([run, run[run > ONSET][::2] + 1.0])) for run in regular()]
+    dip = [run[(run < 1_500) | (run > 1_530)] for run in ahead]
+    assert repair([run[run <= END] for run in dip], regular(), QUIET).seconds == 0.0
+
+
 def test_a_short_return_is_not_a_repair() -> None:
     twice = without(without(regular(), 1_000, 1_100), 1_250, 1_500)
     result = repair(twice, regular(), QUIET)

@@ -60,7 +60,8 @@ def beyond_resilience(findings: Findings) -> Iterator[Section]:
         tuple(repairs),
         (
             ("From the onset until the delivery rate, pooled over seeds in a trailing window, is "
-            f"back at {100 * RECOVERED:g} % of that with the robots removed, for a whole window. "
+            f"back at {100 * RECOVERED:g} % of that with the robots removed: from then on it "
+            "averages as much over every stretch, up to then less. "
             "The null is the same statistic of a pair without fault that differs in behaviour "
             "seeds alone: a time that does not exceed 95 % of its resamples measures noise. "
             "Intervals: bootstrap over seeds; ∞ and \"censored\": not back within the run."),

@@ -38,9 +38,10 @@ def compared(findings: Findings) -> Iterator[Section]:
         return
     yield _matrix(findings, policies)
     contests = tuple(indicator_contests(findings))
+    level = wording.percent(findings.level)
     for table in dict.fromkeys(contest.table for contest in contests):
         here = [contest for contest in contests if contest.table == table]
-        yield _indicators(table, here, policies)
+        yield _indicators(table, here, policies, level)
     for table, cells in cell_contests(findings).items():
         yield _cells(table, cells, policies[0])
 
@@ -71,8 +72,10 @@ def _matrix(findings: Findings, policies: tuple[str, ...]) -> Section:
     )
 
 
-def _indicators(table: str, contests: list[IndicatorContest], policies: tuple[str, ...]) -> Section:
-    columns = ["question", *(f"{policy} [95 %]" for policy in policies)]
+def _indicators(
+    table: str, contests: list[IndicatorContest], policies: tuple[str, ...], level: str
+) -> Section:
+    columns = ["question", *(f"{policy} [{level}]" for policy in policies)]
     columns += [f"{policy} - {policies[0]} [95 %]" for policy in policies[1:]]
     rows = []
     for contest in contests:

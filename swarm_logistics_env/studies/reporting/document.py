@@ -9,6 +9,7 @@ from swarm_logistics_env.studies.analysis.scaling import size_series
 from swarm_logistics_env.studies.judgement import Findings
 from swarm_logistics_env.studies.reporting.beyond import beyond
 from swarm_logistics_env.studies.reporting.beyond_faults import beyond_faults
+from swarm_logistics_env.studies.reporting.checks import checks
 from swarm_logistics_env.studies.reporting.compared import compared
 from swarm_logistics_env.studies.reporting.figures import (
     Figure,
@@ -95,10 +96,11 @@ def _chapters(findings: Findings) -> Iterator[Chapter]:
     )
     yield Chapter(
         "Results",
-        'P is the number of items delivered. Square brackets hold 95 % intervals; "one run" is '
-        "where a single further run falls.",
+        "P is the number of items delivered. Square brackets hold intervals at the level that the "
+        'heading gives; "one run" is where a single further run falls.',
         tuple(tables(findings)),
     )
+    yield Chapter("Checks", "How far the verdicts hang on the method.", tuple(checks(findings)))
     yield Chapter(
         "Policies compared",
         "Side by side, seed by seed; the first policy of the study is the one that the others are "

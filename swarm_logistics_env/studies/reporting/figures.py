@@ -11,7 +11,7 @@ from swarm_logistics_env.studies.analysis.scaling import SizeSeries
 from swarm_logistics_env.studies.judgement import Findings, Judgement
 from swarm_logistics_env.studies.reporting import drawing
 from swarm_logistics_env.studies.reporting.drawing import Panel, Point, Series
-from swarm_logistics_env.studies.reporting.wording import decided, seeds_text
+from swarm_logistics_env.studies.reporting.wording import decided, percent, seeds_text
 
 _Key = TypeVar("_Key")
 Value = str | float | int | bool | None
@@ -37,10 +37,13 @@ class Figure:
     draw: drawing.Draw
 
 
-MARKS = (
-    "Filled: the Holm-adjusted verdict is decided; hollow: inconclusive; bars: 95 % intervals, an "
-    "arrow where a bar leaves the axis; dashed: thresholds"
-)
+def marks(findings: Findings) -> str:
+    """Return what the marks of a figure of indicators mean."""
+    return (
+        "Filled: the Holm-adjusted verdict is decided; hollow: inconclusive; bars: "
+        f"{percent(findings.level)} intervals, an arrow where a bar leaves the axis; dashed: "
+        "thresholds"
+    )
 
 
 def indicator_figures(findings: Findings) -> Iterator[Figure]:
@@ -187,7 +190,7 @@ def _intervals(
     capped = _saturation(any(judgement.saturated for judgement in judgements))
     return Figure(
         name,
-        f"{caption} {seeds_text(findings).capitalize()}. {MARKS}{cross}.{capped}",
+        f"{caption} {seeds_text(findings).capitalize()}. {marks(findings)}{cross}.{capped}",
         columns,
         tuple(rows),
         0.5 + 2.5 * len(panels),

@@ -74,7 +74,7 @@ def _tables(findings: Findings, policy: str, table: str) -> Iterator[Section]:
     title = f"{policy}: {table}"
     for indicator in dict.fromkeys(judgement.comparison.indicator for judgement in judgements):
         asked = [j for j in judgements if j.comparison.indicator == indicator]
-        more, answers = _answers(cells, asked, published=published)
+        more, answers = _answers(findings, cells, asked, published=published)
         rows = [tuple(left + right) for left, right in zip(performance, answers)]
         judged = [row for row in rows if row[-len(more)] != NOTHING]
         yield Section(title, (*columns, *more), tuple(rows if len(columns) > 1 else judged))
@@ -98,7 +98,7 @@ def _grouped(cells: list[Cell]) -> list[Cell]:
 
 
 def _answers(
-    cells: list[Cell], asked: list[Judgement], *, published: bool
+    findings: Findings, cells: list[Cell], asked: list[Judgement], *, published: bool
 ) -> tuple[list[str], list[list[str]]]:
     """Return the columns of one indicator and their rows, one a cell.
 
@@ -107,7 +107,7 @@ def _answers(
     """
     indicator = asked[0].comparison.indicator
     properties = list(dict.fromkeys(wording.property_name(judgement) for judgement in asked))
-    columns = [f"{indicator} [95 %]"]
+    columns = [f"{indicator} [{wording.percent(findings.level)}]"]
     columns += [f"{indicator} paper"] if published else []
     for name in properties:
         columns += [name, "paper"] if published else [name]
@@ -157,8 +157,8 @@ def _claims(findings: Findings, policy: str) -> Iterator[Section]:
             )
         )
     columns = (
-        "indicator", "claim", "paper", "ours [95 %]", "claim is", "under Holm",
-        "seeds for 80 % power at the paper's value",
+        "indicator", "claim", "paper", f"ours [{wording.percent(findings.level)}]", "claim is",
+        "under Holm", "seeds for 80 % power at the paper's value",
     )  # fmt: skip
     lines = (
         f"Unadjusted: {wording.counted(plain)}.",
@@ -202,10 +202,10 @@ def _warnings(findings: Findings) -> Iterator[str]:
             "capped; indicators that rest on it are marked as well."
         )
     if findings.exploratory:
-        yield (
-            "Exploratory: seeds were added after the study began, so the verdicts' error level is "
-            "not the nominal one."
-        )
+        since = "it is judged at a look that was not declared before its first run"
+        if not findings.looks:
+            since = "seeds were added after the study began"
+        yield f"Exploratory: {since}, so the verdicts' error level is not the nominal one."
     for cell in findings.cells:
         if cell.problem:
             yield f"{cell.policy}, {cell.table}, {cell.arm.level}: {cell.problem}."

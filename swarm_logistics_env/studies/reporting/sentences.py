@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.studies.analysis.bootstrap import bootstrap_verdict, differs
 from swarm_logistics_env.studies.judgement import POWER, Findings, Judgement
 from swarm_logistics_env.studies.reporting import wording
 
@@ -40,8 +41,11 @@ def sentence(findings: Findings, judgement: Judgement) -> Sentence:
         parts.append(f"Pairing correlation {estimate.pairing_correlation:.2f}.")
     if "skewed" in estimate.flags:
         parts.append("Skewed: the interval covers less than 95 % at so few seeds.")
+    if differs(estimate):
+        other = wording.on_property(judgement, bootstrap_verdict(estimate))
+        parts.append(f"The studentised bootstrap says otherwise, unadjusted: {other}.")
     if findings.exploratory:
-        parts.append("Exploratory: seeds were added after the study began.")
+        parts.append("Exploratory.")
     return Sentence(head, " ".join(parts), adjusted)
 
 
@@ -60,7 +64,7 @@ def _conditions(judgement: Judgement) -> str:
 
 
 def _interval(estimate: Estimate) -> str:
-    level = f"{100 * estimate.level:g} %"
+    level = wording.percent(estimate.level)
     if estimate.low is None or estimate.high is None:
         return f"{estimate.value:.3f} (no interval)"
     low, high = wording.fixed(estimate.low, 3), wording.fixed(estimate.high, 3)

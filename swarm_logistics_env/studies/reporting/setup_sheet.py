@@ -56,7 +56,12 @@ def _study(plan: Plan) -> tuple[str, ...]:
         (
             "Performance P is the number of items delivered in the order requested. Intervals of "
             "P are t-intervals over seeds; those of indicators are Fieller's, paired by seed. A "
-            "verdict is a paired t-test against the threshold, one-sided 2.5 % on each side."
+            "verdict is a paired t-test against the threshold, one-sided "
+            + (
+                "at the levels of the declared looks."
+                if plan.specification.looks
+                else "2.5 % on each side."
+            )
         ),
     )
 

@@ -66,6 +66,11 @@ def fixed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
+def percent(level: float) -> str:
+    """Return a confidence level, e.g. "95 %"; of an early look never rounded up to 100 %."""
+    return "> 99.99 %" if level > 0.9999 else f"{100 * level:.4g} %"
+
+
 def limits(interval: Interval | None) -> str:
     """Return the limits alone."""
     if interval is None or interval.low is None or interval.high is None:
