@@ -52,7 +52,9 @@ def scenario_command(
 
 @app.command("run")
 def run_command(
-    policy: Annotated[str, typer.Option(help="Name, or package.module:Class.")] = "swarm-dt",
+    policy: Annotated[
+        str, typer.Option(help="Name, path of a policy file, or package.module:Class.")
+    ] = "swarm-dt",
     seed: Annotated[int, typer.Option(help="Decides everything random.")] = 0,
     preset: PresetOption = "paper",
     changes: SetOption = None,
@@ -60,6 +62,9 @@ def run_command(
         list[str] | None,
         typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
     ] = None,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Read a .zip policy: executes the code in it.")
+    ] = False,
 ) -> None:
     """Play one episode and print what it delivered."""
     import time
@@ -69,9 +74,9 @@ def run_command(
 
     scenario = scenario_of(preset, changes)
     befalling = [fault_of(text) for text in faults or []]
-    player = policies.load(policy)
+    player = policies.load(policy, trust_code=trust_code)
     # Compiles the kernels, so that the time below is the episode's.
-    run_episode(scenario.replace(duration=scenario.control_period), policies.load(policy), seed)
+    run_episode(scenario.replace(duration=scenario.control_period), player, seed)
     start = time.perf_counter()
     episode = run_episode(scenario, player, seed, befalling)
     wall = time.perf_counter() - start

@@ -3,8 +3,19 @@
 `load(name)` makes one; a class of one's own needs `reset` and `act` (see `Policy`).
 """
 
+from swarm_logistics_env.policies.card import PolicyCard
+from swarm_logistics_env.policies.files import read_card
 from swarm_logistics_env.policies.loading import NAMES, identity, load
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT, SwarmDTParameters
 
-__all__ = ["NAMES", "Policy", "SwarmDT", "SwarmDTParameters", "identity", "load"]
+__all__ = [
+    "NAMES",
+    "Policy",
+    "PolicyCard",
+    "SwarmDT",
+    "SwarmDTParameters",
+    "identity",
+    "load",
+    "read_card",
+]

@@ -14,11 +14,15 @@ from typing import Any
 
 from swarm_logistics_env.errors import PolicyError, suggest
 from swarm_logistics_env.policies.central import Central
+from swarm_logistics_env.policies.executable import SUFFIX as EXECUTABLE
+from swarm_logistics_env.policies.executable import StableBaselinesPolicy
+from swarm_logistics_env.policies.files import SUFFIX, read_policy
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.records import Record
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
+WEIGHTS = Path(__file__).parent / "weights"
 
 NAMES: dict[str, Callable[..., Policy]] = {
     "swarm-dt": SwarmDT,
@@ -26,25 +30,35 @@ NAMES: dict[str, Callable[..., Policy]] = {
     # Swarm D-T without its taxis: the ablation.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
     "central": Central,
+    # Trained, each by the training preset that its card names.
+    **{
+        path.stem: functools.partial(read_policy, path)
+        for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))
+    },
 }
 
 
-def load(name: str, **parameters: Any) -> Policy:
+def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     """Return the policy called `name`.
 
     Args:
         name: one of `NAMES`, a name that an installed package declares in the entry-point group
-            `swarm_logistics_env.policies`, or "package.module:Class". Naming a class imports, and
-            so executes, its module.
+            `swarm_logistics_env.policies`, "package.module:Class", or the path of a policy file.
+            Naming a class imports, and so executes, its module. A file that `swarm-logistics
+            train` wrote (.safetensors) executes nothing; a model that stable-baselines3 saved
+            (.zip) does.
+        trust_code: whether to read a file although that executes the code in it.
         parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
 
     Raises:
         PolicyError: there is no such policy, or it does not take these parameters.
     """
-    make = NAMES.get(name) or _declared(name) or _imported(name)
+    make = NAMES.get(name) or _declared(name) or _filed(name, trust_code) or _imported(name)
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
-        raise PolicyError(f"no policy {name!r}{suggest(name, known)}, or 'package.module:Class'")
+        raise PolicyError(
+            f"no policy {name!r}{suggest(name, known)}, or 'package.module:Class', or a path"
+        )
     try:
         policy = make(**parameters)
     except TypeError as error:
@@ -82,6 +96,17 @@ def _declared(name: str) -> Callable[..., Policy] | None:
     for point in entry_points(group=ENTRY_POINTS, name=name):
         made: Callable[..., Policy] = point.load()
         return made
+    return None
+
+
+def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
+    path = Path(name)
+    if path.suffix == SUFFIX:
+        return functools.partial(read_policy, path)
+    if path.suffix == EXECUTABLE:
+        return functools.partial(StableBaselinesPolicy, path, trust_code=trust_code)
+    if path.is_file():
+        raise PolicyError(f"{name} is no policy file: should end in {SUFFIX} or {EXECUTABLE}")
     return None
 
 

@@ -1,0 +1,98 @@
+"""Policy files: weights as safetensors, with the card as JSON in its header."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.policies.card import PolicyCard
+from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
+
+SUFFIX = ".safetensors"
+CARD = "swarm_logistics_policy"  # the header's entry that holds the card
+LARGEST_FILE = 64 * 2**20  # bytes; a policy of ours has less than 1 MB
+
+
+def read_policy(path: Path) -> LearnedPolicy:
+    """Return the trained policy in a file; reading one executes nothing that is in it.
+
+    Raises:
+        PolicyError: the file cannot be read, is cut short, carries something else, or its numbers
+            are not those of the network on its card.
+    """
+    card, tensors = _contents(path)
+    try:
+        return LearnedPolicy(card, tensors)
+    except PolicyError as error:
+        raise PolicyError(f"the policy file {path} cannot be used: {error}") from None
+
+
+def read_card(path: Path) -> PolicyCard:
+    """Return the card of a policy file.
+
+    Raises:
+        PolicyError: as `read_policy`.
+    """
+    return read_policy(path).card
+
+
+def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.float32]]) -> None:
+    """Write a policy file, whole or not at all.
+
+    Raises:
+        PolicyError: the tensors are not those of the network on the card, or it cannot be written.
+    """
+    from safetensors.numpy import save
+
+    check_tensors(card.network, tensors)
+    content = save(
+        {name: np.ascontiguousarray(t) for name, t in tensors.items()}, {CARD: card.to_json()}
+    )
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError as error:
+        raise PolicyError(f"cannot write the policy file {path}: {error.strerror}") from error
+
+
+def _contents(path: Path) -> tuple[PolicyCard, dict[str, NDArray[np.float32]]]:
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with path.open("rb") as file:
+            start = file.read(9)
+        size = path.stat().st_size
+    except OSError as error:
+        raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
+    # A pickle, or a zip as torch and stable-baselines3 wrap them: not even looked into. Behind its
+    # length, which may begin like a pickle, a safetensors header begins with a brace.
+    is_pickle = start[:1] == b"\x80" and start[8:] != b"{"
+    if is_pickle or start.startswith(b"PK\x03\x04"):
+        raise PolicyError(
+            f"{path} carries a pickle, which executes code when it is read: a policy file should "
+            "be safetensors, as `swarm-logistics train` writes it"
+        )
+    if size > LARGEST_FILE:
+        raise PolicyError(
+            f"{path} has {size} bytes: a policy file should have at most {LARGEST_FILE}"
+        )
+    try:
+        with safe_open(path, framework="numpy") as file:
+            header = file.metadata() or {}
+            if CARD not in header:
+                raise PolicyError(
+                    f"{path} is safetensors without a card: a policy file should be one that "
+                    "`swarm-logistics train` wrote"
+                )
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - no dict
+    except (SafetensorError, TypeError) as error:
+        raise PolicyError(f"{path} is cut short or no safetensors file: {error}") from None
+    try:
+        return PolicyCard.from_json(header[CARD]), tensors
+    except PolicyError as error:
+        raise PolicyError(f"the card in {path} cannot be read: {error}") from None

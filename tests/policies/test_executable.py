@@ -1,0 +1,73 @@
+"""Models that stable-baselines3 saved; not run where it is not installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.errors import PolicyError
+
+pytest.importorskip("stable_baselines3")
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from swarm_logistics_env.adapters import SwarmVecEnv
+
+    env = SwarmVecEnv(n_worlds=1, n_robots=2, duration=2.0)
+    path = tmp_path_factory.mktemp("model") / "model.zip"
+    untrained(env).save(path)
+    return path
+
+
+def untrained(env: Any) -> Any:
+    from stable_baselines3 import PPO
+
+    small = {"net_arch": [4]}
+    return PPO("MlpPolicy", env, policy_kwargs=small, n_steps=8, batch_size=8, seed=0, device="cpu")
+
+
+def test_a_trusted_model_plays(model: Path) -> None:
+    policy: Any = policies.load(str(model), trust_code=True)
+    assert run_episode(Scenario(n_robots=3, duration=1.0), policy, seed=0).ended_at == 1.0
+    rows = np.random.default_rng(0).normal(size=(4, 140)).astype(np.float32)
+    from stable_baselines3 import PPO
+
+    told, _ = PPO.load(model, device="cpu").predict(rows, deterministic=True)
+    assert (policy.act(rows) == told).all()
+
+
+def test_identity_follows_the_file(model: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.zip"
+    other.write_bytes(model.read_bytes())
+    one, two = (policies.load(str(path), trust_code=True) for path in (model, other))
+    assert policies.identity(one) == policies.identity(two)
+
+
+def test_the_command_line_asks_too(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["run", "--policy", str(model), "--set", "duration=1"]
+    assert app.run(arguments) == 2
+    assert "executes the code in it" in capsys.readouterr().err
+    assert app.run([*arguments, "--trust-code"]) == 0
+
+
+def test_what_is_no_model_is_refused(model: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.zip"
+    broken.write_bytes(model.read_bytes()[:500])
+    with pytest.raises(PolicyError, match="is no PPO model of stable-baselines3"):
+        policies.load(str(broken), trust_code=True)
+
+
+def test_a_model_of_other_spaces_is_refused(tmp_path: Path) -> None:
+    from swarm_logistics_env.adapters import SwarmVecEnv
+
+    env = SwarmVecEnv(n_worlds=1, n_robots=1, message_size=2)
+    path = tmp_path / "model.zip"
+    untrained(env).save(path)
+    with pytest.raises(PolicyError, match=r"to commands \(6,\): should map \(140,\) to \(4,\)"):
+        policies.load(str(path), trust_code=True)
