@@ -47,6 +47,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "policies": WORLD | {"hearing"},
     "episode": WORLD | {"policies"},
     "spi": set(),
+    "watch": RUNS | {"rendering"},
     "studies": RUNS | {"spi"},
     "train": RUNS | ENVIRONMENT | {"wrappers", "adapters", "spi", "studies"},
     "testing": RUNS | ENVIRONMENT | {"wrappers", "adapters"},

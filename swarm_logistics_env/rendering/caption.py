@@ -15,7 +15,7 @@ from swarm_logistics_env.rendering.palette import (
     SEARCHING,
     SHUFFLING,
 )
-from swarm_logistics_env.rendering.sprites import badge, blank, item, robot, words
+from swarm_logistics_env.rendering.sprites import badge, blank, halo, item, robot, words
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
@@ -116,6 +116,7 @@ def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
         "shuffling": (robot(radius, SHUFFLING, 0, False), load),
         "delivering": (robot(radius, DELIVERING, 0, False), asked_for),
         "requested item": (item(0.9 * radius, True),),
+        "timer runs": (halo(0.6 * radius, 0), robot(0.6 * radius, SEARCHING, 0, False)),
     }.items():
         entries.append(_row([pictures, (words(name, text_height, INK),)], text_height // 4))
     return tuple(entries)

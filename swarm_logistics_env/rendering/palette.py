@@ -28,6 +28,14 @@ ITEM: RGB = (214, 214, 214)
 ITEM_EDGE: RGB = (120, 120, 120)
 TRAIL: RGB = (150, 150, 150)
 
+# Curves of runs side by side, and how thick they are [px].
+RUNS: tuple[tuple[RGB, float], ...] = (
+    (REQUESTED, 3.0),
+    (SHUFFLING, 1.5),
+    (TIMER, 4.0),
+    (LINK, 2.0),
+)
+
 # What a robot that fails in a mode wears. A removed robot is not there to wear anything.
 MARKS = {
     "FM1": "1",

@@ -10,15 +10,28 @@ from swarm_logistics_env.rendering.background import background
 from swarm_logistics_env.rendering.canvas import Point, new_canvas, stamp
 from swarm_logistics_env.rendering.caption import Caption
 from swarm_logistics_env.rendering.overlays import draw_beams, draw_links, draw_trails
-from swarm_logistics_env.rendering.palette import DELIVERING, RGB, SEARCHING, SHUFFLING, mark
-from swarm_logistics_env.rendering.projection import Projection
+from swarm_logistics_env.rendering.palette import (
+    DELIVERING,
+    INK,
+    RGB,
+    SEARCHING,
+    SHUFFLING,
+    mark,
+)
+from swarm_logistics_env.rendering.projection import LEAST_SIZE, Projection
 from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 
 class Picture:
-    """Draws states of a warehouse; see `Renderer` for the arguments."""
+    """Draws states of a warehouse; see `Renderer` for the arguments.
+
+    Attributes:
+        show_beams_of, all_links: as the arguments; may change between two pictures.
+        selected: a robot that is ringed, or None.
+        projection: where the warehouse lies on the picture.
+    """
 
     def __init__(
         self,
@@ -28,15 +41,46 @@ class Picture:
         trails: bool,
         all_links: bool,
     ) -> None:
-        self._size, self._beams_of, self._all_links = size, show_beams_of, all_links
+        self._size, self.show_beams_of, self.all_links = size, show_beams_of, all_links
+        self.selected: int | None = None
         self._trails = Trails() if trails else None
         self._lay_out(scenario)
+
+    @classmethod
+    def fitting(cls, scenario: Scenario, width: int, height: int) -> Picture:
+        """Return the largest picture, caption included, for that room [px]; 100 px at least."""
+        size = max(width, height)
+        while True:
+            picture = cls(scenario, size, None, False, False)
+            over = max(picture.width - width, picture.height - height)
+            if over <= 0 or size == LEAST_SIZE:
+                return picture
+            size = max(LEAST_SIZE, size - max(2, over // 2))
+
+    @property
+    def width(self) -> int:
+        """Width of the picture [px]."""
+        return self._canvas.get_width()
+
+    @property
+    def height(self) -> int:
+        """Height of the picture [px], caption included."""
+        return self._canvas.get_height()
+
+    @property
+    def trails(self) -> bool:
+        """Whether robots leave their paths; may change between two pictures."""
+        return self._trails is not None
+
+    @trails.setter
+    def trails(self, wanted: bool) -> None:
+        self._trails = Trails() if wanted else None
 
     def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
         """Return the picture of `state`, which stays as it is until the next call."""
         if self._shape != _shape(scenario):
             self._lay_out(scenario)
-        canvas, projection = self._canvas, self._projection
+        canvas, projection = self._canvas, self.projection
         canvas.blit(self._background, (0, 0))
         robots = projection.points(state.robot_position)
         items = projection.points(state.item_position)
@@ -48,12 +92,13 @@ class Picture:
         self._draw_obstacles(state)
         self._draw_halos(state, scenario, robots)
         self._draw_stored_items(state, items)
-        draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self._all_links)
-        watched = self._beams_of
+        draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self.all_links)
+        watched = self.show_beams_of
         if watched is not None and watched < state.n_robots and state.robot_present[watched]:
             draw_beams(canvas, state, scenario, robots[watched], watched, projection)
         canvas.set_clip(None)
         self._draw_robots(state, robots)
+        self._draw_selection(state, robots)
         self._draw_requested(state, items)
         self._draw_badges(state, robots)
         self._caption.draw(canvas, state, scenario)
@@ -63,7 +108,7 @@ class Picture:
         text_height = max(13, round(self._size / 38))
         margin = Projection.fitting(scenario, self._size, 0).margin
         least_width = Caption.least_width(text_height) + 2 * margin
-        self._projection = projection = Projection.fitting(scenario, self._size, least_width)
+        self.projection = projection = Projection.fitting(scenario, self._size, least_width)
         self._caption = Caption(
             margin, projection.bottom + margin, projection.width - 2 * margin, text_height
         )
@@ -87,7 +132,7 @@ class Picture:
 
     def _draw_obstacles(self, state: WarehouseState) -> None:
         sprite = sprites.obstacle(self._obstacle_radius)
-        obstacles = self._projection.points(state.obstacle_position)
+        obstacles = self.projection.points(state.obstacle_position)
         stamp(self._canvas, ((sprite, at) for at in obstacles))
 
     def _draw_halos(self, state: WarehouseState, scenario: Scenario, robots: list[Point]) -> None:
@@ -119,6 +164,12 @@ class Picture:
             if carried[robot] not in (NOBODY, state.requested):
                 stamps.append((load, robots[robot]))
         stamp(self._canvas, stamps)
+
+    def _draw_selection(self, state: WarehouseState, robots: list[Point]) -> None:
+        robot = self.selected
+        if robot is not None and robot < state.n_robots and state.robot_present[robot]:
+            ring = sprites.circle(1.6 * self._robot_radius + 2.0, 2.0, INK)
+            stamp(self._canvas, [(ring, robots[robot])])
 
     def _draw_requested(self, state: WarehouseState, items: list[Point]) -> None:
         if state.requested == NOBODY:

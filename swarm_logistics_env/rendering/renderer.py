@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.rendering.projection import LARGEST_SIZE, LEAST_SIZE
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from swarm_logistics_env.rendering.window import Window
 
 RenderMode = Literal["rgb_array", "human"]
-_LEAST_SIZE, _LARGEST_SIZE = 100, 8000
 
 
 class Renderer:
@@ -62,8 +62,8 @@ class Renderer:
     ) -> None:
         if mode not in get_args(RenderMode):
             raise SetupError(f"mode = {mode!r}: should be one of {list(get_args(RenderMode))}")
-        if not _LEAST_SIZE <= size <= _LARGEST_SIZE:
-            raise SetupError(f"size = {size}: should be {_LEAST_SIZE} to {_LARGEST_SIZE} [px]")
+        if not LEAST_SIZE <= size <= LARGEST_SIZE:
+            raise SetupError(f"size = {size}: should be {LEAST_SIZE} to {LARGEST_SIZE} [px]")
         if show_beams_of is not None and not 0 <= show_beams_of < scenario.n_robots:
             raise SetupError(
                 f"show_beams_of = {show_beams_of}: should be None or a robot, "

@@ -19,15 +19,7 @@ class Window:
     """
 
     def __init__(self) -> None:
-        try:
-            pygame.display.init()
-        except pygame.error as error:
-            raise _no_display(str(error)) from error
-        # What SDL falls back to by itself shows nothing to anybody.
-        if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
-            pygame.display.quit()
-            raise _no_display("SDL found none")
-        pygame.display.set_caption(_TITLE)
+        open_display(_TITLE, instead="use render_mode = 'rgb_array'")
         self._clock = pygame.time.Clock()
 
     def show(self, picture: pygame.Surface, rate: float) -> bool:
@@ -45,8 +37,25 @@ class Window:
         pygame.display.quit()
 
 
-def _no_display(reason: str) -> SetupError:
+def open_display(title: str, instead: str) -> None:
+    """Ready SDL's display for a window of that title.
+
+    Raises:
+        SetupError: there is none; it says what to do `instead`.
+    """
+    try:
+        pygame.display.init()
+    except pygame.error as error:
+        raise _no_display(str(error), instead) from error
+    # What SDL falls back to by itself shows nothing to anybody.
+    if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
+        pygame.display.quit()
+        raise _no_display("SDL found none", instead)
+    pygame.display.set_caption(title)
+
+
+def _no_display(reason: str, instead: str) -> SetupError:
     return SetupError(
-        f"render_mode = 'human' needs a display ({reason}): use 'rgb_array', or set "
-        "SDL_VIDEODRIVER=dummy to go without"
+        f"a window needs a display ({reason}): {instead}, or set SDL_VIDEODRIVER=dummy to go "
+        "without"
     )

@@ -1,0 +1,39 @@
+"""What is drawn of a run over time. No pygame: the view in the browser has it too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from swarm_logistics_env.rendering.palette import MARKS
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Deliveries of one run.
+
+    Attributes:
+        name: what the run is.
+        times: of the deliveries [s], ascending.
+        until: how far the run has come [s].
+        style: its place in `palette.RUNS`; two runs differ by thickness and lightness as well.
+    """
+
+    name: str
+    times: Sequence[float]
+    until: float
+    style: int
+
+
+@dataclass(frozen=True)
+class Event:
+    """A robot that failed, or was repaired: a mark on the time axis."""
+
+    time: float  # [s]
+    robot: int
+    mode: str | None  # None: repaired
+
+    @property
+    def label(self) -> str:
+        """What the mark says."""
+        return "ok" if self.mode is None else MARKS.get(self.mode, self.mode)

@@ -1,0 +1,275 @@
+"""What is watched: a run, its fault-free twin on the same seed, and what one can do to them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, suggest
+from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.rendering.curves import Curve, Event
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.watch.play import Play
+
+SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
+WIDTH_STEP = 0.25  # [m]
+
+
+class Session:
+    """A run and its twin: same seed, same policy, same conditions, but no fault ever.
+
+    Args:
+        scenario: the conditions.
+        make_policy: called once for each of the two.
+        seed: of the first episode.
+        faults: what befalls the run, in every episode, besides what one does to it by hand.
+        speed: times real time, one of `SPEEDS`.
+
+    Attributes:
+        run, twin: the two.
+        seed: of this episode.
+        paused: whether time stands still.
+        mode: the failure mode that `break_robot` uses.
+        selected: the robot that is inspected, or None.
+        events: what was done to robots in this episode.
+        note: the last thing that happened, a sentence.
+
+    Raises:
+        FaultError, ScenarioError: as `Warehouse.reset`.
+        SetupError: no such speed.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        make_policy: Callable[[], Policy],
+        seed: int = 0,
+        faults: Sequence[Fault] = (),
+        speed: float = 1.0,
+    ) -> None:
+        if speed not in SPEEDS:
+            known = ", ".join(f"{known:g}" for known in SPEEDS)
+            raise SetupError(f"speed = {speed:g}: should be one of {known}")
+        for fault in faults:
+            failed_robots(fault, seed, scenario.n_robots)
+        self._make_policy, self._planned = make_policy, tuple(faults)
+        self.speed, self.paused, self.mode = speed, False, "FM4"
+        self.selected: int | None = None
+        self.note = ""
+        self._due = 0.0  # control periods
+        self._begin(scenario, seed)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The conditions that hold now."""
+        return self.run.world.scenario
+
+    @property
+    def is_over(self) -> bool:
+        """Whether run and twin have come to their ends."""
+        return self.run.is_over and self.twin.is_over
+
+    @property
+    def curves(self) -> tuple[Curve, Curve]:
+        """Deliveries of the run and of its twin."""
+        run, twin = self.run.world.state, self.twin.world.state
+        return (
+            Curve("this run", run.delivery_times, run.time, 0),
+            Curve("without faults", twin.delivery_times, twin.time, 1),
+        )
+
+    # Time
+
+    def play(self, elapsed: float, budget: float = math.inf) -> int:
+        """Let run and twin go on for so much wall time; return the steps that took.
+
+        Args:
+            elapsed: since the last call [s].
+            budget: of computing [s]; what does not fit into it is not caught up with.
+        """
+        if self.paused or self.is_over:
+            return 0
+        self._due += elapsed * self.speed / self.scenario.control_period
+        stop, steps = time.perf_counter() + budget, 0
+        while self._due >= 1.0 and not self.is_over:
+            self._advance()
+            self._due -= 1.0
+            steps += 1
+            if time.perf_counter() >= stop:
+                self._due = min(self._due, 1.0)
+                break
+        return steps
+
+    def pause(self) -> None:
+        """Stop time, or let it go on."""
+        self.paused = not self.paused
+
+    def step(self) -> None:
+        """Stop time, and take one control period."""
+        self.paused = True
+        self._advance()
+
+    def faster(self) -> None:
+        """Play at the next higher speed."""
+        self.speed = SPEEDS[min(SPEEDS.index(self.speed) + 1, len(SPEEDS) - 1)]
+
+    def slower(self) -> None:
+        """Play at the next lower speed."""
+        self.speed = SPEEDS[max(SPEEDS.index(self.speed) - 1, 0)]
+
+    def next_seed(self) -> None:
+        """Begin an episode with the next seed."""
+        self._begin(self.scenario, self.seed + 1)
+        self.note = f"seed {self.seed}"
+
+    def restart(self) -> None:
+        """Begin the episode again, with the same seed, all robots as they were."""
+        self._begin(self.scenario, self.seed)
+        self.note = f"seed {self.seed} again"
+
+    # Robots
+
+    def robot_at(self, x: float, y: float, reach: float) -> int | None:
+        """Return the robot nearest to a position [m] and within `reach` [m] of it, if any."""
+        state = self.run.world.state
+        away = np.hypot(state.robot_position[:, 0] - x, state.robot_position[:, 1] - y)
+        away[~state.robot_present] = np.inf
+        nearest = int(np.argmin(away))
+        return nearest if away[nearest] <= reach else None
+
+    def select(self, robot: int | None) -> None:
+        """Inspect `robot`, or none."""
+        if robot is not None:
+            self._check_there(robot)
+        self.selected = robot
+
+    def choose_mode(self, mode: str) -> None:
+        """Break robots in that failure mode from now on."""
+        if mode not in FAILURE_MODES:
+            raise FaultError(f"no failure mode {mode!r}{suggest(mode, FAILURE_MODES)}")
+        self.mode = mode
+
+    def next_mode(self, forward: bool = True) -> None:
+        """Choose the failure mode after, or before, the one that is chosen."""
+        modes = list(FAILURE_MODES)
+        self.mode = modes[(modes.index(self.mode) + (1 if forward else -1)) % len(modes)]
+
+    def break_robot(self, robot: int | None = None) -> None:
+        """Let a robot, the selected one if None, fail from now on in the chosen mode."""
+        robot = self._meant(robot)
+        if robot is None:
+            return
+        if self.mode in self.run.world.state.failure_modes[robot]:
+            self.note = f"robot {robot} already fails in mode {self.mode}"
+            return
+        now = round(self.run.world.state.time, 9)
+        fault = Fault(self.mode, [robot], onset=now)
+        self.run.world.set_faults([*self.run.world.faults, fault])
+        self._log(robot, self.mode)
+        self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
+
+    def repair_robot(self, robot: int | None = None) -> None:
+        """End every failure that holds of a robot, the selected one if None."""
+        robot = self._meant(robot)
+        if robot is None:
+            return
+        world = self.run.world
+        if not world.state.failed[robot]:
+            self.note = f"robot {robot} is sound"
+            return
+        kept = []
+        for fault in world.faults:
+            if fault.is_active(world.state.time) and isinstance(fault.robots, tuple):
+                others = [other for other in fault.robots if other != robot]
+                kept += [fault.replace(robots=tuple(others))] if others else []
+            else:
+                kept.append(fault)
+        world.set_faults(kept)
+        self._log(robot, None)
+        self.note = f"robot {robot} is repaired"
+
+    def toggle_robot(self, robot: int) -> None:
+        """Select a robot, and break it, or repair it if it fails."""
+        self.select(robot)
+        if self.run.world.state.failed[robot]:
+            self.repair_robot(robot)
+        else:
+            self.break_robot(robot)
+
+    # Conditions
+
+    def resize(self, n_robots: int) -> None:
+        """Begin the episode again with a swarm of that size."""
+        try:
+            scenario = self.scenario.replace(n_robots=n_robots)
+        except ScenarioError as error:
+            self.note = str(error)
+            return
+        self._begin(scenario, self.seed)
+        self.note = f"swarm size {n_robots}: a swarm cannot grow in a run, so it began again"
+        left_out = len(self._planned) - len(self.run.world.faults)
+        if left_out:
+            self.note += f"; {left_out} faults befall more robots than there are: left out"
+
+    def set_delivery_width(self, width: float) -> None:
+        """Make the delivery area that wide [m], in the run and in its twin, at once."""
+        width = round(width, 6)
+        try:
+            for play in (self.run, self.twin):
+                play.world.change(delivery_width=width)
+        except ScenarioError as error:
+            self.note = str(error)
+            return
+        self.note = f"delivery area {width:g} m wide"
+
+    def _begin(self, scenario: Scenario, seed: int) -> None:
+        # Named robots, so that each can be repaired by itself.
+        faults = []
+        for fault in self._planned:
+            try:
+                robots = failed_robots(fault, seed, scenario.n_robots)
+            except FaultError:
+                continue
+            faults.append(fault.replace(robots=tuple(robots.tolist())))
+        self.run = Play(scenario, self._make_policy(), seed, faults)
+        self.twin = Play(scenario, self._make_policy(), seed)
+        self.seed, self._due = seed, 0.0
+        self.events: list[Event] = [
+            Event(fault.onset, robot, fault.mode)
+            for fault in faults
+            if isinstance(fault.robots, tuple)
+            for robot in fault.robots
+        ]
+        if self.selected is not None and self.selected >= scenario.n_robots:
+            self.selected = None
+
+    def _advance(self) -> None:
+        self.run.step()
+        self.twin.step()
+        if self.selected is not None and not self.run.world.state.robot_present[self.selected]:
+            self.selected = None
+
+    def _log(self, robot: int, mode: str | None) -> None:
+        self.events.append(Event(self.run.world.state.time, robot, mode))
+
+    def _meant(self, robot: int | None) -> int | None:
+        if robot is None:
+            robot = self.selected
+        if robot is None:
+            self.note = "click a robot first"
+            return None
+        self._check_there(robot)
+        if self.run.is_over:
+            self.note = "the run is over: begin the next seed, or this one again"
+            return None
+        return robot
+
+    def _check_there(self, robot: int) -> None:
+        state = self.run.world.state
+        if not (0 <= robot < state.n_robots and state.robot_present[robot]):
+            raise SetupError(f"robot = {robot}: should be one that is in the warehouse")
