@@ -19,7 +19,7 @@ class StudiedPolicy:
     Attributes:
         label: how the report calls it.
         identity: stable text of its class, parameters and weights; two of one identity are one.
-        source: what makes it: a name for `policies.load`, or the object itself.
+        source: what makes it, for `policy_choice.policy_of`.
     """
 
     label: str

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 import time
 import traceback
 from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import policies
 from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.studies.code_version import code_version
 from swarm_logistics_env.studies.conditions import Run
+from swarm_logistics_env.studies.policy_choice import policy_of
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,8 @@ def execute(run: Run) -> Outcome:
                 f"this process runs code version {code_version()}, the study {run.code}: "
                 "the package changed while the study ran"
             )
-        policy = _fresh(condition.policy.source)
+        # A policy of its own: one that remembers must not make rows depend on the order of runs.
+        policy = policy_of(condition.policy.source)
         episode = run_episode(
             condition.scenario, policy, run.seed, condition.faults, run.policy_seed
         )
@@ -79,15 +76,3 @@ def execute(run: Run) -> Outcome:
         anchoring_seconds=float(episode.anchoring_seconds),
         wall_seconds=time.perf_counter() - start,
     )
-
-
-def _fresh(source: object) -> Policy:
-    # A copy per run: a policy that remembers must not make rows depend on the order of runs.
-    pristine: Any = _loaded(source) if isinstance(source, str) else source
-    policy: Policy = copy.deepcopy(pristine)
-    return policy
-
-
-@lru_cache(maxsize=8)
-def _loaded(name: str) -> Policy:
-    return policies.load(name)

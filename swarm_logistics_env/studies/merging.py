@@ -90,7 +90,7 @@ def _specification(ours: dict[str, str], theirs: dict[str, str], first: Path, ot
     if differing:
         raise StudyError(f"{first} and {other} differ in {', '.join(differing)}: not one study")
     mine["seeds"] = max(mine["seeds"], yours["seeds"])
-    mine["policies"] = list(dict.fromkeys([*mine["policies"], *yours["policies"]]))
+    mine["policies"] += [policy for policy in yours["policies"] if policy not in mine["policies"]]
     return Specification(**mine).to_json()
 
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-from swarm_logistics_env import policies
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.code_version import code_version
@@ -21,6 +18,7 @@ from swarm_logistics_env.studies.comparisons import (
     Twins,
 )
 from swarm_logistics_env.studies.conditions import Condition, Run, StudiedPolicy
+from swarm_logistics_env.studies.policy_choice import policy_identity, policy_label
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Factor,
@@ -28,7 +26,6 @@ from swarm_logistics_env.studies.specification import (
     Parameter,
     Sizes,
     Specification,
-    policy_label,
     vary,
 )
 from swarm_logistics_env.warehouse.faults import Fault
@@ -168,9 +165,7 @@ def studied(source: object) -> StudiedPolicy:
     Raises:
         PolicyError: it cannot be found or built.
     """
-    # A copy: what an object of the user's did before must not leak into its first run.
-    policy: Any = policies.load(source) if isinstance(source, str) else copy.deepcopy(source)
-    return StudiedPolicy(policy_label(source), policies.identity(policy), source)
+    return StudiedPolicy(policy_label(source), policy_identity(source), source)
 
 
 def _title(factor: Factor, general: str) -> str:

@@ -10,7 +10,6 @@ from pydantic import (
     BeforeValidator,
     Field,
     NonNegativeFloat,
-    PlainSerializer,
     PositiveFloat,
     PositiveInt,
     field_validator,
@@ -20,6 +19,7 @@ from pydantic import (
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.studies.policy_choice import PolicySource, policy_label
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 
 ScenarioFields = dict[str, Any]
@@ -34,17 +34,6 @@ def vary(base: Scenario, fields: ScenarioFields) -> Scenario:
     return base.replace(**changes)
 
 
-def policy_label(source: object) -> str:
-    """Return how a study calls a policy: the name it was asked for, or its class's name."""
-    return source if isinstance(source, str) else type(source).__name__
-
-
-def _policy(value: object) -> object:
-    if isinstance(value, str) or (hasattr(value, "reset") and hasattr(value, "act")):
-        return value
-    raise ValueError("should be a policy's name, its path, or an object with reset and act")
-
-
 def _scenario(value: object) -> object:
     return vary(Scenario(), value) if isinstance(value, dict) else value
 
@@ -57,9 +46,6 @@ def _each(record: type[Record]) -> Callable[[object], object]:
         return tuple(record(**value) if isinstance(value, dict) else value for value in values)
 
     return build
-
-
-PolicySource = Annotated[Any, BeforeValidator(_policy), PlainSerializer(policy_label)]
 
 
 class _Part(Record):
@@ -181,7 +167,8 @@ class Specification(_Part):
 
     Args:
         name: of the study.
-        policies: names, paths or objects with `reset` and `act`.
+        policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
+            `act`.
         seeds: number of seeds; 0 .. seeds - 1, the same for every condition.
         scenario: the base; a dict of fields, "preset" among them, makes one.
         sizes, faults, parameters, ablations: what is varied.

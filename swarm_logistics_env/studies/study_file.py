@@ -13,7 +13,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
     """Return the specification in a TOML file, named after the file where it has no name.
 
     Example of a file:
-        policies = ["swarm-dt", "random-walk"]
+        policies = ["swarm-dt", { name = "swarm-dt", parameters = { taxis_gain = 0.5 } }]
         seeds = 20
         scenario = { preset = "paper", duration = 300 }
 
@@ -40,6 +40,8 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         reason = str(error).splitlines()[0]
         raise StudyError(f"the study file {path} is not TOML: {reason}") from error
+    except RecursionError:
+        raise StudyError(f"the study file {path} is nested too deep") from None
     try:
         specification = Specification(**{"name": path.stem, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses

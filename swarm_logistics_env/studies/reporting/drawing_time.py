@@ -75,6 +75,7 @@ def repairs(canvas: Canvas, panels: Sequence[RepairPanel]) -> None:
                 for first, column in zip((0.0, 1.0, 1.0, 1.0), curve.curve)
             )
             seconds[-1] = curve.followed
+            low, high = (np.where(share > 0.0, limit, np.nan) for limit in (low, high))
             axes.fill_between(
                 seconds, low, high, step="post", color=colour, alpha=0.14, linewidth=0
             )

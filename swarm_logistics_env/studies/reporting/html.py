@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from swarm_logistics_env.studies.reporting.document import Document
@@ -26,5 +27,11 @@ def html(document: Document, drawings: Mapping[str, str]) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    environment.filters["unbroken"] = _unbroken
     template = environment.get_template("report.html.jinja")
     return template.render(document=document, drawings=drawings, marks=_MARKS)
+
+
+def _unbroken(text: str) -> str:
+    """Return text whose numbers keep their units, and equations their two sides, on one line."""
+    return re.sub(r"(?<=\d) (?=%|s\b)| (?=[=<] )|(?<=[=<]) ", "\N{NO-BREAK SPACE}", text)

@@ -70,7 +70,8 @@ def _tables(findings: Findings, policy: str, table: str) -> Iterator[Section]:
     ]
     published = any(cell.published is not None for cell in cells)
     performance = [_performance(cell, published=published) for cell in cells]
-    columns = ["", *(["P paper"] if published else []), "P ours [95 %]", "one run [95 %]"]
+    columns = ["", *(["P paper", "P ours [95 %]"] if published else ["P [95 %]"])]
+    columns.append("one run [95 %]")
     title = f"{policy}: {table}"
     for indicator in dict.fromkeys(judgement.comparison.indicator for judgement in judgements):
         asked = [j for j in judgements if j.comparison.indicator == indicator]

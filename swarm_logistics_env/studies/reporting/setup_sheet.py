@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from importlib.metadata import version
 
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.reporting.sections import Section
+from swarm_logistics_env.studies.reporting.sections import NOTHING, Section
 from swarm_logistics_env.studies.specification import vary
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 
@@ -23,9 +24,9 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
         ),
         Section(
             "Policies",
-            ("policy", "identity"),
+            ("policy", "class", "parameters", "source"),
             tuple(
-                (policy.label, policy.identity)
+                (policy.label, *_identified(policy.identity))
                 for policy in sorted(policies, key=lambda policy: policy.label)
             ),
         ),
@@ -64,6 +65,29 @@ def _study(plan: Plan) -> tuple[str, ...]:
             )
         ),
     )
+
+
+def _identified(identity: str) -> tuple[str, str, str]:
+    """Return class, parameters and digest of the source from a policy's identity."""
+    try:
+        told = json.loads(identity)
+    except json.JSONDecodeError:  # one that a policy gave itself
+        return identity, NOTHING, NOTHING
+    if not isinstance(told, dict):
+        return identity, NOTHING, NOTHING
+    if set(told) == {"given", "policy"}:
+        kind, parameters, source = _identified(told["policy"])
+        given = f"given: {_listed(told['given'])}"
+        return kind, given if parameters == NOTHING else f"{parameters}; {given}", source
+    if set(told) != {"class", "parameters", "source"}:
+        return identity, NOTHING, NOTHING
+    return told["class"], _listed(told["parameters"]) or NOTHING, told["source"]
+
+
+def _listed(parameters: object) -> str:
+    if not isinstance(parameters, dict):
+        return str(parameters)
+    return ", ".join(f"{name} = {value}" for name, value in parameters.items())
 
 
 def _failure_modes(plan: Plan) -> Iterator[Section]:

@@ -1,0 +1,94 @@
+"""Policies as a specification names them: a name, a name with parameters, or an object."""
+
+from __future__ import annotations
+
+import copy
+import json
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar
+
+from pydantic import BeforeValidator, Field, JsonValue, PlainSerializer
+
+from swarm_logistics_env import policies
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies import Policy
+from swarm_logistics_env.records import Record
+
+
+class PolicyChoice(Record):
+    """A policy by name, with parameters of its own.
+
+    Args:
+        name: for `policies.load`.
+        parameters: handed to the policy; whatever TOML and JSON both hold.
+        label: how the report calls it; empty: made from name and parameters.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+    name: str
+    parameters: dict[str, JsonValue] = Field(default_factory=dict)
+    label: str = ""
+
+
+def policy_label(source: object) -> str:
+    """Return how a study calls a policy: its label, the name it was asked for, or its class's."""
+    if isinstance(source, PolicyChoice):
+        given = ", ".join(f"{name} = {value}" for name, value in source.parameters.items())
+        return source.label or f"{source.name} ({given})"
+    return source if isinstance(source, str) else type(source).__name__
+
+
+def policy_of(source: object) -> Policy:
+    """Return a policy that no run has used: an object is copied, a name loaded.
+
+    Raises:
+        PolicyError: it cannot be found or built.
+    """
+    if isinstance(source, str):
+        return copy.deepcopy(_loaded(source, "{}"))
+    if isinstance(source, PolicyChoice):
+        return copy.deepcopy(_loaded(source.name, _canonical(source.parameters)))
+    policy: Any = copy.deepcopy(source)
+    made: Policy = policy
+    return made
+
+
+def policy_identity(source: object) -> str:
+    """Return text that changes whenever the policy's behaviour may have changed."""
+    identity = policies.identity(policy_of(source))
+    if not (isinstance(source, PolicyChoice) and source.parameters):
+        return identity
+    # A class of one's own need not tell its parameters.
+    return _canonical({"given": source.parameters, "policy": identity})
+
+
+def _chosen(value: object) -> object:
+    if isinstance(value, dict):
+        value = PolicyChoice(**value)
+    if isinstance(value, PolicyChoice) and not (value.parameters or value.label):
+        return value.name
+    if isinstance(value, str | PolicyChoice) or (hasattr(value, "reset") and hasattr(value, "act")):
+        return value
+    raise ValueError(
+        "should be a policy's name, its path, a table of name and parameters, or an object with "
+        "reset and act"
+    )
+
+
+def _written(source: object) -> object:
+    if isinstance(source, PolicyChoice):
+        return source.model_dump(mode="json")
+    return policy_label(source)
+
+
+PolicySource = Annotated[Any, BeforeValidator(_chosen), PlainSerializer(_written)]
+
+
+@lru_cache(maxsize=8)
+def _loaded(name: str, parameters: str) -> Policy:
+    return policies.load(name, **json.loads(parameters))
+
+
+def _canonical(value: object) -> str:
+    return json.dumps(value, sort_keys=True, separators=(",", ":"))
