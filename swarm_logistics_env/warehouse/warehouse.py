@@ -19,7 +19,7 @@ from swarm_logistics_env.warehouse.faults import Fault, apply_faults, failed_rob
 from swarm_logistics_env.warehouse.grid import Grid
 from swarm_logistics_env.warehouse.logistics import LIFTED
 from swarm_logistics_env.warehouse.physics import Physics
-from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED, WarehouseState
 
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
@@ -81,7 +81,7 @@ class Warehouse:
         self.scenario, self.state, self._seed = scenario, state, seed
         self.faults, self._struck, self.n_removed = tuple(faults), struck, 0
         self._order = layout.request_order(scenario, seed)
-        state.requested = int(self._order[0])
+        state.requested, self._asked = int(self._order[0]), 0
         self._sensor_keys = row_keys(seed, "sensors", scenario.n_robots)
         self._physics = Physics(scenario, state)
         self._make_room_to_work(scenario)
@@ -291,12 +291,18 @@ class Warehouse:
             state.requested = self._next_request()
 
     def _next_request(self) -> int:
-        cycle, place = divmod(self.state.delivered, self.scenario.n_items)
-        if place == 0:
-            if not self.scenario.restock:
-                return NOBODY
-            self._order = layout.request_order(self.scenario, self._seed or 0, cycle)
-        return int(self._order[place])
+        status = self.state.item_status
+        if (status == DELIVERED).all():
+            return NOBODY
+        # Past what left for good before `restock` was switched on.
+        while True:
+            self._asked += 1
+            cycle, place = divmod(self._asked, self.scenario.n_items)
+            if place == 0:
+                self._order = layout.request_order(self.scenario, self._seed or 0, cycle)
+            item = int(self._order[place])
+            if status[item] != DELIVERED:
+                return item
 
     def _restock(self, item: int) -> None:
         state = self.state

@@ -256,6 +256,24 @@ def test_restock_brings_a_delivered_item_back_and_goes_on(build: Build) -> None:
     assert not world.all_delivered
 
 
+@pytest.mark.parametrize("restock", [(False, True), (True, False)])
+def test_when_restock_is_switched_what_is_there_is_asked_for(
+    build: Build, restock: tuple[bool, bool]
+) -> None:
+    items = [(INSIDE, 5.1), (INSIDE, 4.9), (INSIDE, 5.05)]
+    world = build([(INSIDE, 5.0)], items, restock=restock[0], pickup_range=12.0)
+    state = world.state
+    for _ in range(2):
+        world.step([HOLD])
+    world.change(restock=restock[1])
+    for _ in range(10):
+        assert state.requested == NOBODY or state.item_status[state.requested] != DELIVERED
+        world.step([HOLD])
+    # One came back and goes on coming back; or all three were there and left for good.
+    assert state.delivered == (12 if restock[1] else 5)
+    assert world.all_delivered is restock[0]
+
+
 def test_an_fm4_carrier_blocks_the_request_until_it_lets_go(build: Build) -> None:
     robots = [(INSIDE, 5.0), (INSIDE, 5.3)]
     world = build(robots, [(INSIDE, 5.05), FAR], [Fault("FM4", (0,))], pickup_range=0.4)
