@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from swarm_logistics_env.policies.policy import Policy
@@ -11,12 +13,26 @@ from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 
+class Count(NamedTuple):
+    """Deliveries so far, items that left with them, and whether items come back now."""
+
+    delivered: int
+    gone: int
+    restock: bool
+
+
+def counted(world: Warehouse) -> Count:
+    """Return what is counted now."""
+    gone = int(np.count_nonzero(world.state.item_status == DELIVERED))
+    return Count(world.state.delivered, gone, world.scenario.restock)
+
+
 def check_conservation(
     make: Make, policy: Policy | str = "swarm-dt", seed: int = 0, steps: int = 500
 ) -> None:
     """Check that each item is at every moment stored, delivered, or carried by one robot.
 
-    Without `restock`, as many items are delivered as deliveries were counted.
+    Without `restock`, an item leaves with every delivery.
 
     Args:
         make: returns a new parallel environment.
@@ -27,15 +43,16 @@ def check_conservation(
     Raises:
         ConservationError: names the item and the step.
     """
-    delivered = 0
+    before: Count | None = None
     for moment in played(make, policy, seed, steps):
-        wrong = _wrong_item(moment.world) or _wrong_count(moment.world, delivered)
+        wrong = wrong_item(moment.world) or wrong_count(moment.world, before)
         if wrong:
             raise ConservationError(f"at step {moment.step} {wrong}")
-        delivered = moment.world.state.delivered
+        before = counted(moment.world)
 
 
-def _wrong_item(world: Warehouse) -> str | None:
+def wrong_item(world: Warehouse) -> str | None:
+    """Return in words which item is not stored, carried or delivered as it should be."""
     state = world.state
     if len(state.item_status) != world.scenario.n_items:
         return f"there are {len(state.item_status)} items: should be {world.scenario.n_items}"
@@ -57,14 +74,17 @@ def _wrong_item(world: Warehouse) -> str | None:
     return None
 
 
-def _wrong_count(world: Warehouse, before: int) -> str | None:
-    state = world.state
-    if state.delivered < before:
-        return f"{state.delivered} items are delivered, but {before} were a step before"
-    if len(state.delivered_by) != state.delivered:
-        return f"{len(state.delivered_by)} robots are noted for {state.delivered} deliveries"
-    lying = int(np.count_nonzero(state.item_status == DELIVERED))
-    expected = 0 if world.scenario.restock else state.delivered
-    if not world.scenario.restock and lying != expected:
-        return f"{lying} items have left for {state.delivered} deliveries"
+def wrong_count(world: Warehouse, before: Count | None) -> str | None:
+    """Return in words what is wrong with the deliveries since `before`, None: since the reset."""
+    state, now = world.state, counted(world)
+    before = before or Count(0, 0, now.restock)
+    if now.delivered < before.delivered:
+        return f"{now.delivered} items are delivered, but {before.delivered} were a step before"
+    if len(state.delivered_by) != now.delivered:
+        return f"{len(state.delivered_by)} robots are noted for {now.delivered} deliveries"
+    # Where `restock` changed in between, either may have held.
+    news = now.delivered - before.delivered
+    expected = {before.gone + (0 if restock else news) for restock in (now.restock, before.restock)}
+    if now.gone not in expected:
+        return f"{now.gone} items have left for {now.delivered} deliveries"
     return None

@@ -1,0 +1,1 @@
+"""What holds the promises of docs/promises.md: recorded trajectories, invariants, mutants."""

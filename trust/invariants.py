@@ -1,0 +1,228 @@
+"""What holds at every step of every world, checked without the kernels that make it so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Warehouse
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.testing.items import Count, counted, wrong_count, wrong_item
+from swarm_logistics_env.warehouse import FAILURE_MODES, FailureMode
+from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+
+SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
+JAM = 1.0  # [s] of overlap without a break make a jam
+SLACK = 0.002  # [m]: the solver's slop and its push-out
+
+
+class BrokenPromiseError(AssertionError):
+    """An invariant that does not hold, with the step and what was seen."""
+
+
+class Watch:
+    """Looks at one world after its reset and after every step.
+
+    Attributes:
+        deepest: the greatest overlap seen between bodies [m].
+        deepest_jam: the greatest overlap that lasted for `JAM` [m].
+
+    Raises:
+        BrokenPromiseError: from `look`, with one sentence.
+    """
+
+    def __init__(self, world: Warehouse) -> None:
+        self.world = world
+        self.deepest = self.deepest_jam = 0.0
+        self._count: Count | None = None
+        self._speed = 0.0
+        self._modes: tuple[tuple[str, ...], ...] = ()
+        self._before: dict[str, NDArray[Any]] = {}
+        self._jammed = np.zeros((0, 0))
+        self._is_above_items = True
+
+    def look(self) -> None:
+        """Check everything."""
+        self._items()
+        self._bodies()
+        self._laden_and_items()
+        self._timers()
+        self._capabilities()
+        self._rows()
+        state = self.world.state
+        self._count, self._modes = counted(self.world), state.failure_modes
+        self._speed = float(self.world.scenario.max_speed)
+        self._before = {
+            name: getattr(state, name).copy()
+            for name in ("robot_item", "robot_position", "robot_heading", "item_position",
+                         "item_status")
+        }  # fmt: skip
+
+    def _demand(self, holds: bool, words: str) -> None:
+        # Every comparison is written so that a number that is none fails it.
+        if not holds:
+            raise BrokenPromiseError(f"at step {self.world.state.step} {words}")
+
+    def _items(self) -> None:
+        world, state, scenario = self.world, self.world.state, self.world.scenario
+        problem = wrong_item(world) or wrong_count(world, self._count)
+        self._demand(problem is None, str(problem))
+        counts = [int(np.count_nonzero(state.item_status == s)) for s in (0, 1, 2)]
+        self._demand(sum(counts) == scenario.n_items, f"{counts} items are there in all")
+        carried = state.robot_item[state.robot_item != NOBODY]
+        self._demand(len(set(carried.tolist())) == len(carried), "two robots carry one item")
+        if state.requested == NOBODY:
+            self._demand(bool((state.item_status == DELIVERED).all()), "nothing is asked for")
+        else:
+            self._demand(0 <= state.requested < scenario.n_items, f"{state.requested} is asked")
+            asked = state.item_status[state.requested]
+            self._demand(asked in (STORED, CARRIED), "the requested item is delivered")
+        times = np.array(state.delivery_times)
+        self._demand(bool((np.diff(times) >= 0.0).all()), "delivery times fall")
+        far = np.array([scenario.warehouse_width, scenario.warehouse_height])
+        here = state.item_position[state.item_status != DELIVERED]
+        self._demand(bool(((here >= 0.0) & (here <= far)).all()), "an item lies outside")
+
+    def _bodies(self) -> None:
+        scenario, state = self.world.scenario, self.world.state
+        here = state.robot_present
+        at, radius = state.robot_position, scenario.robot_radius
+        gaps = np.linalg.norm(at[:, None] - at[None], axis=2) - 2.0 * radius
+        off = ~(here[:, None] & here[None]) | np.eye(len(at), dtype=bool)
+        solids = state.obstacle_position
+        to_solids = np.linalg.norm(at[:, None] - solids[None], axis=2)
+        to_solids -= radius + scenario.obstacle_radius
+        far = np.array([scenario.warehouse_width, scenario.warehouse_height])
+        to_walls = np.hstack([at, far - at]) - radius
+        depth = -np.hstack([np.where(off, np.inf, gaps), to_solids, to_walls])
+        depth[~here] = -np.inf
+        # The speed of the last step is that before or after a change. A laden robot that stands
+        # above an item is pushed off it, into whoever is there.
+        speed = max(self._speed, scenario.max_speed)
+        closing = 2.0 * speed * scenario.physics_period
+        if self._is_above_items:
+            closing += 1.5 * scenario.physics_period
+        deepest = float(depth.max(initial=-np.inf))
+        self._demand(
+            deepest <= closing + SLACK,
+            f"bodies overlap by {deepest:.4f} m: should be at most {closing:.4f} m, what they "
+            "close in one substep",
+        )
+        inside = at[here]
+        self._demand(bool(((inside > 0.0) & (inside < far)).all()), "a robot is outside")
+        self.deepest = max(self.deepest, deepest)
+        # For how long each pair is deeper than it may be in a jam.
+        if self._jammed.shape != depth.shape:
+            self._jammed = np.zeros(depth.shape)
+        self._jammed = np.where(depth > SUSTAINED, self._jammed + scenario.control_period, 0.0)
+        lasting = depth[self._jammed > JAM]
+        self.deepest_jam = max(self.deepest_jam, float(lasting.max(initial=0.0)))
+        self._demand(
+            not len(lasting),
+            f"bodies have overlapped by more than {SUSTAINED} m for {JAM} s, now by "
+            f"{float(lasting.max(initial=0.0)):.4f} m",
+        )
+        # Noted for the next step.
+        free = state.item_position[state.item_status == STORED]
+        laden = at[here & (state.robot_item != NOBODY)]
+        away = np.linalg.norm(laden[:, None] - free[None], axis=2)
+        self._is_above_items = bool((away < radius + scenario.item_radius).any())
+
+    def _laden_and_items(self) -> None:
+        """A laden robot enters no item that it was not above when it took its own."""
+        scenario, state, before = self.world.scenario, self.world.state, self._before
+        if not before:
+            return
+        laden = (state.robot_item != NOBODY) & (state.robot_item == before["robot_item"])
+        free = (state.item_status == STORED) & (before["item_status"] == STORED)
+        free &= (state.item_position == before["item_position"]).all(axis=1)
+        radii = scenario.robot_radius + scenario.item_radius
+        then, now = (
+            radii - np.linalg.norm(at[laden][:, None] - state.item_position[free][None], axis=2)
+            for at in (before["robot_position"], state.robot_position)
+        )
+        # Others may push it on while it is being pushed off.
+        allowed = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period + SLACK
+        deeper = now - np.maximum(then, 0.0)
+        self._demand(
+            bool((deeper <= allowed).all()),
+            f"a laden robot drives {float(deeper.max(initial=0.0)):.4f} m into an item",
+        )
+
+    def _timers(self) -> None:
+        state, limit = self.world.state, self.world.scenario.timer_limit
+        for name in ("robot_timer", "robot_told", "robot_heard"):
+            timer = getattr(state, name)
+            self._demand(
+                bool((np.isnan(timer) | ((timer >= 0.0) & (timer < limit))).all()),
+                f"{name} leaves [0, {limit:g})",
+            )
+
+    def _capabilities(self) -> None:
+        state, scenario = self.world.state, self.world.scenario
+        for robot, names in enumerate(state.failure_modes):
+            modes = [FAILURE_MODES[name] for name in names]
+            self._exercised(robot, modes)
+            # What held before and after a step held throughout it.
+            if self._modes:
+                lasting = [FAILURE_MODES[name] for name in names if name in self._modes[robot]]
+                self._did(robot, lasting)
+        tells = state.robot_present & state.sends & ~np.isnan(state.robot_told)
+        gaps = state.robot_position[:, None] - state.robot_position[None]
+        squares = (gaps**2).sum(axis=2)
+        reached = (squares <= scenario.radio_range**2 * (1 + 1e-12)) & tells[None]
+        np.fill_diagonal(reached, False)
+        lowest = np.where(reached, state.robot_told[None], np.inf).min(axis=1, initial=np.inf)
+        heard = np.where(np.isnan(state.robot_heard), np.inf, state.robot_heard)
+        deaf = ~(state.hears & state.robot_present)
+        self._demand(bool(np.isinf(heard[deaf]).all()), "who does not hear has heard a timer")
+        self._demand(bool((heard >= lowest).all()), "a timer was heard that nobody near tells")
+
+    def _exercised(self, robot: int, modes: list[FailureMode]) -> None:
+        state, scenario = self.world.state, self.world.scenario
+        rows = self.world.observe()[robot]
+        if not all(mode.present for mode in modes):
+            self._demand(not state.robot_present[robot], f"robot {robot}, removed, is there")
+        if not state.robot_present[robot]:
+            self._demand(not rows.any(), f"robot {robot} is gone and senses")
+            self._demand(state.robot_item[robot] == NOBODY, f"robot {robot} is gone and carries")
+            self._demand(bool(np.isnan(state.robot_told[robot])), f"robot {robot} tells, gone")
+            return
+        if not all(mode.honest for mode in modes):
+            self._demand(state.robot_told[robot] == 0.0, f"robot {robot} is in FM1, tells no 0")
+        if not all(mode.rangers for mode in modes) and scenario.ranger_noise == 0.0:
+            scans = rows[: 3 * row.N_BEAMS]
+            blind = bool((scans == np.float32(scenario.ranger_range)).all())
+            self._demand(blind, f"robot {robot}'s blind rangers see")
+        if any(mode.view == 0.0 for mode in modes):
+            items = rows[row.ITEMS : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
+            self._demand(not items.any(), f"robot {robot} sees items without cameras")
+
+    def _did(self, robot: int, modes: list[FailureMode]) -> None:
+        state, before = self.world.state, self._before
+        took = state.robot_item[robot] not in (before["robot_item"][robot], NOBODY)
+        if not all(mode.lifts for mode in modes):
+            self._demand(not took, f"robot {robot} lifts item {state.robot_item[robot]}")
+        if not all(mode.delivers for mode in modes):
+            news = state.delivered_by[self._count.delivered if self._count else 0 :]
+            self._demand(robot not in news, f"robot {robot} delivers in a mode that does not")
+        if any(mode.speed == 0.0 for mode in modes):
+            turned = state.robot_heading[robot] != before["robot_heading"][robot]
+            self._demand(not turned or not state.robot_present[robot], f"robot {robot} turns")
+        if not all(mode.obeys for mode in modes) and state.robot_present[robot]:
+            held = before["robot_item"][robot]
+            lost = held != NOBODY and state.robot_item[robot] != held
+            self._demand(not lost, f"robot {robot} is dead and lets item {held} go")
+
+    def _rows(self) -> None:
+        rows = self.world.observe()
+        low, high = row.bounds(self.world.scenario)
+        here = self.world.state.robot_present
+        fits = (rows[here] >= low) & (rows[here] <= high)
+        names = [c.name for c in row.columns(self.world.scenario) if not fits[:, c.columns].all()]
+        self._demand(not names, f"observations leave their ranges: {', '.join(names)}")
+        asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
+        flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
+        self._demand(bool((flags.sum(axis=1) <= 1).all()), "a robot sees two requested items")
