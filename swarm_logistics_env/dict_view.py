@@ -71,7 +71,9 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         observations, rewards, terminations, truncations = (part[rows] for part in outcome)
         infos = self._infos(agents)
         if not self.agents:
-            last = {"delivered": self.warehouse.state.delivered}
+            # Of a wrapper that has more to say.
+            more = getattr(self, "episode_info", {})
+            last = {"delivered": self.warehouse.state.delivered, **more}
             infos = {agent: {**info, **last} for agent, info in infos.items()}
         return (
             dict(zip(agents, observations, strict=True)),

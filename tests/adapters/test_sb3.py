@@ -15,7 +15,13 @@ from swarm_logistics_env import Fault
 from swarm_logistics_env.env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.streams import key
-from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
+from swarm_logistics_env.wrappers import (
+    FaultInjection,
+    IndicatorReward,
+    ParameterChange,
+    RunningMeans,
+    SwarmSize,
+)
 
 pytest.importorskip("stable_baselines3")
 
@@ -369,6 +375,46 @@ def test_their_wrappers_callbacks_and_evaluation_work() -> None:
     assert env.get_attr("render_mode") == [None] * 6
     mean, _ = evaluate_policy(model, env, n_eval_episodes=6)
     assert np.isfinite(mean)
+
+
+def test_worlds_share_running_means_whatever_the_threads() -> None:
+    def played_with(threads: int) -> tuple[list[Any], RunningMeans]:
+        means = RunningMeans(window=3)
+
+        def make_env(world: int) -> Any:
+            env: Any = small_env(n_robots=3, pickup_range=9.0, restock=True)
+            env = FaultInjection(env, "FM1") if world % 2 else env
+            return IndicatorReward(env, {"R": 1.0, "P": 0.1}, references=means)
+
+        env = SwarmVecEnv(make_env=make_env, n_worlds=4, threads=threads, seed=0)
+        trace = played(env, 130)
+        assert env.env_is_wrapped(IndicatorReward) == [True] * 12
+        env.close()
+        return trace, means
+
+    alone, means = played_with(1)
+    assert_same(played_with(3)[0], alone)
+    counts = {condition.n_failed: means.count(condition) for condition in means.conditions}
+    assert counts == {0: 12, 1: 12}
+
+
+def test_the_end_of_an_episode_tells_indicators_and_references() -> None:
+    env = SwarmVecEnv(
+        make_env=lambda world: IndicatorReward(small_env(n_robots=3), "R", references=20.0),
+        n_worlds=2,
+        seed=0,
+    )
+    env.set_options([{}, {"faults": [Fault("FM1", 2)]}])
+    env.reset()
+    returns = np.zeros(6)
+    for _ in range(20):
+        _, rewards, _, infos = env.step(np.zeros((6, 4)))
+        returns += rewards
+    assert infos[0]["indicators"] == {}
+    assert infos[3]["indicators"] == {"R": pytest.approx(-1 + 2 / 3)}
+    assert infos[3]["references"]["R"]["P_o"] == 20.0
+    assert infos[3]["condition"].n_failed == 2
+    assert returns == pytest.approx([0.0] * 3 + [-1 + 2 / 3] * 3)
 
 
 def test_asking_for_adapters_does_not_load_torch() -> None:

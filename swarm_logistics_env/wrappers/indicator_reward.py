@@ -1,0 +1,270 @@
+"""The Swarm Performance Indicators as rewards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env.dict_view import ArrayStep
+from swarm_logistics_env.errors import SetupError, suggest
+from swarm_logistics_env.rewards import carrier_of_requested
+from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.wrappers.conditions import Condition, changes_of, condition_of
+from swarm_logistics_env.wrappers.indicator_payments import (
+    INDICATORS,
+    EpisodeIndicator,
+    Payment,
+    derivative_of,
+    indicator_of,
+)
+from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
+from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.env import SwarmLogisticsEnv
+
+CREDITS = ("team", "deliverer", "carriers")
+
+
+class IndicatorReward(Wrapper):
+    """Pays indicators: the undiscounted return of an episode is the indicator of that episode.
+
+    Each delivery pays its share, and the first step the constant (paper, equations S, FT, R, A):
+
+    ========= ================== ==================== ===================================
+    indicator share              constant             paid in episodes with
+    ========= ================== ==================== ===================================
+    S         N / (m P_N)        -N / m               N + m robots, N the environment's own
+    FT        1 / P_o            -P_S / P_o           m faulty robots
+    R         1 / P_o            -1 + m / N           m faulty robots
+    A         1 / (P_o abs(dx))  1 - 1 / abs(dx)      one parameter changed by dx [relative]
+    P         1                  0                    any conditions
+    ========= ================== ==================== ===================================
+
+    What an episode is about (its `Condition`) is read from the warehouse, so that it does not
+    matter who asked for it: reset options, or wrappers inside or outside of this one. Removed
+    robots are no faulty ones. A parameter that changes in mid-run makes up for what was
+    paid before, so the return is A all the same.
+
+    *References as numbers.* P_o of the environment's own scenario, or a performance per condition,
+    for instance the means of a study. Episodes without faults and changes pay nothing then (but
+    P). Beware: **R, FT, S and A rise when P_o falls**, and nothing in such a reward holds P_o up.
+    So P_o is reported beside them, the one given and, where such episodes are played, the
+    one measured: look at both, or add P to the weights.
+
+    *References as running means* of episodes of the policy in training, played in between: give a
+    `RunningMeans`. Its means at the start of an episode hold for all of that episode. The
+    indicator then depends on the policy through its references too, and reference episodes are
+    paid for that, by the derivative of the indicator with respect to their performance:
+
+    * no faults: -(n_F / n_o) P_F / P_o^2 per delivery for R; -(n_F / n_o) (P_F - P_S) / P_o^2 for
+      FT; the same as for R times N/m or 1/abs(dx), with P_(N+m) or P_new for P_F, for S and A;
+    * m robots removed: -(n_F / n_S) / P_o per delivery for FT;
+
+    summed over all conditions F that have this one as reference; n are the episodes so far, so
+    that the mean return over any mix of episodes has the gradient of the mean indicator (with as
+    many of either, the ratio is 1). Their constant makes their mean return 0, so that all terms
+    are of one size. A performance in no divisor that was not measured yet counts as 0.
+
+    Args:
+        env: the environment, or a wrapper of one.
+        weights: "R", or several with their weights, e.g. {"R": 1.0, "P": 0.02}.
+        references: P_o [items], {condition: P}, or `RunningMeans`, which several may share.
+        credit: who gets the share: "team": everybody present, all of it, so that each robot's
+            return is the indicator; "deliverer": the robot that delivers; "carriers": in equal
+            parts, those that carried the item since it was asked for. In these two the constant
+            is divided among all, so that the sum of the robots' returns is the indicator.
+        constant: whether to pay the constant.
+        own_reward: weight of the wrapped environment's own reward, which is added, for shaping.
+
+    Attributes:
+        condition: of this episode.
+        payments: of this episode, by indicator; unweighted.
+        measured: running means of all conditions played, also where references are numbers. An
+            episode counts when the next one begins.
+
+    Raises:
+        SetupError: an argument cannot be. At the reset, and from `payments_of`, which tells early:
+            a reference is missing or P_o = 0, or the indicator is undefined, as FT with m = N.
+
+    Example:
+        >>> from swarm_logistics_env import Fault, swarm_logistics_v0
+        >>> env = swarm_logistics_v0.parallel_env(n_robots=25)
+        >>> env = IndicatorReward(env, "R", references=33.0)
+        >>> observations, infos = env.reset(seed=0, options={"faults": [Fault("FM1", 2)]})
+        >>> env.condition
+        Condition(n_robots=25, modes=('FM1',), n_failed=2, n_removed=0, changes=())
+        >>> env.payments["R"].share == 1 / 33, round(env.payments["R"].constant, 9)
+        (True, -0.92)
+
+        Worlds that share their means, every other one with faults; `SwarmVecEnv(make_env=...)`:
+
+        >>> from swarm_logistics_env.wrappers import FaultInjection
+        >>> means = RunningMeans(window=20, initial=33.0)
+        >>> def make_env(world):
+        ...     env = swarm_logistics_v0.parallel_env(n_robots=25)
+        ...     env = FaultInjection(env, "FM1", robots=2) if world % 2 else env
+        ...     return IndicatorReward(env, {"R": 1.0, "P": 0.02}, references=means)
+    """
+
+    def __init__(
+        self,
+        env: SwarmLogisticsEnv | Wrapper,
+        weights: str | Mapping[str, float],
+        *,
+        references: float | Mapping[Condition, float] | RunningMeans,
+        credit: Literal["team", "deliverer", "carriers"] = "team",
+        constant: bool = True,
+        own_reward: float = 0.0,
+    ) -> None:
+        super().__init__(env)
+        self.weights = _checked_weights(weights)
+        if credit not in CREDITS:
+            raise SetupError(f"credit = {credit!r}{suggest(str(credit), CREDITS)}")
+        self.credit, self.constant = credit, constant
+        self.own_reward = _finite("own_reward", own_reward)
+        self._own = self.unwrapped.scenario
+        self.condition = Condition(self._own.n_robots)
+        self._references: GivenPerformances | RunningMeans
+        if isinstance(references, RunningMeans):
+            self._references = self.measured = references
+        else:
+            given = references if isinstance(references, Mapping) else {self.condition: references}
+            self._references, self.measured = GivenPerformances(given), RunningMeans()
+            if given is not references:
+                self._references.divisor(self.condition)
+        # What can be known of the episodes to come is tried before any of them.
+        for scenario in self.env.scenarios:
+            self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
+        self._is_over = False
+
+    def payments_of(self, condition: Condition) -> dict[str, Payment]:
+        """Return what an episode of that condition would pay, by indicator; unweighted.
+
+        Raises:
+            SetupError: a reference is missing or 0, or an indicator is undefined.
+        """
+        payments = {}
+        for name in self.weights:
+            paid = self._indicator(name, condition) or Payment()
+            if isinstance(self._references, RunningMeans):
+                slope = derivative_of(name, condition, self._own, self._references)
+                paid = Payment(paid.share + slope.share, paid.constant + slope.constant)
+            payments[name] = paid
+        return payments
+
+    @property
+    def episode_info(self) -> dict[str, Any]:
+        """What this episode is about and has come to, for the infos of its last step.
+
+        "condition"; "indicators": name -> value so far, constant included, of those that it tests;
+        "references": name -> {"P_o": items, "measured P_o": items or None}, for FT "P_S" as well,
+        for S "P_N" instead.
+        """
+        delivered = self.unwrapped.warehouse.state.delivered
+        tests = {name: test for name, test in self._indicators.items() if test.performances}
+        return {
+            "condition": self.condition,
+            "indicators": {
+                name: test.share * delivered + test.constant for name, test in tests.items()
+            },
+            "references": {
+                name: {
+                    label: items
+                    for role, (condition, given) in test.performances.items()
+                    for label, items in (
+                        (role, given),
+                        (f"measured {role}", self.measured.mean(condition)),
+                    )
+                }
+                for name, test in tests.items()
+            },
+        }
+
+    def reset_arrays(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> NDArray[np.float32]:
+        """Begin an episode; the one before counts if it came to its end."""
+        if self._is_over:
+            self.measured.add(self.condition, self.unwrapped.warehouse.state.delivered)
+            self._is_over = False
+        return super().reset_arrays(seed, options)
+
+    def begun(self, seed: int) -> None:
+        """Note what the episode is about and what it pays."""
+        self._seed = seed
+        self._paid, self._delivered = Payment(), 0
+        self._carriers = set[int]()  # of the requested item since it was asked for
+        self._take_condition()
+
+    def step_arrays(self, commands: ArrayLike) -> ArrayStep:
+        """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
+        observations, own, terminations, truncations = self.env.step_arrays(commands)
+        world = self.unwrapped.warehouse
+        state = world.state
+        rewards = self.own_reward * own if self.own_reward else np.zeros(state.n_robots)
+        deliverers = state.delivered_by[self._delivered :]
+        if world.scenario is not self._scenario or world.faults is not self._faults:
+            self._take_condition()
+        if self._paid is not self._due or deliverers:
+            self._pay(rewards, deliverers, state.robot_present | terminations)
+        if self.credit == "carriers" and (carrier := carrier_of_requested(world)) != NOBODY:
+            self._carriers.add(carrier)
+        self._delivered = state.delivered
+        self._is_over = not self.env.agents
+        return observations, rewards, terminations, truncations
+
+    def _pay(
+        self, rewards: NDArray[np.float64], deliverers: list[int], present: NDArray[np.bool_]
+    ) -> None:
+        once = self._due.constant - self._paid.constant
+        # What was delivered before a change in mid-run was paid another share.
+        once += (self._due.share - self._paid.share) * self._delivered
+        self._paid = self._due
+        if self.credit == "team":
+            rewards[present] += once + self._due.share * len(deliverers)
+            return
+        rewards[present] += once / max(int(np.count_nonzero(present)), 1)
+        for robot in deliverers:
+            involved = {robot} | {other for other in self._carriers if present[other]}
+            rewards[list(involved)] += self._due.share / len(involved)
+            self._carriers.clear()
+
+    def _take_condition(self) -> None:
+        world = self.unwrapped.warehouse
+        self._scenario, self._faults = world.scenario, world.faults
+        self.condition = condition_of(world, self._seed, self._own)
+        self.payments = self.payments_of(self.condition)
+        self._indicators = {
+            name: indicator
+            for name in self.weights
+            if (indicator := self._indicator(name, self.condition))
+        }
+        weighted = [(self.weights[name], paid) for name, paid in self.payments.items()]
+        share = sum(weight * paid.share for weight, paid in weighted)
+        constant = sum(weight * paid.constant for weight, paid in weighted)
+        self._due = Payment(share, constant if self.constant else 0.0)
+
+    def _indicator(self, name: str, condition: Condition) -> EpisodeIndicator | None:
+        return indicator_of(name, condition, self._own, self._references)
+
+
+def _checked_weights(weights: str | Mapping[str, float]) -> dict[str, float]:
+    checked = {weights: 1.0} if isinstance(weights, str) else dict(weights)
+    if not checked:
+        raise SetupError(f"weights = {weights!r}: should name at least one indicator")
+    known = (*INDICATORS, "P")
+    for name, weight in checked.items():
+        if name not in known:
+            raise SetupError(f"no indicator {name!r}{suggest(str(name), known)}")
+        _finite(f"weights[{name!r}]", weight)
+    return checked
+
+
+def _finite(name: str, value: float) -> float:
+    if not isinstance(value, int | float | np.number) or not np.isfinite(value):
+        raise SetupError(f"{name} = {value!r}: should be a finite number")
+    return float(value)

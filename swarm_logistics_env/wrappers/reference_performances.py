@@ -1,0 +1,122 @@
+"""The performances that indicators are relative to: given, or measured during a training."""
+
+from __future__ import annotations
+
+import operator
+from collections import Counter, deque
+from collections.abc import Mapping
+
+import numpy as np
+
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.wrappers.conditions import Condition
+
+
+class GivenPerformances:
+    """Numbers, as of a study.
+
+    Raises:
+        SetupError: a performance is negative or not finite, or a key is no condition.
+    """
+
+    def __init__(self, performances: Mapping[Condition, float]) -> None:
+        self._performances = dict(performances)
+        for condition, items in self._performances.items():
+            if not isinstance(condition, Condition):
+                raise SetupError(f"references: key {condition!r} should be a Condition")
+            if not isinstance(items, int | float | np.number) or not 0 <= items < np.inf:
+                raise SetupError(
+                    f"references[{condition}] = {items!r}: should be a number of items, at least 0"
+                )
+
+    def performance(self, condition: Condition) -> float:
+        """Return its P [items].
+
+        Raises:
+            SetupError: it was not given.
+        """
+        if condition not in self._performances:
+            raise SetupError(f"references should have the performance of {condition}")
+        return float(self._performances[condition])
+
+    def divisor(self, condition: Condition) -> float:
+        """Return its P as one divides by it.
+
+        Raises:
+            SetupError: it was not given, or is 0.
+        """
+        p_o = self.performance(condition)
+        if p_o == 0:
+            raise SetupError(f"P_o = 0 of {condition}: should be positive, indicators divide by it")
+        return p_o
+
+
+class RunningMeans:
+    """Items delivered under each condition: the mean over its last episodes.
+
+    Environments may share one, so that a few reference episodes serve them all. They should play
+    the same scenario, but for the swarm size, and lie in one process. `SwarmVecEnv` lets them
+    report in the worlds' order, so that results do not depend on its threads.
+
+    Args:
+        window: over how many episodes of a condition the mean is taken; the policy changes.
+        least: what a mean that divides counts as at least [items]: at the start of a training
+            nothing is delivered.
+        initial: what a mean that divides counts as before there is any; None: `least`.
+
+    Raises:
+        SetupError: a window below 1, or numbers that are not positive.
+
+    Example:
+        >>> means = RunningMeans(window=2)
+        >>> for delivered in (30, 34, 36):
+        ...     means.add(Condition(25), delivered)
+        >>> means.mean(Condition(25)), means.count(Condition(25))
+        (35.0, 3)
+    """
+
+    def __init__(
+        self, window: int = 50, *, least: float = 1.0, initial: float | None = None
+    ) -> None:
+        try:
+            self.window = operator.index(window)
+        except TypeError:
+            self.window = 0
+        if self.window < 1:
+            raise SetupError(f"window = {window!r}: should be a number of episodes, at least 1")
+        self.least = least
+        self.initial = least if initial is None else initial
+        for name in ("least", "initial"):
+            value = getattr(self, name)
+            if not isinstance(value, int | float | np.number) or not 0 < value < np.inf:
+                raise SetupError(f"{name} = {value!r}: should be a positive number of items")
+        self._last: dict[Condition, deque[int]] = {}
+        self._counts: Counter[Condition] = Counter()
+
+    def add(self, condition: Condition, delivered: int) -> None:
+        """Count an episode that is over."""
+        self._last.setdefault(condition, deque(maxlen=self.window)).append(delivered)
+        self._counts[condition] += 1
+
+    def mean(self, condition: Condition) -> float | None:
+        """Return the mean P of its last episodes [items], or None if there was none."""
+        last = self._last.get(condition)
+        return sum(last) / len(last) if last else None
+
+    def count(self, condition: Condition) -> int:
+        """Return how many of its episodes there were in all."""
+        return self._counts[condition]
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The conditions met so far, in order of their first episodes."""
+        return tuple(self._last)
+
+    def performance(self, condition: Condition) -> float:
+        """Return its mean P [items], 0 if there was none."""
+        return self.mean(condition) or 0.0
+
+    def divisor(self, condition: Condition) -> float:
+        """Return its mean P as one divides by it."""
+        mean = self.mean(condition)
+        return max(self.initial if mean is None else mean, self.least)

@@ -1,0 +1,375 @@
+"""Indicators as rewards: what an episode's rewards sum up to."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, spi
+from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.wrappers import (
+    Condition,
+    FaultInjection,
+    IndicatorReward,
+    ParameterChange,
+    RunningMeans,
+    SwarmSize,
+)
+
+N = 4
+OWN = Condition(N)
+FAULTY = Condition(N, ("motor_slow",), n_failed=2)
+REMOVED = Condition(N, n_removed=2)
+SLOW = {"faults": [Fault("motor_slow", 2)]}
+GONE = {"faults": [Fault("removed", 2)]}
+CLOSE: Any = {"abs": 1e-9, "rel": 0}
+
+
+def busy(**arguments: Any) -> SwarmLogisticsEnv:
+    """A warehouse whose robots reach every item, so that even a blind policy delivers."""
+    fields: dict[str, Any] = {
+        "n_robots": N, "n_items": 12, "warehouse_width": 6.0, "warehouse_height": 5.0,
+        "pickup_range": 9.0, "duration": 12.0, "restock": True,
+    }  # fmt: skip
+    return SwarmLogisticsEnv(**{**fields, **arguments})
+
+
+def play(env: Any, seed: int | None, options: Any = None) -> tuple[np.ndarray, Any]:
+    """Play an episode to its end; returns the rewards (steps, N) and the last infos."""
+    env.reset(seed=seed, options=options)
+    n_robots = env.unwrapped.warehouse.state.n_robots
+    rng, rewards, infos = np.random.default_rng(seed), [], {}
+    while env.agents:
+        heading = env.unwrapped.warehouse.state.robot_heading
+        east = np.stack([np.cos(heading), -np.sin(heading), 0 * heading, 1 + 0 * heading], axis=1)
+        east[:, 3] = np.where(rng.uniform(size=n_robots) < 0.3, -1.0, 1.0)
+        _, earned, _, _, infos = env.step({name: east[int(name[6:])] for name in env.agents})
+        rewards.append([earned.get(f"robot_{row}", 0.0) for row in range(n_robots)])
+    return np.array(rewards), infos
+
+
+def delivered(env: Any) -> int:
+    return int(env.unwrapped.warehouse.state.delivered)
+
+
+EPISODES: dict[str, tuple[Any, Callable[[int], spi.Estimate]]] = {
+    "R": (SLOW, lambda p: spi.robustness([33], [p], n=N, m=2)),
+    "FT": (SLOW, lambda p: spi.fault_tolerance([33], [p], [21])),
+    "S": ({"scenario": {"n_robots": 7}}, lambda p: spi.scalability([33], [p], n=N, m=3)),
+    "A": (
+        {"scenario": {"delivery_width": 1.5}},
+        lambda p: spi.adaptability([33], [p], x_o=2.0, x_new=1.5),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EPISODES)
+def test_the_return_is_the_indicator(name: str) -> None:
+    options, estimate = EPISODES[name]
+    env = busy()
+    env.cover(env.scenario.replace(n_robots=7))
+    env = IndicatorReward(env, name, references={OWN: 33, REMOVED: 21})
+    rewards, infos = play(env, 0, options)
+    p = delivered(env)
+    assert p > 5
+    for robot_return in rewards.sum(axis=0):
+        assert robot_return == pytest.approx(estimate(p).value, **CLOSE)
+    info = infos["robot_0"]
+    assert info["indicators"][name] == pytest.approx(estimate(p).value, **CLOSE)
+    reference = "P_N" if name == "S" else "P_o"
+    assert info["references"][name][reference] == 33
+    assert info["references"][name][f"measured {reference}"] is None
+    assert info["delivered"] == p
+    # Nothing but the constant without a delivery, and it only once.
+    paying = np.flatnonzero(rewards[:, 0])
+    times = {round(time / 0.1) - 1 for time in env.unwrapped.warehouse.state.delivery_times}
+    assert set(paying) == times | {0}
+
+
+def test_the_constant_can_be_left_out_and_weights_add_up() -> None:
+    references = {OWN: 33.0, REMOVED: 21.0}
+    env = IndicatorReward(busy(), {"R": 2.0, "FT": 1.0, "P": 0.5}, references=references)
+    rewards, infos = play(env, 0, SLOW)
+    p = delivered(env)
+    r, ft = p / 33 - 1 + 2 / N, (p - 21) / 33
+    assert rewards.sum(axis=0) == pytest.approx(2 * r + ft + 0.5 * p, **CLOSE)
+    assert infos["robot_0"]["indicators"] == pytest.approx({"R": r, "FT": ft})
+    env = IndicatorReward(busy(), "R", references=33, constant=False)
+    rewards, infos = play(env, 0, SLOW)
+    assert rewards.sum(axis=0) == pytest.approx(p / 33, **CLOSE)
+    assert infos["robot_0"]["indicators"] == pytest.approx({"R": r})
+
+
+def test_without_what_an_indicator_is_about_numbers_pay_nothing() -> None:
+    env = IndicatorReward(busy(), {"R": 1.0, "S": 1.0, "A": 1.0}, references=33.0)
+    for options in (None, GONE):
+        rewards, infos = play(env, 0, options)
+        assert delivered(env) > 5
+        assert not rewards.any()
+        assert next(iter(infos.values()))["indicators"] == {}
+    # The P_o that the policy has in fact is told beside the one given.
+    env.reset(seed=0, options=SLOW)
+    measured = env.episode_info["references"]["R"]["measured P_o"]
+    assert measured == env.measured.mean(OWN)
+    assert measured > 5
+
+
+STACKS: dict[str, Callable[[Any], Any]] = {
+    "faults": lambda env: FaultInjection(env, "FM4", robots=1, onset=[0.0, 3.0]),
+    "size": lambda env: SwarmSize(env, [5, 6], leave=[(1, 5.0)]),
+    "change": lambda env: ParameterChange(env, "delivery_width", [1.0, 3.0]),
+    "reward": lambda env: IndicatorReward(
+        env, {"R": 1.0, "FT": 0.5, "S": 0.25, "A": 2.0, "P": 0.01},
+        references=RunningMeans(initial=20.0),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(STACKS)), ids="(".join)
+def test_the_order_of_wrappers_does_not_matter(order: tuple[str, ...]) -> None:
+    env: Any = busy(duration=2.0)
+    for name in order:
+        env = STACKS[name](env)
+    expected: Any = STACKS["reward"](STACKS["size"](STACKS["faults"](STACKS["change"](
+        busy(duration=2.0)
+    ))))  # fmt: skip
+    for seed in range(3):
+        rewards, infos = play(env, seed)
+        wanted, wanted_infos = play(expected, seed)
+        np.testing.assert_array_equal(rewards, wanted)
+        assert infos == wanted_infos
+        condition = env.condition
+        assert condition.n_robots in (5, 6)
+        assert condition.n_failed == condition.n_removed == 1
+        assert condition.changes[0][0] == "delivery_width"
+        assert set(infos["robot_0"]["indicators"]) == {"R", "FT", "S", "A"}
+
+
+def test_a_change_in_mid_run_makes_the_return_the_adaptability() -> None:
+    env = ParameterChange(busy(), "delivery_width", 1.5, at=6.0)
+    for stack in (
+        IndicatorReward(env, "A", references=33.0),
+        ParameterChange(
+            IndicatorReward(busy(), "A", references=33.0), "delivery_width", 1.5, at=6.0
+        ),
+    ):
+        rewards, _ = play(stack, 0)
+        value = spi.adaptability([33], [delivered(stack)], x_o=2.0, x_new=1.5).value
+        assert rewards.sum(axis=0) == pytest.approx(value, **CLOSE)
+        assert not rewards[:59].any()
+
+
+def test_running_means_are_those_of_the_episodes_that_ended() -> None:
+    means = RunningMeans(window=2)
+    env = IndicatorReward(busy(), {"R": 1.0, "FT": 1.0}, references=means)
+    plays: dict[Condition, list[int]] = {OWN: [], FAULTY: [], REMOVED: []}
+    for seed in range(4):
+        for condition, options in ((OWN, None), (FAULTY, SLOW), (REMOVED, GONE)):
+            env.reset(seed=99, options=SLOW)  # is cut short, so counts for nothing
+            env.step_arrays(np.zeros((N, 4)))
+            play(env, seed, options)
+            assert env.condition == condition
+            plays[condition].append(delivered(env))
+    env.reset(seed=0)
+    assert {c: means.count(c) for c in means.conditions} == dict.fromkeys(plays, 4)
+    assert {c: means.mean(c) for c in means.conditions} == pytest.approx(
+        {condition: np.mean(counts[-2:]) for condition, counts in plays.items()}
+    )
+
+
+def filled(**performances: int) -> RunningMeans:
+    means = RunningMeans()
+    for name, condition in (("o", OWN), ("f", FAULTY), ("s", REMOVED)):
+        if name in performances:
+            means.add(condition, performances[name])
+    return means
+
+
+def test_reference_episodes_are_paid_the_derivative() -> None:
+    means = filled(o=30, f=20, s=25)
+
+    def indicators(o: float = 30.0, f: float = 20.0, s: float = 25.0) -> dict[str, float]:
+        return {
+            "R": float(spi.robustness([o], [f], n=N, m=2).value),
+            "FT": float(spi.fault_tolerance([o], [f], [s]).value),
+        }
+
+    env = IndicatorReward(busy(), {"R": 1.0, "FT": 1.0}, references=means)
+    h = 1e-4
+    for condition, at in ((OWN, "o"), (FAULTY, "f"), (REMOVED, "s")):
+        value = {"o": 30.0, "f": 20.0, "s": 25.0}[at]
+        up, down = indicators(**{at: value + h}), indicators(**{at: value - h})
+        for name, paid in env.payments_of(condition).items():
+            assert paid.share == pytest.approx((up[name] - down[name]) / (2 * h), rel=1e-6)
+            mean_return = paid.share * value + paid.constant
+            own = indicators()[name] if condition == FAULTY else 0.0
+            assert mean_return == pytest.approx(own, **CLOSE)
+    assert env.payments_of(OWN)["R"].share == pytest.approx(-20 / 30**2)
+    # Twice as many faulty episodes as reference ones: each of the latter stands for two.
+    means.add(FAULTY, 20)
+    assert env.payments_of(OWN)["R"].share == pytest.approx(-2 * 20 / 30**2)
+    means.add(OWN, 30)
+    means.add(Condition(N, ("FM1",), n_failed=1), 10)
+    assert env.payments_of(OWN)["R"].share == pytest.approx(-(2 * 20 + 10) / 2 / 30**2)
+    rewards, _ = play(env, 0)
+    assert delivered(env) > 0
+    payments = env.payments.values()
+    expected = sum(paid.share * delivered(env) + paid.constant for paid in payments)
+    assert rewards.sum(axis=0) == pytest.approx(expected, **CLOSE)
+
+
+def test_derivatives_of_scalability_and_adaptability() -> None:
+    means = RunningMeans()
+    larger, changed = Condition(N + 2), Condition(N, changes=(("delivery_width", 3.0),))
+    for condition, items in ((OWN, 30), (larger, 40), (changed, 24)):
+        means.add(condition, items)
+    env = IndicatorReward(busy(), {"S": 1.0, "A": 1.0}, references=means)
+    assert env.payments_of(OWN)["S"].share == pytest.approx(-(N / 2) * 40 / 30**2)
+    assert env.payments_of(OWN)["A"].share == pytest.approx(-(1 / 0.5) * 24 / 30**2)
+    assert env.payments_of(larger)["S"].share == pytest.approx((N / 2) / 30)
+    assert env.payments_of(larger)["A"].share == 0
+    assert env.payments_of(changed)["A"].constant == pytest.approx(1 - 1 / 0.5)
+    # An environment of another size does not take part in what this one's S is about.
+    means.add(Condition(2), 11)
+    assert env.payments_of(OWN)["S"].share == pytest.approx(-(N / 2) * 40 / 30**2)
+
+
+def test_means_that_are_not_there_yet_or_too_small() -> None:
+    env = IndicatorReward(busy(), {"R": 1.0, "FT": 1.0}, references=RunningMeans(initial=8.0))
+    assert env.payments_of(FAULTY)["R"].share == 1 / 8
+    assert env.payments_of(FAULTY)["FT"].constant == 0
+    assert env.payments_of(OWN)["R"].share == 0
+    env = IndicatorReward(busy(), {"R": 1.0, "FT": 1.0}, references=filled(o=0, f=3))
+    assert env.payments_of(FAULTY)["R"].share == 1
+    assert env.payments_of(OWN)["R"].share == 0  # a mean below `least` moves nothing
+
+
+@pytest.mark.parametrize("credit", ["deliverer", "carriers"])
+def test_credit_goes_to_the_robots_involved(credit: Any) -> None:
+    env = IndicatorReward(busy(), "R", references=33.0, credit=credit)
+    rewards, _ = play(env, 0, SLOW)
+    state = env.unwrapped.warehouse.state
+    value = spi.robustness([33], [state.delivered], n=N, m=2).value
+    assert rewards.sum() == pytest.approx(value, **CLOSE)
+    constant = (-1 + 2 / N) / N
+    by_robot = rewards.sum(axis=0) - constant
+    counts = np.bincount(state.delivered_by, minlength=N)
+    assert by_robot.sum() == pytest.approx(counts.sum() / 33, **CLOSE)
+    if credit == "deliverer":
+        assert by_robot == pytest.approx(counts / 33, **CLOSE)
+
+
+def test_who_carried_the_item_before_shares_the_credit() -> None:
+    env = IndicatorReward(busy(n_robots=2), "P", references=33.0, credit="carriers")
+    env.reset(seed=0)
+    state = env.unwrapped.warehouse.state
+    hold, stay = np.array([0, 0, 0, 1.0]), np.zeros(4)
+    seen = set()
+    total = np.zeros(2)
+    command = {0: [hold, stay], 1: [np.array([0, 0, 0, -1.0]), stay], 2: [stay, hold]}
+    for step in range(3):
+        if step == 0:
+            state.item_position[:] = 0.05
+            state.item_position[state.requested] = state.robot_position[0]
+        _, rewards, _, _ = env.step_arrays(np.array(command[step]))
+        total += rewards
+        seen.add(int(state.item_carrier[state.requested]))
+    assert seen == {0, 1, -1}
+    while not state.delivered:
+        heading = float(state.robot_heading[1])
+        drive = np.array([np.cos(heading), -np.sin(heading), 0.0, 0.0])
+        _, rewards, _, _ = env.step_arrays(np.array([stay, drive]))
+        total += rewards
+    assert state.delivered == 1
+    assert total.tolist() == [0.5, 0.5]
+
+
+def test_the_environments_own_reward_can_be_kept_for_shaping() -> None:
+    rewards, _ = play(busy(rewards={"contact": -1.0}), 0)
+    assert rewards.any()
+    env = IndicatorReward(busy(rewards={"contact": -1.0}), "R", references=33.0, own_reward=0.1)
+    kept, _ = play(env, 0)
+    np.testing.assert_allclose(kept, 0.1 * rewards)
+
+
+def test_absent_robots_get_nothing() -> None:
+    env = IndicatorReward(busy(), {"R": 1.0, "P": 1.0}, references=33.0)
+    with pytest.raises(SetupError, match=r"performance of .*n_removed=1"):
+        env.reset_arrays(0, {"faults": [Fault("removed", (1,)), Fault("FM2", (0,))]})
+    env = IndicatorReward(busy(), {"R": 1.0, "P": 1.0}, references=RunningMeans())
+    env.reset_arrays(0, {"faults": [Fault("removed", (1,)), Fault("FM2", (0,))]})
+    for _ in range(20):
+        rewards = env.step_arrays(np.tile([0.5, 0, 0, 1.0], (N, 1)))[1]
+        assert rewards[1] == 0
+    assert env.condition == Condition(N, ("FM2",), n_failed=1, n_removed=1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"weights": "Q"}, "no indicator 'Q'"),
+        ({"weights": {}}, "at least one indicator"),
+        ({"weights": {"R": np.nan}}, r"weights\['R'\] = nan"),
+        ({"credit": "robot"}, "credit = 'robot'"),
+        ({"own_reward": "a"}, "own_reward = 'a'"),
+        ({"references": 0}, "P_o = 0"),
+        ({"references": -1.0}, "= -1.0: should be a number of items"),
+        ({"references": None}, "= None: should be a number of items"),
+        ({"references": {"P_o": 3}}, "key 'P_o' should be a Condition"),
+        ({"env": 3}, "should be a SwarmLogisticsEnv"),
+        ({"env": SwarmSize(busy(), [2, 6]), "weights": "S"}, "S from N = 4 to 2"),
+        ({"env": ParameterChange(busy(), "n_obstacles", 1), "weights": "A"}, "n_obstacles from 0"),
+        ({"env": ParameterChange(busy(), "restock", False), "weights": "A"}, "that is a number"),
+        (
+            {
+                "env": ParameterChange(ParameterChange(busy(), "n_items", 9), "max_speed", 1.0),
+                "weights": "A",
+            },
+            "A of changes in max_speed, n_items",
+        ),
+        (
+            {"env": ParameterChange(busy(), "max_speed", 1.0), "weights": "A", "references": {}},
+            r"performance of Condition\(n_robots=4",
+        ),
+    ],
+)
+def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(SetupError, match=message):
+        IndicatorReward(**{"env": busy(), "weights": "R", "references": 33.0, **arguments})
+
+
+def test_what_cannot_be_judged_is_refused_at_the_reset() -> None:
+    env = IndicatorReward(busy(), "FT", references=33.0)
+    with pytest.raises(SetupError, match="n_removed=2"):
+        env.reset_arrays(0, SLOW)
+    with pytest.raises(SetupError, match="4 of 4 robots faulty"):
+        env.reset_arrays(0, {"faults": [Fault("FM1", 4)]})
+    with pytest.raises(SetupError, match="4 of 4 robots faulty"):
+        env.payments_of(Condition(4, ("FM1",), n_failed=4))
+    wrong: Any
+    for wrong in ({"n_failed": 5, "modes": ("FM1",)}, {"n_removed": -1}, {"n_failed": 1}):
+        with pytest.raises(SetupError, match="should"):
+            Condition(4, **wrong)
+    bad: Any
+    for bad in ({"window": 0}, {"window": 1.5}, {"least": 0}, {"initial": np.inf}):
+        with pytest.raises(SetupError, match="should be a"):
+            RunningMeans(**bad)
+
+
+def test_a_copy_goes_on_as_the_original() -> None:
+    env = IndicatorReward(busy(), "R", references=RunningMeans())
+    play(env, 0, SLOW)
+    env.reset_arrays(1)
+    other = copy.deepcopy(env)
+    for _ in range(130):
+        for mine, theirs in zip(*(e.step_arrays(np.ones((N, 4))) for e in (env, other))):
+            np.testing.assert_array_equal(mine, theirs)
+        if not env.agents:
+            np.testing.assert_array_equal(env.reset_arrays(), other.reset_arrays())
+    assert env.measured.conditions == other.measured.conditions
