@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.study import PolicyOption, ProcessesOption, study, study_of
+from swarm_logistics_env.cli.study import (
+    PolicyOption,
+    ProcessesOption,
+    TrustCodeOption,
+    study,
+    study_of,
+)
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.comparing import Answer
@@ -37,6 +43,7 @@ def power_command(
     pilot_seeds: Annotated[int, typer.Option(min=2, help="Seeds of the pilot.")] = 5,
     policies: PolicyOption = None,
     processes: ProcessesOption = None,
+    trust_code: TrustCodeOption = False,
 ) -> None:
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
     from swarm_logistics_env.cli.tables import show
@@ -44,7 +51,7 @@ def power_command(
     from swarm_logistics_env.studies.power import demands
     from swarm_logistics_env.studies.reporting.sections import Section
 
-    findings = _pilot(asked, pilot_seeds, policies, processes)
+    findings = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
     for demand in demands(findings, effect, power):
         comparison = demand.judgement.comparison
@@ -102,7 +109,13 @@ def compare_command(
     raise typer.Exit(1 if failed else 0)
 
 
-def _pilot(asked: str, seeds: int, policies: list[str] | None, processes: int | None) -> Findings:
+def _pilot(
+    asked: str,
+    seeds: int,
+    policies: list[str] | None,
+    processes: int | None,
+    trust_code: bool,
+) -> Findings:
     import os
 
     from swarm_logistics_env.errors import StudyError
@@ -112,7 +125,7 @@ def _pilot(asked: str, seeds: int, policies: list[str] | None, processes: int | 
         if policies:
             raise StudyError("--policy is for a pilot: a study that was run has its own policies")
         return Study.stored(asked).findings()
-    pilot = study_of(asked, None, seeds, policies, looks=())
+    pilot = study_of(asked, None, seeds, policies, trust_code, looks=())
     pilot.run(processes=processes or os.cpu_count() or 1)
     return pilot.findings()
 

@@ -38,7 +38,7 @@ def scenario_of(preset: str, changes: list[str] | None) -> Scenario:
             raise ScenarioError(f"--set {change}: should be FIELD=VALUE")
         try:
             fields[name] = json.loads(value)
-        except json.JSONDecodeError:
+        except (json.JSONDecodeError, RecursionError):
             fields[name] = value
     return Scenario.preset(preset).replace(**fields)
 

@@ -24,6 +24,9 @@ SeedsOption = Annotated[
 PolicyOption = Annotated[
     list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
 ]
+TrustCodeOption = Annotated[
+    bool, typer.Option("--trust-code", help="Let a study file name policies as package.mod:Class.")
+]
 ProcessesOption = Annotated[
     int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
 ]
@@ -38,13 +41,16 @@ def group() -> None:
 
 @study.command("plan")
 def plan_command(
-    asked: StudyArgument, seeds: SeedsOption = None, policies: PolicyOption = None
+    asked: StudyArgument,
+    seeds: SeedsOption = None,
+    policies: PolicyOption = None,
+    trust_code: TrustCodeOption = False,
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
     from swarm_logistics_env.cli.tables import show
     from swarm_logistics_env.studies.pilot import expect
 
-    plan = study_of(asked, None, seeds, policies).plan()
+    plan = study_of(asked, None, seeds, policies, trust_code).plan()
     expected = expect(plan)
     show(_conditions(plan))
     typer.echo(plan)
@@ -73,13 +79,14 @@ def run_command(
         str | None,
         typer.Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N."),
     ] = None,
+    trust_code: TrustCodeOption = False,
 ) -> None:
     """Play the runs that are missing, then print and write the report."""
     from swarm_logistics_env.studies.engines import engine_named
     from swarm_logistics_env.studies.shards import Shard
 
     part = Shard.parse(shard) if shard else None
-    chosen = study_of(asked, out / part.directory if part else out, seeds, policies)
+    chosen = study_of(asked, out / part.directory if part else out, seeds, policies, trust_code)
     player = engine_named(
         engine or ("ray" if address else "local" if processes == 1 else "process"),
         processes,
@@ -154,6 +161,7 @@ def study_of(
     out: Path | None,
     seeds: int | None,
     policies: list[str] | None,
+    trust_code: bool = False,
     **fields: object,
 ) -> Study:
     """Return the study of a file or a preset with the options and fields that are given.
@@ -168,7 +176,7 @@ def study_of(
     if policies:
         fields["policies"] = tuple(policies)
     if asked.endswith(".toml") or Path(asked).is_file():
-        return Study.from_file(asked, out=out, **fields)
+        return Study.from_file(asked, out=out, trust_code=trust_code, **fields)
     return Study.preset(asked, out=out, **fields)
 
 

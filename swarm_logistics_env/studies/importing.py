@@ -77,7 +77,10 @@ def import_results(file: Path, out: Path) -> int:
         raise StudyError(f"cannot read {file}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise StudyError(f"{file} is not a CSV file in UTF-8: {error.reason}") from error
-    rows = list(_rows(file, text))
+    try:
+        rows = list(_rows(file, text))
+    except csv.Error as error:
+        raise StudyError(f"{file} is not a CSV file: {error}") from error
     if not rows:
         raise StudyError(f"{file} holds no run")
     cells = _cells(file, rows)

@@ -11,8 +11,10 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies import notes
 from swarm_logistics_env.studies.conditions import Run
 from swarm_logistics_env.studies.execution import Outcome
 
@@ -198,7 +200,7 @@ class Store:
         """Return the outcomes of those of `runs` that finished, by key."""
         wanted = {run.key for run in runs}
         found = {}
-        with self._explained():
+        with self._explained(), self._sound():
             rows = self._database.execute(
                 "SELECT run, delivered, delivery_times, ended_at, all_delivered, failed_robots,"
                 " anchoring_seconds, error, wall_seconds FROM runs"
@@ -207,19 +209,19 @@ class Store:
                 if run not in wanted:
                     continue
                 if error is not None:
-                    found[run] = Outcome(run, error=error, wall_seconds=wall)
+                    found[run] = Outcome(run, error=str(error), wall_seconds=float(wall))
                     continue
                 if times is None:
-                    found[run] = Outcome(run, untimed=count)
+                    found[run] = Outcome(run, untimed=_whole(count))
                     continue
                 found[run] = Outcome(
                     run,
-                    delivery_times=np.frombuffer(times, dtype="<f8"),
-                    ended_at=ended_at,
+                    delivery_times=_times(times, count),
+                    ended_at=float(ended_at),
                     all_delivered=bool(all_delivered),
                     failed_robots=tuple(json.loads(robots)),
-                    anchoring_seconds=anchoring,
-                    wall_seconds=wall,
+                    anchoring_seconds=float(anchoring),
+                    wall_seconds=float(wall),
                 )
         return found
 
@@ -228,13 +230,13 @@ class Store:
 
         `delivery_times` is a list [s]; the fields of a result are None where the run failed.
         """
-        with self._explained():
+        with self._explained(), self._sound():
             cursor = self._database.execute(_ROWS)
             names = [column[0] for column in cursor.description]
             for values in cursor:
                 row = dict(zip(names, values))
                 if row["delivery_times"] is not None:
-                    row["delivery_times"] = np.frombuffer(row["delivery_times"], "<f8").tolist()
+                    row["delivery_times"] = _times(row["delivery_times"], row["delivered"]).tolist()
                 yield row
 
     def note(self, name: str) -> str | None:
@@ -243,7 +245,11 @@ class Store:
             row = self._database.execute(
                 "SELECT value FROM notes WHERE name = ?", (name,)
             ).fetchone()
-            return None if row is None else str(row[0])
+        if row is None:
+            return None
+        if not notes.reads(name, row[0]):
+            raise StudyError(f"the store {self.path} is damaged: its note {name!r} does not read")
+        return str(row[0])
 
     def set_note(self, name: str, value: str) -> None:
         """Note a fact about the study."""
@@ -299,8 +305,33 @@ class Store:
             self._database.execute("COMMIT")
 
     @contextmanager
+    def _sound(self) -> Iterator[None]:
+        try:
+            yield
+        except (KeyError, OverflowError, TypeError, ValueError) as error:
+            raise StudyError(
+                f"the store {self.path} is damaged: a run in it does not read ({error!r})"
+            ) from error
+
+    @contextmanager
     def _explained(self) -> Iterator[None]:
         try:
             yield
         except sqlite3.Error as error:
             raise StudyError(f"cannot use the store {self.path}: {error}") from error
+
+
+def _whole(number: object) -> int:
+    if not isinstance(number, int) or number < 0:
+        raise ValueError(f"delivered = {number!r}")
+    return number
+
+
+def _times(blob: bytes, delivered: object) -> NDArray[np.float64]:
+    """Return the delivery times that a row holds, if they are what `add` can have written."""
+    times = np.frombuffer(blob, dtype="<f8")
+    if len(times) != _whole(delivered):
+        raise ValueError(f"{len(times)} delivery times of {delivered} items")
+    if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
+        raise ValueError("delivery times that do not rise")
+    return times

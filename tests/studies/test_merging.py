@@ -69,7 +69,12 @@ def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
         ({}, "UPDATE runs SET ended_at = 1.5", "has another result"),
         ({}, "UPDATE notes SET value = 'old' WHERE name = 'code'", "never mixes two versions"),
         ({}, "DELETE FROM notes WHERE name = 'identities'", "does not note its identities"),
-        ({}, "INSERT INTO notes VALUES ('imported', 'x.csv')", "was imported"),
+        (
+            {},
+            """INSERT INTO notes VALUES
+            ('imported', '{"file": "x.csv", "digest": "d", "paired": true}')""",
+            "was imported",
+        ),
         (
             {},
             """UPDATE notes SET value = '{"policy swarm-dt": "x"}' WHERE name = 'identities'""",

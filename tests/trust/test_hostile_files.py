@@ -1,0 +1,345 @@
+"""Files that others made: read or refused in one sentence, never run; nothing else is written."""
+
+from __future__ import annotations
+
+import json
+import random
+import sqlite3
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.export import export
+from swarm_logistics_env.studies.importing import import_results
+from swarm_logistics_env.studies.merging import merge
+from swarm_logistics_env.studies.store import FILE_NAME, Store
+
+STUDY = """\
+name = "mine"
+policies = ["swarm-dt", "random-walk"]
+seeds = 3
+looks = [3, 6]
+indicators = ["S", "FT", "R", "A"]
+scenario = { preset = "paper", n_robots = 4, n_items = 8, duration = 20.0 }
+
+[[sizes]]
+title = "Sizes"
+values = [2, 4]
+superlinear = [[2, 4]]
+
+[[faults]]
+modes = ["FM1", "FM4"]
+robots = [1, 2]
+onsets = [0.0, 5.0]
+duration = 3.0
+
+[[parameters]]
+name = "delivery_width"
+values = [2.0, 1.0]
+
+[[ablations]]
+policy = "random-walk"
+fall = 0.1
+"""
+TABLE = """\
+kind,name,value,n_robots,seed,delivered
+fault,none,0,25,0,40
+fault,removed,1,25,0,38
+fault,FM1,1,25,0,30
+size,n_robots,5,,0,9
+size,n_robots,10,,0,18
+parameter,delivery_width,2,,0,20
+parameter,delivery_width,1,,0,10
+"""
+SPICES = [
+    "1e999", "-1", "0", "nan", "inf", "99999999999999999999", "''", "[]", "{}", "true", '"', "\0",
+    "\n", ",", "=", "[[", "../../x", "1.5", "2026-01-01", "é", "\ufeff", "os:abort", "a" * 200_000,
+    "{" * 500, "[" * 5000,
+]  # fmt: skip
+examples = settings(max_examples=max(40, settings().max_examples // 3))
+
+
+def mangled(source: random.Random, content: bytes) -> bytes:
+    """Return the content with some bytes changed, cut out, doubled, or strange text put in."""
+    for _ in range(source.randint(1, 4)):
+        start = source.randint(0, len(content))
+        stop = min(len(content), start + source.choice([0, 1, 1, 2, 5, 30, 3000]))
+        middle = source.choice(
+            [
+                b"",
+                source.choice(SPICES).encode(),
+                bytes(source.randrange(256) for _ in range(stop - start)),
+                content[start:stop] * 2,
+                content[: stop - start],
+            ]
+        )
+        content = content[:start] + middle + content[stop:]
+    return content if source.random() < 0.9 else content[: source.randint(0, len(content))]
+
+
+def refused_or_done(call: Callable[[], object]) -> None:
+    try:
+        call()
+    except SwarmLogisticsError as error:
+        assert_one_sentence(str(error))
+
+
+def assert_one_sentence(said: str) -> None:
+    assert len(said) > 15
+    assert len(said.splitlines()) == 1, said
+
+
+def listing(directory: Path) -> set[str]:
+    return {path.relative_to(directory).as_posix() for path in directory.rglob("*")}
+
+
+@given(st.randoms(use_true_random=False))
+@examples
+def test_any_study_file_is_planned_or_refused(source: random.Random) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mine.toml"
+        path.write_bytes(mangled(source, STUDY.encode()))
+        refused_or_done(lambda: Study.from_file(path).plan())
+        assert listing(Path(folder)) == {"mine.toml"}
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from(
+            [
+                "name",
+                "policies",
+                "seeds",
+                "scenario",
+                "sizes",
+                "faults",
+                "parameters",
+                "ablations",
+                "indicators",
+                "looks",
+                "reference",
+                "sead",
+            ]
+        ),
+        st.recursive(
+            st.sampled_from(["", "S", "FM1", "swarm-dt", "delivery_width", "preset", "x:y"])
+            | st.integers(-3, 30)
+            | st.floats()
+            | st.booleans(),
+            lambda inner: (
+                st.lists(inner, max_size=3)
+                | st.dictionaries(
+                    st.sampled_from(["values", "modes", "robots", "name", "policy", "title", "q"]),
+                    inner,
+                    max_size=3,
+                )
+            ),
+            max_leaves=6,
+        ),
+        max_size=4,
+    )
+)
+@examples
+def test_any_fields_of_a_study_are_planned_or_refused(fields: dict[str, Any]) -> None:
+    refused_or_done(lambda: Study(**fields).plan())
+
+
+CANARY = "import pathlib\npathlib.Path('it-was-run').touch()\nclass Bird:\n    pass\n"
+
+
+@pytest.mark.parametrize(
+    "field", ["policies = ['canary:Bird']", "[[ablations]]\npolicy='canary:B'"]
+)
+def test_a_study_file_runs_no_code_unless_it_is_allowed_to(
+    field: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    Path("canary.py").write_text(CANARY)
+    Path("mine.toml").write_text(f"seeds = 1\n{field}\n")
+    for arguments in (
+        ["plan", "mine.toml"],
+        ["run", "mine.toml", "--out", "out"],
+        ["power", "mine.toml"],
+    ):
+        assert app.run(["study", *arguments]) == 2
+        said = capsys.readouterr().err
+        assert "canary:B" in said
+        assert "--trust-code" in said
+        assert len(said.splitlines()) == 1
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["canary.py", "mine.toml"]
+    assert app.run(["study", "plan", "mine.toml", "--trust-code"]) == 2  # a Bird is no policy
+    assert Path("it-was-run").exists()
+    sys.modules.pop("canary")
+
+
+def test_a_policy_on_the_command_line_needs_no_leave(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text(
+        "seeds = 1\nscenario = {duration = 0.5}\n[[sizes]]\nvalues=[2,3]\n"
+    )
+    policy = "swarm_logistics_env.policies:SwarmDT"
+    assert app.run(["study", "plan", "mine.toml", "--policy", policy]) == 0
+    assert policy in capsys.readouterr().out
+
+
+@given(st.randoms(use_true_random=False))
+@examples
+def test_any_table_is_imported_or_refused(source: random.Random) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path, out = Path(folder) / "mine.csv", Path(folder) / "out"
+        path.write_bytes(mangled(source, TABLE.encode()))
+        refused_or_done(lambda: import_results(path, out))
+        assert listing(Path(folder)) <= {"mine.csv", "out", f"out/{FILE_NAME}"}
+        if out.exists():
+            refused_or_done(lambda: Study.stored(out).findings())
+
+
+class Whole(NamedTuple):
+    """A small store as it lies on disk, as something that is short to print."""
+
+    path: Path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    out = tmp_path_factory.mktemp("whole")
+    study = Study(
+        out=out,
+        seeds=2,
+        scenario={"n_robots": 3, "n_items": 5, "warehouse_width": 3.0, "warehouse_height": 3.0,
+                  "delivery_width": 1.0, "duration": 10.0},
+        sizes=[{"values": [2, 3]}],
+        faults=[{"modes": ["FM1"], "robots": [1]}],
+    )  # fmt: skip
+    study.run()
+    return Whole(out / FILE_NAME)
+
+
+def read_all(out: Path) -> None:
+    """Use a store in every way that reads it."""
+    refused_or_done(lambda: Study.stored(out).findings())
+    refused_or_done(lambda: exported(out))
+    refused_or_done(lambda: merge([out], out / "merged"))
+
+
+def exported(out: Path) -> None:
+    with Store.existing(out) as store:
+        export(store, out / "rows.csv")
+
+
+ALLOWED = {"rows.csv", "merged", *(f"{FILE_NAME}{end}" for end in ("", "-wal", "-shm", "-journal"))}
+
+
+@given(source=st.randoms(use_true_random=False))
+@examples
+def test_any_store_is_read_or_refused(whole: Whole, source: random.Random) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        out.mkdir()
+        (out / FILE_NAME).write_bytes(mangled(source, whole.path.read_bytes()))
+        read_all(out)
+        assert {path.name for path in out.iterdir()} <= ALLOWED
+        assert [path.name for path in Path(folder).iterdir()] == ["out"]
+
+
+COLUMNS = ["delivered", "delivery_times", "ended_at", "all_delivered", "failed_robots",
+           "anchoring_seconds", "error", "seed", "code", "condition", "run"]  # fmt: skip
+VALUES = [None, "x", "{", "[1, 2", -1, 1e300, b"\x01", b"\xff" * 16, "[]", "null", 2**62, "'"]
+
+
+@given(
+    changes=st.lists(
+        st.tuples(st.sampled_from(COLUMNS), st.sampled_from(VALUES), st.integers(0, 7)),
+        min_size=1,
+        max_size=2,
+    )
+)
+@examples
+def test_a_store_of_wrong_contents_is_read_or_refused(
+    whole: Whole, changes: list[tuple[str, Any, int]]
+) -> None:
+    def spoil(database: sqlite3.Connection) -> None:
+        keys = [key for (key,) in database.execute("SELECT run FROM runs ORDER BY run")]
+        for column, value, place in changes:
+            database.execute(
+                f"UPDATE OR IGNORE runs SET {column} = ? WHERE run = ?",
+                (value, keys[place % len(keys)]),
+            )
+
+    spoiled(whole, spoil)
+
+
+@given(
+    name=st.sampled_from(
+        ["specification", "code", "identities", "declared_seeds", "declared_looks", "imported"]
+    ),
+    value=st.sampled_from(["", "x", "null", "{}", "[]", "-1", '{"a": 1}', "[[1]]", "1e9", b"\xff"])
+    | st.none(),
+)
+@examples
+def test_a_store_of_wrong_notes_is_read_or_refused(
+    whole: Whole, name: str, value: str | bytes | None
+) -> None:
+    def spoil(database: sqlite3.Connection) -> None:
+        if value is None:
+            database.execute("DELETE FROM notes WHERE name = ?", (name,))
+        else:
+            database.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
+
+    spoiled(whole, spoil)
+
+
+def spoiled(whole: Whole, spoil: Callable[[sqlite3.Connection], None]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        (out / FILE_NAME).write_bytes(whole.path.read_bytes())
+        database = sqlite3.connect(out / FILE_NAME)
+        with database:
+            spoil(database)
+        database.close()
+        read_all(out)
+        assert {path.name for path in out.iterdir()} <= ALLOWED
+
+
+def test_names_in_a_study_neither_leave_its_folder_nor_become_markup(tmp_path: Path) -> None:
+    evil = "../../<script>alert(1)</script>"
+    out = tmp_path / "a" / "b" / "out"
+    fields = json.loads(json.dumps({"title": evil, "values": [2, 3]}))
+    study = Study(
+        out=out,
+        name=evil,
+        seeds=2,
+        scenario={"n_robots": 3, "n_items": 5, "warehouse_width": 3.0, "warehouse_height": 3.0,
+                  "delivery_width": 1.0, "duration": 10.0},
+        sizes=[fields],
+    )  # fmt: skip
+    study.run()
+    study.report()
+    assert {path.name for path in tmp_path.iterdir()} == {"a"}
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {"b"}
+    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == {"out"}
+    page = out / "report.html"
+    if page.exists():  # it needs the extra `study`
+        assert "<script>alert" not in page.read_text(encoding="utf-8")
+
+
+def test_what_is_refused_says_where(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text(TABLE.replace("30", "x" * 200_000))
+    with pytest.raises(StudyError, match=r"mine\.csv"):
+        import_results(path, tmp_path / "out")

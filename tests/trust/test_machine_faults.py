@@ -1,0 +1,223 @@
+"""What machines do to a study: finished runs stay, it goes on, the report says what is missing."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.export import export
+from swarm_logistics_env.studies.store import FILE_NAME, Store
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+
+SCENARIO = {"n_robots": 4, "n_items": 8, "warehouse_width": 3.0, "warehouse_height": 3.0,
+            "delivery_width": 1.0, "duration": 20.0}  # fmt: skip
+STUDY: dict[str, Any] = {
+    "seeds": 6,
+    "scenario": SCENARIO,
+    "sizes": [{"values": [2, 4]}],
+    "faults": [{"modes": ["FM1", "FM4"], "robots": [1]}],
+}
+FILE = """\
+seeds = 6
+scenario = { n_robots = 4, n_items = 8, warehouse_width = 3.0, warehouse_height = 3.0, \
+delivery_width = 1.0, duration = 20.0 }
+[[sizes]]
+values = [2, 4]
+[[faults]]
+modes = ["FM1", "FM4"]
+robots = [1]
+"""
+N_RUNS = 30
+
+
+def digest(directory: Path) -> str:
+    with Store.existing(directory) as store:
+        return export(store, directory.with_suffix(".csv"))[1]
+
+
+def finished(directory: Path) -> int:
+    with Store.existing(directory) as store:
+        return len(store.succeeded())
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Digest of the study that nothing befell."""
+    out = tmp_path_factory.mktemp("undisturbed") / "out"
+    assert Study(out=out, **STUDY).run().played == N_RUNS
+    return digest(out)
+
+
+CAP_DAC_OVERRIDE, PR_CAPBSET_DROP = 1, 24
+
+
+def command(*arguments: str, limit: int | None = None) -> Any:
+    """Run the command line in another process, which may write files of `limit` bytes at most.
+
+    Folders that are read-only are so for root as well.
+    """
+
+    def limited() -> None:
+        import ctypes
+        import resource
+
+        if limit is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        if os.geteuid() == 0:
+            ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
+
+    return subprocess.run(
+        [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()", *arguments],
+        preexec_fn=limited,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def complaint(done: Any) -> str:
+    """What a command that failed said last; it may have told its progress before."""
+    assert done.returncode == 2, done
+    assert "Traceback" not in done.stderr
+    last: str = done.stderr.splitlines()[-1]
+    assert last.startswith("swarm-logistics: ")
+    return last
+
+
+def test_a_disk_that_is_full_keeps_what_is_finished_and_the_study_goes_on(
+    undisturbed: str, tmp_path: Path
+) -> None:
+    file, out = tmp_path / "mine.toml", tmp_path / "out"
+    file.write_text(FILE)
+    run = ("study", "run", str(file), "--out", str(out), "--processes", "1")
+    said = complaint(command(*run, limit=150_000))
+    assert str(out / FILE_NAME) in said
+    kept = finished(out)
+    assert 0 < kept < N_RUNS
+    told = command("study", "report", str(out))
+    assert told.returncode == 0
+    assert "missing" in told.stdout
+    # Nor is there room for a report.
+    assert str(out) in complaint(command("study", "report", str(out), limit=100))
+    assert finished(out) == kept
+    done = command(*run)
+    assert done.returncode == 0, done.stderr
+    assert f"{N_RUNS - kept} runs played" in done.stdout
+    assert digest(out) == undisturbed
+
+
+@contextmanager
+def read_only(folder: Path) -> Iterator[None]:
+    folder.chmod(0o555)
+    try:
+        yield
+    finally:
+        folder.chmod(0o755)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="root writes everywhere")
+def test_a_folder_that_is_read_only_is_named(tmp_path: Path) -> None:
+    with read_only(tmp_path):
+        for out in (tmp_path, tmp_path / "new"):
+            arguments = ("study", "run", "quick", "--out", str(out), "--processes", "1")
+            assert str(tmp_path) in complaint(command(*arguments))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="root writes everywhere")
+def test_a_study_in_a_folder_that_became_read_only_stays_as_it_is(tmp_path: Path) -> None:
+    Study(out=tmp_path, seeds=1, scenario=SCENARIO, sizes=[{"values": [2, 3]}]).run()
+    before = (tmp_path / FILE_NAME).read_bytes()
+    with read_only(tmp_path):
+        assert str(tmp_path) in complaint(command("study", "report", str(tmp_path)))
+    assert (tmp_path / FILE_NAME).read_bytes() == before
+    assert command("study", "report", str(tmp_path)).returncode == 0
+
+
+def test_a_clock_that_is_set_back_changes_nothing(
+    undisturbed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [1e9]
+
+    def back() -> float:
+        now[0] -= 3600.0
+        return now[0]
+
+    monkeypatch.setattr(time, "time", back)
+    monkeypatch.setattr(time, "perf_counter", back)
+    Study(out=tmp_path / "out", **STUDY).run()
+    monkeypatch.undo()
+    assert digest(tmp_path / "out") == undisturbed
+
+
+HUNGRY = """
+import resource
+from swarm_logistics_env.policies import SwarmDT
+
+class Hungry(SwarmDT):
+    identity = "hungry"
+    def act(self, observations):
+        if len(observations) == 4:
+            resource.setrlimit(resource.RLIMIT_AS, (1 << 30, resource.RLIM_INFINITY))
+            self.eaten = bytearray(1 << 40)
+        return super().act(observations)
+"""
+
+
+def test_a_worker_out_of_memory_is_a_failed_run_and_nothing_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "hungry_policy.py").write_text(HUNGRY)
+    monkeypatch.syspath_prepend(tmp_path)
+    study = Study(
+        out=tmp_path / "out",
+        policies=["hungry_policy:Hungry"],
+        seeds=2,
+        scenario=SCENARIO,
+        sizes=[{"values": [2, 4, 5]}],
+    )
+    tally = study.run(processes=2)
+    assert (tally.played, tally.failed) == (6, 2)
+    errors = study.results()["error"].dropna()
+    assert len(errors) == 2
+    assert errors.str.contains("MemoryError").all()
+    problems = [judgement.problem for judgement in study.findings().judgements]
+    assert problems == ["N = 4: 2 of 2 runs failed"] * 2
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="ray is not installed")
+@pytest.mark.filterwarnings("ignore")  # of ray's own
+def test_a_node_that_is_lost_costs_no_run(undisturbed: str, tmp_path: Path) -> None:
+    from ray.cluster_utils import Cluster
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    added = [cluster.add_node(num_cpus=1)]
+    add = Store.add
+
+    def add_and_lose(store: Store, run: Any, outcome: Any) -> None:
+        add(store, run, outcome)
+        if added and len(store) == 3:
+            cluster.remove_node(added.pop(), allow_graceful=False)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Store, "add", add_and_lose)
+        try:
+            study = Study(out=tmp_path / "out", **STUDY)
+            first = study.run("ray", address=cluster.address)
+        finally:
+            cluster.shutdown()
+    assert first.played == N_RUNS
+    if first.failed:  # what was lost twice is played by the next call
+        assert Study(out=tmp_path / "out", **STUDY).run().played == first.failed
+    assert digest(tmp_path / "out") == undisturbed
