@@ -6,12 +6,13 @@ OUT    ?= results/paper
 
 DEV   := .venvs/dev
 STUDY := .venvs/study
+DOCS  := .venvs/docs
 
 TORCHRL   := .venvs/torchrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
 
-.PHONY: help paper test check benchmark interop format clean
+.PHONY: help paper test check benchmark interop docs format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -19,6 +20,7 @@ help:
 	@echo "make check           lint and types only"
 	@echo "make benchmark       cost of a control step beside the bare physics"
 	@echo "make interop         TorchRL, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
+	@echo "make docs            the documentation site, site/index.html"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -42,16 +44,23 @@ interop: $(TORCHRL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
 	$(RLLIB)/bin/python -m interop.rllib_ppo
 
+# study: autodoc reads the package. -W: a warning is an error.
+docs: $(DOCS)/installed
+	$(DOCS)/bin/python docs/generate.py
+	$(DOCS)/bin/python docs/generate_study_files.py
+	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
+
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .
 	$(DEV)/bin/ruff format .
 
 clean:
-	rm -rf .venvs build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
+	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,study,render
+$(DEV)/installed: EXTRAS := dev,docs,study,render
 $(STUDY)/installed: EXTRAS := study
+$(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
 $(SUPERSUIT)/installed: OTHERS := supersuit

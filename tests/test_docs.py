@@ -1,25 +1,104 @@
-"""The committed page of the environment is what the code says."""
+"""The pages: what is generated is current, code runs, outputs are those that came, links exist."""
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import runpy
 from pathlib import Path
+from typing import Any
 
-DOCS = Path(__file__).parents[1] / "docs"
+import pytest
+import typer.main
+
+from swarm_logistics_env.cli import app
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+BLOCKS = runpy.run_path(str(DOCS / "blocks.py"))
+PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md"))}
 
 
-def test_the_page_is_the_generated_one() -> None:
-    page = runpy.run_path(str(DOCS / "generate.py"))["page"]()
-    committed = (DOCS / "environment.md").read_text(encoding="utf-8")
-    assert committed == page, "stale: run `python docs/generate.py`"
+@pytest.mark.parametrize("script", sorted(path.name for path in DOCS.glob("generate*.py")))
+def test_generated_page_is_current(script: str) -> None:
+    generator = runpy.run_path(str(DOCS / script))
+    assert PAGES[generator["PAGE"].name] == generator["page"](), (
+        f"stale: run `python docs/{script}`"
+    )
 
 
-def test_the_example_on_the_page_runs() -> None:
-    text = (DOCS / "environment.md").read_text(encoding="utf-8")
-    found = re.search(r"```python\n(.*?)```", text, re.DOTALL)
-    assert found
-    example = found[1].replace("n_robots=5", "n_robots=5, duration=2.0")
-    namespace: dict[str, object] = {}
-    exec(example, namespace)
-    assert set(namespace["terminations"]) | set(namespace["truncations"])  # type: ignore[call-overload]
+@pytest.mark.parametrize("page", BLOCKS["pages"](), ids=lambda page: page.name)
+def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
+    text = PAGES[page.name]
+    for module in re.findall(r"<!-- needs: (\w+) -->", text):
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f"{module} is not installed")
+    said = BLOCKS["recorded"](text)
+    comparable = BLOCKS["comparable"]
+    assert comparable(said) == comparable(text), f"stale: run `python docs/blocks.py {page}`"
+
+
+def test_every_block_has_a_language_that_is_checked() -> None:
+    for name, text in PAGES.items():
+        for block in BLOCKS["blocks"](text):
+            assert block.language in BLOCKS["LANGUAGES"], f"{name}: ```{block.language}"
+
+
+def test_changed_output_is_noticed() -> None:
+    page = "```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n"
+    assert BLOCKS["recorded"](page) == page.replace("3", "2")
+
+
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_commands_that_are_not_run_are_commands(name: str) -> None:
+    for arguments in BLOCKS["commands"](PAGES[name]):
+        parse(arguments)
+
+
+def parse(arguments: list[str]) -> None:
+    """Parse a command line down to its last command, without running it."""
+    command: Any = typer.main.get_command(app)
+    context = None
+    while True:
+        context = command.make_context(command.name, list(arguments), parent=context)
+        if not hasattr(command, "resolve_command"):
+            return
+        rest = [*context._protected_args, *context.args]
+        _, command, arguments = command.resolve_command(context, rest)
+
+
+def test_targets_of_make_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for text in PAGES.values():
+        for target in re.findall(r"(?:^|`)make ([\w-]+)", text, flags=re.MULTILINE):
+            assert f"\n{target}:" in makefile, target
+
+
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_links_and_pictures_exist(name: str) -> None:
+    text = re.sub(r"^```\w.*?^```$", "", PAGES[name], flags=re.DOTALL | re.MULTILINE)
+    targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)|^```{figure} (\S+)", text, flags=re.MULTILINE)
+    for link, picture in targets:
+        if "://" not in link:
+            assert (DOCS / (link or picture)).exists(), f"{name}: {link or picture}"
+
+
+def test_site_builds_without_warnings(tmp_path: Path) -> None:
+    sphinx = pytest.importorskip("sphinx.application", reason="needs the extra docs")
+    pytest.importorskip("furo", reason="needs the extra docs")
+    warnings: list[str] = []
+
+    class Log:
+        def write(self, text: str) -> None:
+            warnings.append(text)
+
+        def flush(self) -> None: ...
+
+    site = sphinx.Sphinx(DOCS, DOCS, tmp_path / "site", tmp_path / "trees", "html", None, Log())
+    site.build()
+    assert "".join(warnings) == ""
+    html = (tmp_path / "site" / "indicators.html").read_text(encoding="utf-8")
+    assert "<math" in html
+    for page in (tmp_path / "site").glob("*.html"):
+        loads = re.findall(r'(?:src|<link[^>]* href)="(https?:[^"]+)"', page.read_text("utf-8"))
+        assert not loads, f"{page.name} loads {loads[0]}"

@@ -1,0 +1,169 @@
+"""Runs the code of the pages and records what it prints: `python docs/blocks.py [PAGE ...]`.
+
+The blocks of a page are run in their order, in one folder and one Python namespace:
+
+    python    is executed; one whose first line is `# name.py` becomes that file as well
+    toml      becomes the file that its first line names, `# name.toml`
+    console   each `$ swarm-logistics ...`, `| head -N`, `| tail -N` and `|| echo WORDS` included
+    text      directly below one of them: what it prints; recorded, and held by the tests
+    sh        is not run; its commands have to exist
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shlex
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from swarm_logistics_env.cli import app
+
+DOCS = Path(__file__).parent
+LANGUAGES = {"python", "toml", "console", "text", "sh"}
+
+_BLOCK = re.compile(r"^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE)
+_FILE = re.compile(r"# (\w+\.(?:py|toml))\n")
+# Lines about the machine rather than the result.
+_WALL_TIME = re.compile(r"times real time|runs played|On one process|Wrote .* in ")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page: `text[start:end]` is its code."""
+
+    language: str
+    code: str
+    start: int
+    end: int
+    after: int  # where the block ends, fence included
+
+
+def pages() -> list[Path]:
+    """Return the pages that have code."""
+    return [page for page in sorted(DOCS.glob("*.md")) if blocks(page.read_text("utf-8"))]
+
+
+def blocks(text: str) -> list[Block]:
+    """Return the blocks of a page, in order."""
+    return [
+        Block(m["language"], m["code"], m.start("code"), m.end("code"), m.end())
+        for m in _BLOCK.finditer(text)
+        if not m["language"].startswith("{")
+    ]
+
+
+def recorded(text: str) -> str:
+    """Run a page's blocks in an empty folder; return it with the outputs that came."""
+    pieces: list[str] = []
+    done = 0
+    printed: str | None = None
+    before = 0
+    names: dict[str, Any] = {"__name__": "page"}
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
+        for block in blocks(text):
+            if block.language == "text":
+                if (
+                    printed is not None
+                    and not text[before : block.start - len("```text\n")].strip()
+                ):
+                    pieces += [text[done : block.start], printed]
+                    done = block.end
+                printed = None
+                continue
+            file = _FILE.match(block.code)
+            if file:
+                Path(file[1]).write_text(block.code, encoding="utf-8")
+            printed = None
+            if block.language == "python":
+                printed = _printed_by_python(block.code, names)
+            elif block.language == "console":
+                printed = "".join(
+                    _printed_by_command(line[2:])
+                    for line in block.code.splitlines()
+                    if line.startswith("$ ")
+                )
+            before = block.after
+    return "".join(pieces) + text[done:]
+
+
+def comparable(text: str) -> str:
+    """Return a page without what tells of the machine or of the version of the code.
+
+    Digests are numbered as they appear, so that equal ones stay equal.
+    """
+    digests: dict[str, str] = {}
+    text = re.sub(
+        r"\b[0-9a-f]{64}\b", lambda m: digests.setdefault(m[0], f"digest {len(digests)}"), text
+    )
+    return "\n".join(
+        re.sub(r"[\d.,]+", "#", line) if _WALL_TIME.search(line) else line
+        for line in text.splitlines()
+    )
+
+
+def commands(text: str) -> list[list[str]]:
+    """Return the arguments of every `swarm-logistics` command, run or not."""
+    code = "\n".join(b.code for b in blocks(text) if b.language in ("console", "sh"))
+    calls = re.findall(r"^(?:\$ )?swarm-logistics (.*)$", code.replace("\\\n", " "), re.MULTILINE)
+    return [shlex.split(call.split(" |")[0], comments=True) for call in calls]
+
+
+@contextlib.contextmanager
+def _importable() -> Iterator[None]:
+    """Find modules in the present folder, and forget those that came from it."""
+    known = set(sys.modules)
+    path = list(sys.path)
+    here = Path.cwd()
+    sys.path.insert(0, str(here))
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        for name in set(sys.modules) - known:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file is not None and Path(file).is_relative_to(here):
+                del sys.modules[name]
+
+
+def _printed_by_python(code: str, names: dict[str, Any]) -> str:
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        exec(compile(code, "page", "exec"), names)
+    return out.getvalue()
+
+
+def _printed_by_command(line: str) -> str:
+    call, _, otherwise = line.partition(" || echo ")
+    call, _, pipe = call.partition(" | ")
+    program, *arguments = shlex.split(call)
+    assert program == "swarm-logistics", line
+    if arguments[:2] == ["study", "run"] and "--engine" not in arguments:
+        arguments += ["--engine", "local"]  # the same bits, without the start of processes
+    with (
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        contextlib.redirect_stderr(io.StringIO()) as complaints,
+    ):
+        code = app.run(arguments)
+    printed = out.getvalue() + (complaints.getvalue() if code else "")
+    if code and not otherwise:
+        raise AssertionError(f"{line}: ended with {code}: {printed}")
+    if pipe:
+        program, number = pipe.split()
+        lines = printed.splitlines(keepends=True)
+        shown = int(number[1:])
+        printed = "".join({"head": lines[:shown], "tail": lines[-shown:]}[program])
+    return printed + (" ".join(shlex.split(otherwise)) + "\n" if code else "")
+
+
+if __name__ == "__main__":
+    for page in [Path(name) for name in sys.argv[1:]] or pages():
+        text = page.read_text(encoding="utf-8")
+        said = recorded(text)
+        if comparable(said) != comparable(text):
+            page.write_text(said, encoding="utf-8")
+            sys.stdout.write(f"{page}: recorded anew\n")

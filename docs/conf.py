@@ -1,0 +1,66 @@
+"""Settings of the documentation site: `make docs`. Nothing is fetched when a page is viewed."""
+
+from __future__ import annotations
+
+from importlib.metadata import version as installed_version
+from typing import TYPE_CHECKING, Any
+
+from latex2mathml.converter import convert
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+project = "swarm-logistics-env"
+author = "swarm-logistics-env contributors"
+project_copyright = author
+version = release = installed_version("swarm-logistics-env")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+exclude_patterns = ["media"]
+html_theme = "furo"
+html_title = "swarm-logistics-env"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_theme_options = {"navigation_with_keys": True}
+html_copy_source = False
+html_show_sphinx = False
+pygments_style = "default"
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the signatures hold them
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = False
+napoleon_use_rtype = False
+
+
+def setup(app: Sphinx) -> None:
+    """Render formulas as MathML, which browsers draw themselves."""
+    app.add_html_math_renderer("mathml", (inline, None), (block, None))
+    app.connect("autodoc-process-docstring", escape_bars)
+
+
+html_math_renderer = "mathml"
+
+
+def escape_bars(app: Any, what: Any, name: Any, obj: Any, options: Any, lines: list[str]) -> None:
+    """Keep |x|, which docstrings mean as absolute value, from being read as a substitution."""
+    lines[:] = [line.replace("|", r"\|") for line in lines]
+
+
+def inline(translator: Any, node: Any) -> None:
+    """Write a formula within a line."""
+    from docutils.nodes import SkipNode
+
+    translator.body.append(convert(node.astext()))
+    raise SkipNode
+
+
+def block(translator: Any, node: Any) -> None:
+    """Write a formula on a line of its own."""
+    from docutils.nodes import SkipNode
+
+    formula = convert(node.astext(), display="block")
+    translator.body.append(f'<div class="math">{formula}</div>\n')
+    raise SkipNode

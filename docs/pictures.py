@@ -1,0 +1,66 @@
+"""Draws the pictures of the pages into docs/media: `python docs/pictures.py`."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env.policies.policy import decide, start
+from swarm_logistics_env.rendering import Renderer
+from swarm_logistics_env.studies import Study
+
+MEDIA = Path(__file__).parent / "media"
+SIZE = 560  # px
+
+
+def scene(seconds: float, faults: tuple[Fault, ...] = ()) -> NDArray[np.uint8]:
+    """Return a picture of Swarm D-T after some time."""
+    scenario = Scenario(n_robots=16, warehouse_width=8.0, warehouse_height=6.0, n_items=30)
+    world = Warehouse(scenario)
+    observations = world.reset(seed=4, faults=faults)
+    policy = policies.load("swarm-dt")
+    start(policy, scenario, 4)
+    renderer = Renderer(scenario, "rgb_array", SIZE, trails=True, show_beams_of=3)
+    while world.state.time < seconds:
+        observations = world.step(decide(policy, observations, world.state))
+        picture = renderer.frame(world.state, scenario)
+    return picture
+
+
+def save(picture: NDArray[np.uint8], name: str) -> None:
+    """Write a picture with a palette: a quarter of the size, and the colours are few."""
+    Image.fromarray(picture).quantize(128).save(MEDIA / name, optimize=True)
+
+
+def figures() -> None:
+    """Keep two figures of a study's report."""
+    study = Study(
+        seeds=10,
+        scenario={"duration": 300.0},
+        sizes=[{"values": [5, 10, 20, 40]}],
+        faults=[{"modes": ["FM1", "FM2", "FM4"], "robots": [1, 2, 3]}],
+    )
+    study.run(processes=2)
+    with tempfile.TemporaryDirectory() as folder:
+        written = {path.name: path for path in _files(study, Path(folder))}
+        for name, start_of_name in (("scalability", "P-N"), ("faults", "FT-R")):
+            (path,) = (written[file] for file in written if file.startswith(start_of_name))
+            shutil.copy(path, MEDIA / f"{name}.svg")
+
+
+def _files(study: Study, folder: Path) -> list[Path]:
+    study.report(folder)
+    return sorted(folder.rglob("*.svg"))
+
+
+if __name__ == "__main__":
+    MEDIA.mkdir(exist_ok=True)
+    save(scene(30.0), "warehouse.png")
+    save(scene(60.0, (Fault("FM1", 2), Fault("FM4", [0, 5]))), "faults.png")
+    figures()
