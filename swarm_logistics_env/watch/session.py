@@ -170,6 +170,7 @@ class Session:
         now = round(self.run.world.state.time, 9)
         fault = Fault(self.mode, [robot], onset=now)
         self.run.world.set_faults([*self.run.world.faults, fault])
+        self._look_after_selection()
         self._log(robot, self.mode)
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
 
@@ -245,13 +246,18 @@ class Session:
             if isinstance(fault.robots, tuple)
             for robot in fault.robots
         ]
-        if self.selected is not None and self.selected >= scenario.n_robots:
-            self.selected = None
+        self._look_after_selection()
 
     def _advance(self) -> None:
         self.run.step()
         self.twin.step()
-        if self.selected is not None and not self.run.world.state.robot_present[self.selected]:
+        self._look_after_selection()
+
+    def _look_after_selection(self) -> None:
+        present = self.run.world.state.robot_present
+        if self.selected is not None and not (
+            self.selected < len(present) and present[self.selected]
+        ):
             self.selected = None
 
     def _log(self, robot: int, mode: str | None) -> None:

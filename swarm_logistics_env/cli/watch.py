@@ -1,0 +1,56 @@
+"""`swarm-logistics watch`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swarm_logistics_env.cli.app import app
+from swarm_logistics_env.cli.options import PresetOption, SetOption, fault_of, scenario_of
+
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
+]
+
+
+@app.command("watch")
+def watch_command(
+    policy: Annotated[
+        str, typer.Option(help="Name, path of a policy file, or package.module:Class.")
+    ] = "swarm-dt",
+    seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
+    preset: PresetOption = "paper",
+    changes: SetOption = None,
+    faults: FaultOption = None,
+    speed: Annotated[float, typer.Option(help="Times real time.")] = 1.0,
+    web: Annotated[
+        bool, typer.Option("--web", help="In the browser, for machines without a display.")
+    ] = False,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Of --web, on this machine only; 0: any free.")
+    ] = 8765,
+) -> None:
+    """Watch a run beside its fault-free twin; click robots to inspect, break and repair them."""
+    from swarm_logistics_env import policies
+    from swarm_logistics_env.watch import Session
+
+    session = Session(
+        scenario_of(preset, changes),
+        lambda: policies.load(policy),
+        seed,
+        [fault_of(text) for text in faults or []],
+        speed,
+    )
+    if web:
+        from swarm_logistics_env.watch.web import serve
+
+        serve(session, policy, port, announce=typer.echo)
+        return
+    from swarm_logistics_env.rendering.renderer import load_pygame
+
+    load_pygame()
+    from swarm_logistics_env.watch.window import WatchWindow
+
+    WatchWindow(session, policy).run()

@@ -1,0 +1,136 @@
+"""A session as JSON: what the page draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from swarm_logistics_env.rendering import palette
+from swarm_logistics_env.rendering.beams import ranges
+from swarm_logistics_env.rendering.links import followed
+from swarm_logistics_env.rendering.trails import TRAIL_SECONDS
+from swarm_logistics_env.warehouse import FAILURE_MODES
+from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
+from swarm_logistics_env.watch.inspection import activity, observation_words
+from swarm_logistics_env.watch.keys import HELP, KEYS, LINKS, MOUSE, QUIT, TRAILS
+from swarm_logistics_env.watch.session import WIDTH_STEP, Session
+
+_COLOURS = (
+    "INK", "SURROUNDINGS", "FLOOR", "FLOOR_LINE", "DELIVERY_AREA", "DELIVERY_HATCH",
+    "DELIVERY_WORD", "OBSTACLE", "SEARCHING", "SHUFFLING", "DELIVERING", "TIMER", "REQUESTED",
+    "LINK", "BEAM", "ITEM", "ITEM_EDGE", "TRAIL",
+)  # fmt: skip
+_SHAPE = (
+    "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
+    "restock", "robot_radius", "item_radius", "obstacle_radius", "control_period",
+)  # fmt: skip
+
+
+def fixed_view(title: str) -> dict[str, Any]:
+    """Return what does not change: colours, failure modes, keys."""
+    return {
+        "title": title,
+        "colours": {name: _css(getattr(palette, name)) for name in _COLOURS},
+        "curves": [[_css(colour), thickness] for colour, thickness in palette.RUNS],
+        "modes": [
+            {"name": name, "mark": palette.MARKS.get(name, ""), "meaning": mode.description}
+            for name, mode in FAILURE_MODES.items()
+        ],
+        "keys": [
+            {"name": key.name, "label": key.label, "meaning": key.meaning}
+            for key in KEYS
+            if key.name != QUIT
+        ],
+        "mouse": MOUSE,
+        "view_keys": {"trails": TRAILS, "links": LINKS, "help": HELP},
+        "trail_seconds": TRAIL_SECONDS,
+        "width_step": WIDTH_STEP,
+    }
+
+
+def moving_view(session: Session) -> dict[str, Any]:
+    """Return what is true now. Lengths in m, times in s, angles in rad; x right, y up.
+
+    A robot is [x, y, heading, activity, age of its timer in timer limits or None, mark,
+    robot it follows], or None where it is absent; an item [x, y, status].
+    """
+    world = session.run.world
+    state, scenario = world.state, world.scenario
+    return {
+        "seed": session.seed,
+        "speed": session.speed,
+        "paused": session.paused,
+        "over": session.is_over,
+        "mode": session.mode,
+        "note": session.note,
+        "time": _short(state.time),
+        "scenario": {name: getattr(scenario, name) for name in _SHAPE},
+        "robots": [_robot(session, robot) for robot in range(state.n_robots)],
+        "items": [
+            [_short(x), _short(y), status]
+            for (x, y), status in zip(state.item_position.tolist(), state.item_status.tolist())
+        ],
+        "obstacles": [[_short(x), _short(y)] for x, y in state.obstacle_position.tolist()],
+        "requested": state.requested,
+        "carrier": NOBODY
+        if state.requested == NOBODY
+        else int(state.item_carrier[state.requested]),
+        "curves": [
+            {
+                "name": curve.name,
+                "times": [_short(time) for time in curve.times],
+                "until": _short(curve.until),
+                "style": curve.style,
+            }
+            for curve in session.curves
+        ],
+        "events": [[_short(event.time), event.robot, event.label] for event in session.events],
+        "selected": _selected(session),
+    }
+
+
+def _robot(session: Session, robot: int) -> list[Any] | None:
+    state, scenario = session.run.world.state, session.scenario
+    if not state.robot_present[robot]:
+        return None
+    x, y = state.robot_position[robot].tolist()
+    age = float(state.robot_timer[robot]) / scenario.timer_limit
+    return [
+        _short(x),
+        _short(y),
+        _short(float(state.robot_heading[robot])),
+        activity(state, robot),
+        _short(age) if age < 1.0 else None,
+        palette.mark(state.failure_modes[robot]),
+        followed(state, scenario, robot),
+    ]
+
+
+def _selected(session: Session) -> dict[str, Any] | None:
+    robot = session.selected
+    if robot is None:
+        return None
+    state, scenario = session.run.world.state, session.scenario
+    return {
+        "robot": robot,
+        "activity": activity(state, robot),
+        "modes": list(state.failure_modes[robot]),
+        "beams": [_short(reach) for reach in _beams(state, session, robot)],
+        "reach": _short(float(state.ranger_range[robot])),
+        "view": _short(float(state.view_range[robot])),
+        "row": observation_words(session.run.sensed(robot), scenario),
+    }
+
+
+def _beams(state: WarehouseState, session: Session, robot: int) -> list[float]:
+    nearest: list[float] = np.min(ranges(state, session.scenario, robot), axis=0).tolist()
+    return nearest
+
+
+def _short(number: float) -> float:
+    return round(number, 3)
+
+
+def _css(colour: palette.RGB) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*colour)
