@@ -21,8 +21,10 @@ def _digest_of_sources() -> str:
     for pattern in ("*.py", "warehouse/*.py", "policies/*.py"):
         for path in sorted(here.glob(pattern)):
             source = path.read_bytes()
-            # Kernels, and the two files whose constants they use.
-            if b"@kernel" in source or path.name in ("observations.py", "state.py"):
+            # Kernels, what they are made of, and the two files whose constants they use.
+            marks = (b"@kernel", b"import intrinsic")
+            constants = ("observations.py", "state.py")
+            if any(mark in source for mark in marks) or path.name in constants:
                 digest.update(source)
     return digest.hexdigest()
 

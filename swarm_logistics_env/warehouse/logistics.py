@@ -1,7 +1,7 @@
 """Pick up, carry, drop, deliver, next request, and the timers: the rules of the warehouse.
 
 Kernels change the state's arrays and list what the physics must know as events
-(kind, robot, item), since a body's collision filter can only be set from Python.
+(kind, robot, item), so that they know no engine.
 """
 
 from __future__ import annotations

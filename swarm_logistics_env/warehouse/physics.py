@@ -8,17 +8,30 @@ discard the contact solution and let robots sink into each other.
 
 from __future__ import annotations
 
+import sys
+from typing import Any
+
 import numpy as np
 import pymunk
 from numpy.typing import NDArray
-from pymunk import batch
+from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no public name
+from pymunk.batch import BodyFields
 
+from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse import engine as at
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
-# Of the contact solver: few for robots that meet, many for a pile. With 4, a pile of 150 in a
-# corner stands 50 mm inside itself for good; with 16 always, a step costs a fifth more.
-_FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 4, 16, 8
+_FUNCTIONS = {
+    at.STEP: "cpSpaceStep",
+    at.SET_ITERATIONS: "cpSpaceSetIterations",
+    at.EACH_BODY: "cpSpaceEachBody",
+    at.READ_BODY: "pmSpaceBodyGetIteratorFuncBatched",
+    at.WRITE_BODY: "pmSpaceBodySetIteratorFuncBatched",
+    at.SET_FILTER: "cpShapeSetFilter",
+    at.SET_OFFSET: "cpCircleShapeSetOffset",
+    at.REINDEX: "cpSpaceReindexShape",
+}
 _SLOP = 0.001  # [m]; pymunk's default 0.1 lets robots of this size pass through each other
 _WALL = 0.5  # [m], half the thickness of a wall
 _ROBOT, _SOLID, _ITEM = 1, 2, 4
@@ -40,8 +53,6 @@ class Physics:
 
     def __init__(self, scenario: Scenario, state: WarehouseState) -> None:
         n = state.n_robots
-        self._substeps = scenario.n_substeps
-        self._period = scenario.physics_period
         self._space = pymunk.Space(threaded=False)
         self._space.collision_slop = _SLOP
         self._add_solids(scenario, state.obstacle_position)
@@ -49,34 +60,16 @@ class Physics:
         self._items = self._add_items(scenario, state)
         # A batch call reads and writes every body, in order of insertion: N robots, N controls, and
         # the static body last.
-        self.bodies, self._reader = _buffer(2 * n + 1, 4)  # x, y [m], and velocity [m/s], as read
-        self.velocities, self._writer = _buffer(2 * n + 1, 2)  # [m/s], to be written
-        self._fetch()
-
-    def advance(self, n_touching: int) -> None:
-        """Move everything by one control period, as `velocities` say, and fill `bodies`.
-
-        `n_touching` robots touch something now, which says how hard the contacts are to solve.
-
-        Rows 0 to N-1 of `velocities` have to be those just read, rows N to 2N-1 the wanted ones.
-        """
-        self._space.iterations = min(
-            _FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS
-        )
-        batch.set_space_bodies(self._space, batch.BodyFields.VELOCITY, self._writer)
-        step, period = self._space.step, self._period
-        for _ in range(self._substeps):
-            step(period)
-        self._fetch()
-
-    def lift(self, robot: int, item: int) -> None:
-        """Make `item` no obstacle and `robot` one that free items stop."""
-        self._items[item].filter = _NOTHING
-        self._robots[robot].filter = _LADEN_ROBOT
+        self._read = _Batch(2 * n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY)
+        self._written = _Batch(2 * n + 1, 2, BodyFields.VELOCITY)
+        self.bodies = self._read.numbers  # x, y [m], and velocity [m/s], as read
+        self.velocities = self._written.numbers  # [m/s], to be written
+        self.engine = self._table()
+        at.read_bodies(self.engine)
 
     def put_down(self, robot: int, item: int, x: float, y: float) -> None:
         """Make `item` an obstacle at (x, y) [m] for the laden and `robot` an unladen one."""
-        self._robots[robot].filter = _EMPTY_ROBOT
+        self.take_away(robot)
         self.place(item, x, y)
 
     def take_away(self, robot: int) -> None:
@@ -94,11 +87,24 @@ class Physics:
         """Take `robot` out of everybody's way, for good."""
         self._robots[robot].filter = _NOTHING
 
-    def _fetch(self) -> None:
-        self._reader.clear()
-        batch.get_space_bodies(
-            self._space, batch.BodyFields.POSITION | batch.BodyFields.VELOCITY, self._reader
-        )
+    def _table(self) -> NDArray[np.int64]:
+        shapes = [*self._robots, *self._items]
+        table = np.zeros(at.SHAPES + len(shapes), np.int64)
+        for row, address in _FUNCTION_ADDRESSES.items():
+            table[row] = address
+        table[at.SPACE] = _address(self._space._space)
+        table[at.READ_BATCH], table[at.READ_COUNT] = self._read.address, self._read.count_address
+        table[at.WRITE_BATCH] = self._written.address
+        table[at.WRITE_COUNT] = self._written.count_address
+        for row, met in (
+            (at.NO_ONE, _NOTHING),
+            (at.EMPTY_ROBOT, _EMPTY_ROBOT),
+            (at.LADEN_ROBOT, _LADEN_ROBOT),
+            (at.FREE_ITEM, _FREE_ITEM),
+        ):
+            table[row] = met.categories | met.mask << 32
+        table[at.SHAPES :] = [_address(shape._shape) for shape in shapes]
+        return table
 
     def _add_solids(self, scenario: Scenario, obstacles: NDArray[np.float64]) -> None:
         body = self._space.static_body
@@ -150,10 +156,40 @@ class Physics:
         return shapes
 
 
-def _buffer(rows: int, columns: int) -> tuple[NDArray[np.float64], batch.Buffer]:
-    # pymunk trusts the memory it is given. One number to spare: it replaces, with memory of its
-    # own, a buffer that what it reads would fill.
-    memory = np.zeros(rows * columns + 1)
-    buffer = batch.Buffer()
-    buffer.set_float_buf(memory)
-    return memory[:-1].reshape(rows, columns), buffer
+class _Batch:
+    """Numbers of all bodies, (rows, columns), that one call of the engine reads or writes."""
+
+    def __init__(self, rows: int, columns: int, fields: BodyFields) -> None:
+        # The engine trusts the memory it is given. One number to spare: it replaces, with memory of
+        # its own, a buffer that what it reads would fill.
+        memory = np.zeros(rows * columns + 1)
+        self.numbers = memory[:-1].reshape(rows, columns)
+        # All kept, because what a structure of cffi points to lives no longer for it.
+        self._memory = ffi.from_buffer("double[]", memory)
+        self._buffer = ffi.new("pmFloatArray *")
+        self._buffer.arr, self._buffer.max = self._memory, len(memory)
+        self._batch = ffi.new("pmBatchedData *")
+        self._batch.floatArray, self._batch.fields = self._buffer, fields.value
+        self.address = _address(self._batch)
+        self.count_address = _address(ffi.addressof(self._buffer, "num"))
+
+
+def _address(thing: Any) -> int:
+    return int(ffi.cast("intptr_t", thing))
+
+
+def _function_addresses() -> dict[int, int]:
+    """Return where the functions that kernels call are, by their row in the table.
+
+    Raises:
+        SetupError: kernels cannot call this pymunk, or any C function on this machine.
+    """
+    if sys.maxsize < 2**32 or sys.byteorder != "little":
+        raise SetupError("this machine's words: should be of 64 bits, lowest byte first")
+    try:
+        return {row: _address(ffi.addressof(lib, name)) for row, name in _FUNCTIONS.items()}
+    except AttributeError as error:
+        raise SetupError(f"pymunk {pymunk.version} lacks a function: {error}") from None
+
+
+_FUNCTION_ADDRESSES = _function_addresses()

@@ -1,6 +1,6 @@
-"""What a control step does apart from moving bodies, in three compiled calls.
+"""A control step in one compiled call, bodies' motion and all, without the interpreter's lock.
 
-Each takes whole tables of the state and hands their rows to the kernels that know the rules:
+Its parts take whole tables of the state and hand their rows to the kernels that know the rules:
 calling a kernel from Python costs as much as most of them do.
 """
 
@@ -14,6 +14,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import state as at
 from swarm_logistics_env.warehouse.disturbance import disturb
 from swarm_logistics_env.warehouse.driving import drive
+from swarm_logistics_env.warehouse.engine import advance, follow
 from swarm_logistics_env.warehouse.grid import fill
 from swarm_logistics_env.warehouse.logistics import (
     carry_along,
@@ -29,8 +30,8 @@ from swarm_logistics_env.warehouse.sensing import sense
     WIDTH, HEIGHT, ROBOT_RADIUS, ITEM_RADIUS, OBSTACLE_RADIUS, RANGER_RANGE, RADIO_RANGE,
     PICKUP_RANGE, MAX_SPEED, TIMER_LIMIT, CONTROL_PERIOD, STORAGE_WIDTH, GOSSIP,
     ROBOT_CELL, ITEM_CELL, SIDEWAYS, RANGER_NOISE, POSITION_NOISE, SENSOR_DROPOUT, RADIO_LOSS,
-    VIEW_RANGE, N_CONSTANTS,
-) = range(22)  # fmt: skip
+    VIEW_RANGE, PHYSICS_PERIOD, N_SUBSTEPS, N_CONSTANTS,
+) = range(24)  # fmt: skip
 
 
 def constants_of(scenario: Scenario, robot_cell: float, item_cell: float) -> NDArray[np.float64]:
@@ -56,7 +57,83 @@ def constants_of(scenario: Scenario, robot_cell: float, item_cell: float) -> NDA
     constants[SENSOR_DROPOUT] = scenario.sensor_dropout
     constants[RADIO_LOSS] = scenario.radio_loss
     constants[VIEW_RANGE] = scenario.view_range
+    constants[PHYSICS_PERIOD] = scenario.physics_period
+    constants[N_SUBSTEPS] = scenario.n_substeps
     return constants
+
+
+_MESSAGE = 4  # first column of a command row that is broadcast, where there are any
+# What `step` returns instead of a number of robots.
+NOT_FINITE, TO_BE_PERCEIVED = -1, -2
+
+
+@kernel
+def step(
+    commands: NDArray[np.float64],
+    step: int,
+    requested: int,
+    pauses: bool,
+    engine: NDArray[np.int64],
+    bodies: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    claim: NDArray[np.int64],
+    claim_square: NDArray[np.float64],
+    events: NDArray[np.int64],
+    constants: NDArray[np.float64],
+    position: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    numbers: NDArray[np.float64],
+    flags: NDArray[np.bool_],
+    links: NDArray[np.int64],
+    memory: NDArray[np.int64],
+    item_position: NDArray[np.float64],
+    item_links: NDArray[np.int64],
+    obstacle_position: NDArray[np.float64],
+    robot_size: NDArray[np.int64],
+    robot_start: NDArray[np.int64],
+    robot_members: NDArray[np.int64],
+    item_size: NDArray[np.int64],
+    item_start: NDArray[np.int64],
+    item_members: NDArray[np.int64],
+    keys: NDArray[np.uint64],
+    message: NDArray[np.float64],
+    rows: NDArray[np.float32],
+) -> int:
+    """Take control step number `step` and fill the observation rows.
+
+    Returns how many robots are anchored; `NOT_FINITE`, with the world as it was, if a command is
+    not finite; or `TO_BE_PERCEIVED`, with the rows still to be filled by `perceive`, if the
+    requested item can now be delivered or if it `pauses` anyway.
+    """
+    n_touching = set_out(commands, constants, numbers, flags, bodies, velocities)
+    if n_touching < 0:
+        return NOT_FINITE
+    advance(engine, n_touching, int(constants[N_SUBSTEPS]), constants[PHYSICS_PERIOD])
+    send(commands, flags, message)
+    is_due = handle_items(
+        commands, requested, constants, engine, bodies, position, velocity, flags, links, memory,
+        item_position, item_links, claim, claim_square, item_size, item_start, item_members, events,
+    )  # fmt: skip
+    if is_due or pauses:
+        return TO_BE_PERCEIVED
+    return perceive(
+        step, requested, constants, position, velocity, numbers, flags, links, memory,
+        item_position, item_links, obstacle_position, robot_size, robot_start, robot_members,
+        item_size, item_start, item_members, keys, message, rows,
+    )  # fmt: skip
+
+
+@kernel
+def send(
+    commands: NDArray[np.float64], flags: NDArray[np.bool_], message: NDArray[np.float64]
+) -> None:
+    """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
+    first = commands.shape[1] - message.shape[1]
+    for robot in range(message.shape[0]):
+        sends = first == _MESSAGE and flags[at.PRESENT, robot] and flags[at.OBEYS, robot]
+        for place in range(message.shape[1]):
+            given = commands[robot, first + place] if sends else 0.0
+            message[robot, place] = min(max(given, -1.0), 1.0)
 
 
 @kernel
@@ -91,6 +168,7 @@ def handle_items(
     commands: NDArray[np.float64],
     requested: int,
     constants: NDArray[np.float64],
+    engine: NDArray[np.int64],
     bodies: NDArray[np.float64],
     position: NDArray[np.float64],
     velocity: NDArray[np.float64],
@@ -105,10 +183,10 @@ def handle_items(
     start: NDArray[np.int64],
     members: NDArray[np.int64],
     events: NDArray[np.int64],
-) -> int:
-    """Take over where the bodies are, then let go and lift; returns the number of events.
+) -> bool:
+    """Take over where the bodies are, then let go and lift.
 
-    The last row of `events` begins with 1 if the requested item can now be delivered, else 0.
+    Returns whether the requested item can now be delivered.
     """
     for robot in range(len(position)):
         is_there = 1.0 if flags[at.PRESENT, robot] else 0.0
@@ -129,12 +207,11 @@ def handle_items(
         links[at.ITEM], memory, item_position, item_links[at.STATUS], item_links[at.CARRIER],
         claim, claim_square, constants[ITEM_CELL], size, start, members, events, n_events,
     )  # fmt: skip
-    events[-1, 0] = 0
-    if requested != at.NOBODY and item_links[at.CARRIER, requested] != at.NOBODY:
-        carrier = item_links[at.CARRIER, requested]
-        if flags[at.IN_DELIVERY, carrier] and flags[at.DELIVERS, carrier]:
-            events[-1, 0] = 1
-    return n_events
+    follow(engine, events, n_events, len(position), item_position)
+    carrier = item_links[at.CARRIER, requested] if requested != at.NOBODY else at.NOBODY
+    return bool(
+        carrier != at.NOBODY and flags[at.IN_DELIVERY, carrier] and flags[at.DELIVERS, carrier]
+    )
 
 
 @kernel

@@ -17,7 +17,6 @@ from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.warehouse import layout, stepping
 from swarm_logistics_env.warehouse.faults import Fault, apply_faults, failed_robots
 from swarm_logistics_env.warehouse.grid import Grid
-from swarm_logistics_env.warehouse.logistics import LIFTED
 from swarm_logistics_env.warehouse.physics import Physics
 from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED, WarehouseState
 
@@ -109,29 +108,28 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         given = self._checked(commands)
-        state, physics = self.state, self._physics
-        n_touching = stepping.set_out(
-            given, self._constants, state.numbers, state.flags, physics.bodies, physics.velocities
-        )
-        if n_touching < 0:
+        state, physics, scenario = self.state, self._physics, self.scenario
+        time = (state.step + 1) * scenario.control_period
+        is_fault_due = bool(self._fault_times) and self._fault_times[0] <= time + 5e-7
+        rows = self._blank_rows()
+        anchored = stepping.step(
+            given, state.step + 1, state.requested, is_fault_due, physics.engine, physics.bodies,
+            physics.velocities, self._claim, self._claim_square, self._events, *self._seen(rows),
+        )  # fmt: skip
+        if anchored == stepping.NOT_FINITE:
             obeying = state.robot_present & state.obeys
             bad = np.argwhere(~np.isfinite(given) & obeying[:, None])[0]
             raise CommandError(
                 f"commands[{bad[0]}, {bad[1]}] = {given[bad[0], bad[1]]}: should be finite"
             )
         self._log.append(given)
-        physics.advance(n_touching)
-        if self.scenario.message_size:
-            self._send_messages(given)
-        state.step += 1
-        state.time = state.step * self.scenario.control_period
-        self._handle_items(given)
-        if self._events[-1, 0]:
+        self._rows, state.step, state.time = rows, state.step + 1, time
+        if anchored == stepping.TO_BE_PERCEIVED:
             self._deliver()
-        if self._fault_times and self._fault_times[0] <= state.time + 5e-7:
-            self._apply_faults()
-        anchored = self._perceive()
-        state.anchoring_seconds += anchored * self.scenario.control_period
+            if is_fault_due:
+                self._apply_faults()
+            anchored = self._perceive()
+        state.anchoring_seconds += anchored * scenario.control_period
         if len(self._log) >= self._longest_log:
             self._remember()
         return self.observe()
@@ -213,7 +211,7 @@ class Warehouse:
         self._item_grid = Grid(width, height, cell, items)
         self._claim = np.full(items, NOBODY)
         self._claim_square = np.zeros(items)
-        self._events = np.zeros((2 * n + 1, 3), np.int64)
+        self._events = np.zeros((2 * n, 3), np.int64)
         self._command_shape = (n, len(COMMAND_COLUMNS) + scenario.message_size)
         size = math.prod(self._command_shape)
         self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
@@ -251,29 +249,6 @@ class Warehouse:
         self._physics = Physics(self.scenario, self.state)
         for commands in saved["_log"]:
             self.step(commands)
-
-    def _handle_items(self, commands: NDArray[np.float64]) -> None:
-        state, grid, physics = self.state, self._item_grid, self._physics
-        n_events = stepping.handle_items(
-            commands, state.requested, self._constants, physics.bodies, state.robot_position,
-            state.robot_velocity, state.flags, state.links, state.robot_memory,
-            state.item_position, state.item_links, self._claim, self._claim_square,
-            grid.size, grid.start, grid.members, self._events,
-        )  # fmt: skip
-        if n_events:
-            for kind, robot, item in self._events[:n_events].tolist():
-                if kind == LIFTED:
-                    physics.lift(robot, item)
-                else:
-                    physics.put_down(robot, item, *state.item_position[item].tolist())
-
-    def _send_messages(self, commands: NDArray[np.float64]) -> None:
-        state = self.state
-        state.robot_message[:] = 0.0
-        if commands.shape[1] > len(COMMAND_COLUMNS):
-            sends = state.robot_present & state.obeys
-            message = np.clip(commands[:, len(COMMAND_COLUMNS) :], -1.0, 1.0)
-            state.robot_message[sends] = message[sends]
 
     def _deliver(self) -> None:
         state = self.state
@@ -340,13 +315,19 @@ class Warehouse:
             zeroed[robot] = 0.0
 
     def _perceive(self) -> int:
-        state, robots, items = self.state, self._robot_grid, self._item_grid
+        self._rows = self._blank_rows()
+        state = self.state
+        return stepping.perceive(state.step, state.requested, *self._seen(self._rows))
+
+    def _blank_rows(self) -> NDArray[np.float32]:
         # New memory every time: what was handed out stays as it was.
-        self._rows = np.empty((len(state.robot_position), self._n_columns), np.float32)
-        return stepping.perceive(
-            state.step, state.requested, self._constants, state.robot_position,
-            state.robot_velocity, state.numbers, state.flags, state.links, state.robot_memory,
-            state.item_position, state.item_links, state.obstacle_position,
-            robots.size, robots.start, robots.members, items.size, items.start, items.members,
-            self._sensor_keys, state.robot_message, self._rows,
+        return np.empty((len(self.state.robot_position), self._n_columns), np.float32)
+
+    def _seen(self, rows: NDArray[np.float32]) -> tuple[Any, ...]:
+        state, robots, items = self.state, self._robot_grid, self._item_grid
+        return (
+            self._constants, state.robot_position, state.robot_velocity, state.numbers, state.flags,
+            state.links, state.robot_memory, state.item_position, state.item_links,
+            state.obstacle_position, robots.size, robots.start, robots.members, items.size,
+            items.start, items.members, self._sensor_keys, state.robot_message, rows,
         )  # fmt: skip
