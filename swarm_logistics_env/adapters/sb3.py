@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import operator
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any, TypeAlias
 
 import numpy as np
-from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.adapters.worlds import RowsStep, World, Worlds, checked_count, maker
+from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
-from swarm_logistics_env.wrappers import Wrapper
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -25,7 +21,6 @@ except ModuleNotFoundError as error:
         f"SwarmVecEnv needs stable-baselines3 ({error}): pip install 'swarm-logistics-env[train]'"
     ) from error
 
-World: TypeAlias = SwarmLogisticsEnv | Wrapper
 Infos: TypeAlias = list[dict[str, Any]]
 
 
@@ -78,6 +73,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         20
         >>> PPO("MlpPolicy", env, n_steps=32, seed=0).learn(640).num_timesteps
         640
+        >>> from swarm_logistics_env.env import SwarmLogisticsEnv
         >>> from swarm_logistics_env.wrappers import FaultInjection
         >>> def make_env(world):
         ...     return FaultInjection(SwarmLogisticsEnv(n_robots=5), "FM1", robots=world + 1)
@@ -96,35 +92,27 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         seed: int | None = None,
         **fields: Any,
     ) -> None:
-        n_worlds, self._threads = _count("n_worlds", n_worlds), _count("threads", threads)
+        n_worlds = checked_count("n_worlds", n_worlds)
+        threads = checked_count("threads", threads)
         if make_env is None:
-            make_env = _maker(scenario, n_worlds, n_robots, fields)
+            make_env = maker(scenario, n_worlds, n_robots, fields)
         elif scenario is not None or n_robots is not None or fields:
             raise SetupError(
                 "make_env and conditions: should be one or the other; make_env decides what its "
                 "environments are like"
             )
-        self.worlds = [make_env(world) for world in range(n_worlds)]
-        observations, actions = _spaces(self.worlds)
-        sizes = [len(env.possible_agents) for env in self.worlds]
-        ends = np.cumsum(sizes).tolist()
-        self._rows = [slice(end - size, end) for end, size in zip(ends, sizes)]
-        self._world_of = np.repeat(np.arange(n_worlds), sizes)
-        # Largest first, so that no thread is left with much work at the end.
-        self._order = sorted(range(n_worlds), key=lambda world: -sizes[world])
-        self._n_robots = [0] * n_worlds
-        self._is_over = [False] * n_worlds
-        self._present = np.zeros(ends[-1], np.bool_)
-        self._silence: Infos = [{"TimeLimit.truncated": False} for _ in range(ends[-1])]
-        self._pool = self._new_pool()
-        super().__init__(ends[-1], observations, actions)
+        self._worlds = Worlds(make_env, n_worlds, threads)
+        self.worlds = self._worlds.envs
+        n_rows = self._worlds.n_rows
+        self._silence: Infos = [{"TimeLimit.truncated": False} for _ in range(n_rows)]
+        super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
         if seed is not None:
             self.seed(seed)
 
     @property
     def present(self) -> NDArray[np.bool_]:
         """Which rows of the latest observations are a robot's, (num_envs,); others are zeros."""
-        return self._present.copy()
+        return self._worlds.present.copy()
 
     def seed(self, seed: int | None = None) -> list[int]:
         """Fix all episodes from the next `reset` on; returns each row's world's seed.
@@ -138,7 +126,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             seed = operator.index(seed)
         except TypeError:
             raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
-        self._seeds = [key(seed, "world", world) >> 1 for world in self._world_of.tolist()]
+        self._seeds = [key(seed, "world", world) >> 1 for world in self._worlds.world_of.tolist()]
         return list(self._seeds)
 
     def set_options(self, options: Mapping[str, Any] | Sequence[Any] | None = None) -> None:
@@ -152,10 +140,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             self._options = [dict(options or {})] * self.num_envs
             return
         if len(options) == len(self.worlds):
-            options = [options[world] for world in self._world_of.tolist()]
-        firsts = [rows.start for rows in self._rows]
+            options = [options[world] for world in self._worlds.world_of.tolist()]
+        firsts = [rows.start for rows in self._worlds.rows]
         if len(options) != self.num_envs or any(
-            options[row] != options[firsts[world]] for row, world in enumerate(self._world_of)
+            options[row] != options[firsts[world]]
+            for row, world in enumerate(self._worlds.world_of)
         ):
             raise SetupError(
                 f"{len(options)} options: should be one dict, or a dict for each of the "
@@ -165,10 +154,10 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world; returns the observations (num_envs, D)."""
-        observations = self._blank()
-        for world, rows in enumerate(self._rows):
-            seed, options = self._seeds[rows.start], self._options[rows.start]
-            self._begin(world, observations[rows], seed, options)
+        observations = self._worlds.blank()
+        for world, rows in enumerate(self._worlds.rows):
+            options = self._options[rows.start] or None
+            self._worlds.begin(world, observations, self._seeds[rows.start], options)
         self._reset_seeds()
         self._reset_options()
         return observations
@@ -179,20 +168,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         Raises:
             CommandError: wrong shape or not finite; nothing has happened in any world then.
         """
-        given = np.asarray(actions)
-        wanted = (self.num_envs, *self.action_space.shape)
-        if given.shape != wanted or given.dtype.kind not in "fiub":
-            raise CommandError(
-                f"actions of shape {given.shape} and type {given.dtype}: should be {wanted} numbers"
-            )
-        if not np.isfinite(given).all():
-            row = int(np.argwhere(~np.isfinite(given))[0, 0])
-            world = int(self._world_of[row])
-            raise CommandError(
-                f"actions[{row}] = {given[row]} (world {world}, robot_"
-                f"{row - self._rows[world].start}): should be finite"
-            )
-        self._actions = given
+        self._actions = self._worlds.checked(actions)
 
     def step_wait(
         self,
@@ -202,20 +178,15 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         The arrays are the caller's own. The infos of rows that are not done are always the same
         dicts: to be read only.
         """
-        # New memory every time: learners keep the observations before these.
-        self._observations = self._blank()
-        self._rewards = np.zeros(self.num_envs, np.float32)
-        self._terminated = np.zeros(self.num_envs, np.bool_)
-        self._truncated = np.zeros(self.num_envs, np.bool_)
-        self._step_worlds()
-        dones = self._terminated | self._truncated
+        step = self._worlds.step(self._actions)
+        dones = step.terminated | step.truncated
         infos = self._silence.copy()
-        # Here and in the worlds' order: what episodes share must not depend on the threads.
-        if dones.any() or any(self._is_over):
-            for world, rows in enumerate(self._rows):
-                if self._is_over[world] or dones[rows].any():
-                    self._end(world, dones, infos)
-        return self._observations, self._rewards, dones, infos
+        # In the worlds' order: what episodes share must not depend on the threads.
+        if dones.any() or any(self._worlds.is_over):
+            for world, rows in enumerate(self._worlds.rows):
+                if self._worlds.is_over[world] or dones[rows].any():
+                    self._end(world, step, dones, infos)
+        return step.observations, step.rewards, dones, infos
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
         """Return an attribute of the world of each row."""
@@ -272,69 +243,21 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
     def close(self) -> None:
         """Release threads and what rendering holds; harmless when called twice."""
-        if self._pool is not None:
-            self._pool.shutdown()
-        for env in self.worlds:
-            env.close()
-
-    def _new_pool(self) -> ThreadPoolExecutor | None:
-        # One fewer: the thread that asks for the step works as well.
-        helpers = min(self._threads, len(self.worlds)) - 1
-        return ThreadPoolExecutor(helpers, "swarm-worlds") if helpers else None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_pool": None}
-
-    def __setstate__(self, saved: dict[str, Any]) -> None:
-        self.__dict__.update(saved)
-        self._pool = self._new_pool()
-
-    def _blank(self) -> NDArray[np.float32]:
-        return np.zeros((self.num_envs, *self.observation_space.shape), np.float32)
+        self._worlds.close()
 
     def _of_rows(
         self, answer: Callable[[World], Any], indices: int | Iterable[int] | None
     ) -> list[Any]:
-        chosen = range(self._world_of.size) if indices is None else indices
-        worlds = self._world_of[np.atleast_1d(np.fromiter(_each(chosen), np.int64))].tolist()
+        chosen = range(self.num_envs) if indices is None else indices
+        worlds = self._worlds.world_of[np.atleast_1d(np.fromiter(_each(chosen), np.int64))].tolist()
         answers = {world: answer(self.worlds[world]) for world in dict.fromkeys(worlds)}
         return [answers[world] for world in worlds]
 
-    def _step_worlds(self) -> None:
-        waiting = deque(self._order)
-        if self._pool is None:
-            self._work(waiting)
-            return
-        helpers = min(self._threads, len(self.worlds)) - 1
-        futures = [self._pool.submit(self._work, waiting) for _ in range(helpers)]
-        try:
-            self._work(waiting)
-        finally:
-            wait(futures)
-        for future in futures:
-            future.result()
-
-    def _work(self, waiting: deque[int]) -> None:
-        while True:
-            try:
-                world = waiting.popleft()
-            except IndexError:
-                return
-            env, first = self.worlds[world], self._rows[world].start
-            rows = slice(first, first + self._n_robots[world])
-            (
-                self._observations[rows],
-                self._rewards[rows],
-                self._terminated[rows],
-                self._truncated[rows],
-            ) = env.step_arrays(self._actions[rows])
-            self._is_over[world] = not env.agents
-
-    def _end(self, world: int, dones: NDArray[np.bool_], infos: Infos) -> None:
+    def _end(self, world: int, step: RowsStep, dones: NDArray[np.bool_], infos: Infos) -> None:
         """Tell of the rows that are done, and begin the next episode if the world is over."""
-        env, rows = self.worlds[world], self._rows[world]
+        env, rows = self.worlds[world], self._worlds.rows[world]
         state = env.warehouse.state
-        if self._is_over[world]:
+        if self._worlds.is_over[world]:
             dones[rows] = True
         about = {"delivered": state.delivered, "n_robots": state.n_robots, "world": world}
         about |= getattr(env, "episode_info", {})
@@ -342,94 +265,15 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             row = rows.start + robot
             infos[row] = {
                 **about,
-                "terminal_observation": self._observations[row].copy(),
-                "TimeLimit.truncated": bool(self._truncated[row] and not self._terminated[row]),
+                "terminal_observation": step.observations[row].copy(),
+                "TimeLimit.truncated": bool(step.truncated[row] and not step.terminated[row]),
                 "failure_modes": state.failure_modes[robot] if robot < state.n_robots else (),
-                "padding": not self._present[row],
+                "padding": not self._worlds.present[row],
             }
-        if self._is_over[world]:
-            self._observations[rows] = 0.0
-            self._begin(world, self._observations[rows])
+        if self._worlds.is_over[world]:
+            self._worlds.begin(world, step.observations)
         else:
-            self._note_present(world)
-
-    def _begin(
-        self,
-        world: int,
-        observations: NDArray[np.float32],
-        seed: int | None = None,
-        options: Mapping[str, Any] | None = None,
-    ) -> None:
-        env = self.worlds[world]
-        first = env.reset_arrays(seed, options or None)
-        if len(first) > len(observations):
-            raise SetupError(
-                f"n_robots = {len(first)}: should be at most {len(observations)}, for which world "
-                f"{world} has rows; a wrapper such as SwarmSize announces more"
-            )
-        observations[: len(first)] = first
-        self._n_robots[world], self._is_over[world] = len(first), False
-        self._note_present(world)
-
-    def _note_present(self, world: int) -> None:
-        present, rows = self.worlds[world].warehouse.state.robot_present, self._rows[world]
-        self._present[rows] = False
-        self._present[rows.start : rows.start + len(present)] = present
-
-
-def _count(name: str, value: int) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = 0
-    if number < 1:
-        raise SetupError(f"{name} = {value!r}: should be an integer of at least 1")
-    return number
-
-
-def _maker(
-    scenario: Scenario | None,
-    n_worlds: int,
-    n_robots: int | Sequence[int] | None,
-    fields: Mapping[str, Any],
-) -> Callable[[int], World]:
-    if isinstance(n_robots, Sequence | np.ndarray):
-        sizes: list[Any] = [int(size) for size in n_robots]
-    else:
-        sizes = [n_robots]
-    if not 1 <= len(sizes) <= n_worlds:
-        raise SetupError(
-            f"n_robots = {n_robots!r}: should be 1 to {n_worlds} sizes, as there are {n_worlds} "
-            "worlds to have them"
-        )
-
-    def make_env(world: int) -> World:
-        size = sizes[world % len(sizes)]
-        sized = {} if size is None else {"n_robots": size}
-        return SwarmLogisticsEnv(scenario, **sized, **fields)
-
-    return make_env
-
-
-def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
-    for env in worlds:
-        if not hasattr(env, "reset_arrays"):
-            raise SetupError(
-                f"make_env gave {env!r}: should be a SwarmLogisticsEnv or a wrapper of one"
-            )
-    if len({id(env.unwrapped) for env in worlds}) < len(worlds):
-        raise SetupError("make_env gave the same environment twice: should make one each time")
-    seen = [env.observation_space("robot_0") for env in worlds]
-    told = [env.action_space("robot_0") for env in worlds]
-    if len({(space.shape, command.shape) for space, command in zip(seen, told)}) > 1:
-        raise SetupError(
-            f"observations {[space.shape for space in seen]} and commands "
-            f"{[command.shape for command in told]}: should be of one length in all worlds, so of "
-            "one message_size"
-        )
-    low = np.min([space.low for space in seen], axis=0)
-    high = np.max([space.high for space in seen], axis=0)
-    return Box(low, high, dtype=np.float32), told[0]
+            self._worlds.note_present(world)
 
 
 def _layers(env: World) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import doctest
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -31,6 +32,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
 
+from swarm_logistics_env.adapters import sb3
 from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
 SMALL: dict[str, Any] = {
@@ -427,3 +429,9 @@ def test_asking_for_adapters_does_not_load_torch() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert not {"torch", "stable_baselines3"} & set(done.stdout.split())
+
+
+def test_the_example_runs() -> None:
+    ran = doctest.testmod(sb3)
+    assert ran.attempted > 5
+    assert not ran.failed

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+import doctest
 import itertools
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,9 @@ from swarm_logistics_env.wrappers import (
     ParameterChange,
     RunningMeans,
     SwarmSize,
+    conditions,
+    indicator_reward,
+    reference_performances,
 )
 
 N = 4
@@ -373,3 +378,10 @@ def test_a_copy_goes_on_as_the_original() -> None:
         if not env.agents:
             np.testing.assert_array_equal(env.reset_arrays(), other.reset_arrays())
     assert env.measured.conditions == other.measured.conditions
+
+
+@pytest.mark.parametrize("module", [conditions, indicator_reward, reference_performances])
+def test_the_examples_run(module: ModuleType) -> None:
+    ran = doctest.testmod(module)
+    assert ran.attempted
+    assert not ran.failed

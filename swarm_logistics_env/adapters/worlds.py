@@ -1,0 +1,246 @@
+"""Several environments side by side in one process, their robots as rows of common arrays."""
+
+from __future__ import annotations
+
+import operator
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.wrappers import Wrapper
+
+World: TypeAlias = SwarmLogisticsEnv | Wrapper
+
+
+class RowsStep(NamedTuple):
+    """What a step of all worlds gives; arrays of the caller's own."""
+
+    observations: NDArray[np.float32]  # (R, D)
+    rewards: NDArray[np.float32]  # (R,)
+    terminated: NDArray[np.bool_]  # (R,)
+    truncated: NDArray[np.bool_]  # (R,)
+
+
+class Worlds:
+    """Worlds whose robots are R rows: world 0's possible agents first, then world 1's, ...
+
+    Rows without a robot are zeros. Who is over is begun anew by the caller, so that what worlds
+    share is touched in one thread only.
+
+    Args:
+        make_env: world number -> environment.
+        n_worlds: how many.
+        threads: how many step at the same time; the results are the same bits.
+
+    Attributes:
+        envs: the environments.
+        rows: of each world, the slice of its rows.
+        world_of: (R,) the world of each row.
+        is_over: of each world, whether its episode is.
+        present: (R,) which rows of the latest observations are a robot's.
+        observation_space, command_space: of every row.
+
+    Raises:
+        SetupError: no environments, one twice, or rows or commands that differ in length.
+    """
+
+    def __init__(self, make_env: Callable[[int], World], n_worlds: int, threads: int) -> None:
+        self.envs = [make_env(world) for world in range(n_worlds)]
+        self.observation_space, self.command_space = _spaces(self.envs)
+        sizes = [len(env.possible_agents) for env in self.envs]
+        ends = np.cumsum(sizes).tolist()
+        self.rows = [slice(end - size, end) for end, size in zip(ends, sizes)]
+        self.n_rows: int = ends[-1]
+        self.world_of = np.repeat(np.arange(n_worlds), sizes)
+        self.is_over = [False] * n_worlds
+        self.present = np.zeros(self.n_rows, np.bool_)
+        self._n_robots = [0] * n_worlds
+        # Largest first, so that no thread is left with much work at the end.
+        self._order = sorted(range(n_worlds), key=lambda world: -sizes[world])
+        # The thread that asks for a step works as well.
+        self._n_helpers = min(threads, n_worlds) - 1
+        self._pool = self._new_pool()
+
+    def blank(self) -> NDArray[np.float32]:
+        """Return zeros for the observations of all rows, (R, D)."""
+        return np.zeros((self.n_rows, *self.observation_space.shape), np.float32)
+
+    def begin(
+        self,
+        world: int,
+        observations: NDArray[np.float32],
+        seed: int | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Begin an episode and write its first observations into those of all rows.
+
+        Raises:
+            SetupError: it has more robots than the world has rows.
+        """
+        rows = self.rows[world]
+        first = self.envs[world].reset_arrays(seed, options)
+        if len(first) > rows.stop - rows.start:
+            raise SetupError(
+                f"n_robots = {len(first)}: should be at most {rows.stop - rows.start}, for which "
+                f"world {world} has rows; a wrapper such as SwarmSize announces more"
+            )
+        observations[rows] = 0.0
+        observations[rows.start : rows.start + len(first)] = first
+        self._n_robots[world], self.is_over[world] = len(first), False
+        self.note_present(world)
+
+    def note_present(self, world: int) -> None:
+        """Take over which robots of a world are there."""
+        there, rows = self.envs[world].warehouse.state.robot_present, self.rows[world]
+        self.present[rows] = False
+        self.present[rows.start : rows.start + len(there)] = there
+
+    def checked(self, commands: ArrayLike) -> NDArray[Any]:
+        """Return commands (R, 4) as an array.
+
+        Raises:
+            CommandError: wrong shape or not finite.
+        """
+        given = np.asarray(commands)
+        wanted = (self.n_rows, *self.command_space.shape)
+        if given.shape != wanted or given.dtype.kind not in "fiub":
+            raise CommandError(
+                f"actions of shape {given.shape} and type {given.dtype}: should be {wanted} numbers"
+            )
+        if not np.isfinite(given).all():
+            row = int(np.argwhere(~np.isfinite(given))[0, 0])
+            world = int(self.world_of[row])
+            raise CommandError(
+                f"actions[{row}] = {given[row]} (world {world}, robot_"
+                f"{row - self.rows[world].start}): should be finite"
+            )
+        return given
+
+    def step(self, commands: NDArray[Any]) -> RowsStep:
+        """Take one control period in every world, with `checked` commands (R, 4)."""
+        # New memory every time: what was handed out stays as it was.
+        outcome = RowsStep(
+            self.blank(),
+            np.zeros(self.n_rows, np.float32),
+            np.zeros(self.n_rows, np.bool_),
+            np.zeros(self.n_rows, np.bool_),
+        )
+        waiting = deque(self._order)
+        if self._pool is None:
+            self._work(waiting, commands, outcome)
+            return outcome
+        helpers = [
+            self._pool.submit(self._work, waiting, commands, outcome)
+            for _ in range(self._n_helpers)
+        ]
+        try:
+            self._work(waiting, commands, outcome)
+        finally:
+            wait(helpers)
+        for helper in helpers:
+            helper.result()
+        return outcome
+
+    def close(self) -> None:
+        """Release threads and what rendering holds; harmless when called twice."""
+        if self._pool is not None:
+            self._pool.shutdown()
+        for env in self.envs:
+            env.close()
+
+    def _work(self, waiting: deque[int], commands: NDArray[Any], outcome: RowsStep) -> None:
+        observations, rewards, terminated, truncated = outcome
+        while True:
+            try:
+                world = waiting.popleft()
+            except IndexError:
+                return
+            env, first = self.envs[world], self.rows[world].start
+            at = slice(first, first + self._n_robots[world])
+            observations[at], rewards[at], terminated[at], truncated[at] = env.step_arrays(
+                commands[at]
+            )
+            self.is_over[world] = not env.agents
+
+    def _new_pool(self) -> ThreadPoolExecutor | None:
+        return ThreadPoolExecutor(self._n_helpers, "swarm-worlds") if self._n_helpers else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_pool": None}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        self.__dict__.update(saved)
+        self._pool = self._new_pool()
+
+
+def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
+    for env in worlds:
+        if not hasattr(env, "reset_arrays"):
+            raise SetupError(
+                f"make_env gave {env!r}: should be a SwarmLogisticsEnv or a wrapper of one"
+            )
+    if len({id(env.unwrapped) for env in worlds}) < len(worlds):
+        raise SetupError("make_env gave the same environment twice: should make one each time")
+    seen = [env.observation_space("robot_0") for env in worlds]
+    told = [env.action_space("robot_0") for env in worlds]
+    if len({(space.shape, command.shape) for space, command in zip(seen, told)}) > 1:
+        raise SetupError(
+            f"observations {[space.shape for space in seen]} and commands "
+            f"{[command.shape for command in told]}: should be of one length in all worlds, so of "
+            "one message_size"
+        )
+    low = np.min([space.low for space in seen], axis=0)
+    high = np.max([space.high for space in seen], axis=0)
+    return Box(low, high, dtype=np.float32), told[0]
+
+
+def maker(
+    scenario: Scenario | None,
+    n_worlds: int,
+    n_robots: int | Sequence[int] | None,
+    fields: Mapping[str, Any],
+) -> Callable[[int], World]:
+    """Return what makes plain environments, of one size or of several in turn.
+
+    Raises:
+        SetupError: there are no sizes, or more than worlds.
+    """
+    if isinstance(n_robots, Sequence | np.ndarray):
+        sizes: list[Any] = [int(size) for size in n_robots]
+    else:
+        sizes = [n_robots]
+    if not 1 <= len(sizes) <= n_worlds:
+        raise SetupError(
+            f"n_robots = {n_robots!r}: should be 1 to {n_worlds} sizes, as there are {n_worlds} "
+            "worlds to have them"
+        )
+
+    def make_env(world: int) -> World:
+        size = sizes[world % len(sizes)]
+        sized = {} if size is None else {"n_robots": size}
+        return SwarmLogisticsEnv(scenario, **sized, **fields)
+
+    return make_env
+
+
+def checked_count(name: str, value: int) -> int:
+    """Return the value as an int of at least 1.
+
+    Raises:
+        SetupError: it is none.
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = 0
+    if number < 1:
+        raise SetupError(f"{name} = {value!r}: should be an integer of at least 1")
+    return number
