@@ -75,9 +75,7 @@ class Panel:
             ("–", lambda s: _press(s, "W")),
             ("+", lambda s: _press(s, "w")),
         )
-        for line in wrapped(session.note, _SMALL, self._width, 3):
-            self._line(line, _SMALL)
-        self._y += _GAP
+        self._paragraph(session.note, 3)
 
     def _draw_modes(self, session: Session) -> None:
         self._line("Break robots in mode (click to choose)")
@@ -92,9 +90,7 @@ class Panel:
             self._canvas.blit(sign, sign.get_rect(midright=(rect.right - 4, rect.centery)))
         self._y = top + rows * 22 + 2
         description = FAILURE_MODES[session.mode].description
-        for line in wrapped(f"{session.mode}: {description}", _SMALL, self._width, 2):
-            self._line(line, _SMALL)
-        self._y += _GAP
+        self._paragraph(f"{session.mode}: {description}", 2)
 
     def _draw_robot(self, session: Session) -> None:
         robot = session.selected
@@ -141,6 +137,13 @@ class Panel:
         for line in wrapped(text, height, self._width, 1):
             self._put(words(line, height, colour), _GAP)
         self._y += round(1.15 * height)
+
+    def _paragraph(self, text: str, n_lines: int) -> None:
+        """Write small text; what follows stands in the same place however long it is."""
+        after = self._y + n_lines * round(1.15 * _SMALL) + _GAP // 2
+        for line in wrapped(text, _SMALL, self._width, n_lines):
+            self._line(line, _SMALL)
+        self._y = after
 
     def _row(self, text: str, *buttons: tuple[str, Act]) -> None:
         self._put(words(text, _NORMAL, INK), _GAP)

@@ -1,0 +1,262 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
+from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
+from swarm_logistics_env.policies import Policy
+from swarm_logistics_env.watch import Session
+from swarm_logistics_env.watch.inspection import observation_words
+from swarm_logistics_env.watch.keys import KEYS, press
+
+SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
+
+
+def swarm_dt() -> Policy:
+    return policies.load("swarm-dt")
+
+
+def finish(session: Session) -> None:
+    session.play(1e6)
+    assert session.is_over
+
+
+def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
+    scenario = SMALL.replace(duration=60.0)
+    faults = [Fault("FM4", 3, onset=5.0)]
+    session = Session(scenario, swarm_dt, 2, faults)
+    finish(session)
+    with_faults = run_episode(scenario, swarm_dt(), 2, faults)
+    without = run_episode(scenario, swarm_dt(), 2)
+    run, twin = session.curves
+    assert list(run.times) == with_faults.delivery_times.tolist()
+    assert list(twin.times) == without.delivery_times.tolist()
+    assert list(run.times) != list(twin.times)
+
+
+def test_without_faults_run_and_twin_are_the_same() -> None:
+    session = Session(SMALL, swarm_dt)
+    session.play(15.0)
+    run, twin = session.run.world.state, session.twin.world.state
+    assert np.array_equal(run.robot_position, twin.robot_position)
+    session.select(0)
+    session.break_robot()
+    session.play(3.0)
+    assert run.failed.tolist() == [True] + [False] * 7
+    assert not twin.failed.any()
+
+
+def test_speed_is_how_much_time_passes_in_a_second() -> None:
+    session = Session(SMALL, swarm_dt, speed=4.0)
+    for _ in range(10):
+        session.play(0.1)
+    assert session.run.world.state.time == pytest.approx(4.0, abs=0.11)
+    session.faster()
+    assert session.speed == 8.0
+    for _ in range(20):
+        session.slower()
+    assert session.speed == 0.25
+    assert session.play(0.1) == 0
+
+
+def test_paused_time_stands_still_and_a_step_is_one_period() -> None:
+    session = Session(SMALL, swarm_dt)
+    session.pause()
+    session.play(5.0)
+    assert session.run.world.state.time == 0.0
+    session.step()
+    assert session.run.world.state.step == session.twin.world.state.step == 1
+    session.pause()
+    session.step()
+    assert session.paused
+
+
+def test_what_the_budget_does_not_allow_is_not_caught_up_with() -> None:
+    session = Session(SMALL, swarm_dt, speed=64.0)
+    assert session.play(1.0, budget=0.0) == 1
+    assert session.play(0.0, budget=0.0) <= 1
+    assert session.play(0.0, budget=0.0) == 0
+
+
+@pytest.mark.parametrize("mode", FAILURE_MODES)
+def test_robot_breaks_and_is_repaired(mode: str) -> None:
+    session = Session(SMALL, swarm_dt)
+    session.play(2.0)
+    session.choose_mode(mode)
+    session.toggle_robot(3)
+    world = session.run.world
+    assert world.state.failure_modes[3] == (mode,)
+    assert mode in session.note
+    assert [(event.robot, event.mode) for event in session.events] == [(3, mode)]
+    assert session.events[0].time == world.state.time
+    if mode == "removed":
+        assert session.selected is None
+        with pytest.raises(SetupError, match="robot = 3"):
+            session.repair_robot(3)
+        return
+    session.play(1.0)
+    session.toggle_robot(3)
+    assert not world.state.failed.any()
+    assert world.state.max_speed[3] == SMALL.max_speed
+    assert session.events[-1].mode is None
+
+
+def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
+    session = Session(SMALL, swarm_dt, 0, [Fault("dead", 3), Fault("FM1", 2, onset=15.0)])
+    first, *others = np.flatnonzero(session.run.world.state.failed).tolist()
+    session.repair_robot(first)
+    assert np.flatnonzero(session.run.world.state.failed).tolist() == others
+    session.play(16.0)
+    modes = [name for names in session.run.world.state.failure_modes for name in names]
+    assert modes.count("FM1") == 2  # a fault that is yet to come comes
+
+
+def test_breaking_twice_in_a_mode_is_once() -> None:
+    session = Session(SMALL, swarm_dt)
+
+    def modes() -> list[str]:
+        return list(session.run.world.state.failure_modes[1])
+
+    session.break_robot(1)
+    session.break_robot(1)
+    assert modes() == ["FM4"]
+    assert "already" in session.note
+    session.choose_mode("FM1")
+    session.break_robot(1)
+    assert modes() == ["FM4", "FM1"]
+    session.repair_robot(1)
+    assert modes() == []
+    session.repair_robot(1)
+    assert "sound" in session.note
+
+
+def test_without_a_selected_robot_it_says_what_to_do() -> None:
+    session = Session(SMALL, swarm_dt)
+    session.break_robot()
+    assert session.note == "click a robot first"
+    finish(session)
+    session.break_robot(2)
+    assert "over" in session.note
+    assert not session.run.world.state.failed.any()
+
+
+def test_swarm_size_begins_again_and_says_so() -> None:
+    session = Session(SMALL, swarm_dt, 3, [Fault("FM2", 6), Fault("FM1", 1)])
+    session.play(2.0)
+    session.select(7)
+    session.resize(5)
+    assert session.run.world.state.time == 0.0
+    assert session.run.world.state.n_robots == session.twin.world.state.n_robots == 5
+    assert session.seed == 3
+    assert session.selected is None
+    assert "began again" in session.note
+    assert "1 fault" in session.note
+    session.resize(0)
+    assert "n_robots = 0" in session.note
+    assert session.scenario.n_robots == 5
+    session.resize(6)
+    assert session.run.world.state.failed.sum() == 6
+
+
+def test_delivery_width_changes_at_once_in_both() -> None:
+    session = Session(SMALL, swarm_dt)
+    session.play(2.0)
+    session.set_delivery_width(3.0)
+    for play in (session.run, session.twin):
+        assert play.world.scenario.delivery_width == 3.0
+        assert play.world.state.time == pytest.approx(2.0)
+    session.set_delivery_width(5.0)
+    assert "leaves no storage" in session.note
+    assert session.scenario.delivery_width == session.twin.world.scenario.delivery_width == 3.0
+
+
+def test_next_seed_and_again() -> None:
+    session = Session(SMALL, swarm_dt, 0)
+    start = session.run.world.state.robot_position.copy()
+    session.play(1.0)
+    session.break_robot(0)
+    session.next_seed()
+    assert session.seed == 1
+    assert session.events == []
+    assert not np.array_equal(session.run.world.state.robot_position, start)
+    session.restart()
+    assert session.seed == 1
+    assert session.run.world.state.time == 0.0
+
+
+def test_robot_at_is_the_nearest_within_reach() -> None:
+    session = Session(SMALL, swarm_dt)
+    x, y = session.run.world.state.robot_position[4]
+    assert session.robot_at(x + 0.05, y, 0.2) == 4
+    assert session.robot_at(-3.0, -3.0, 0.2) is None
+    session.choose_mode("removed")
+    session.break_robot(4)
+    assert session.robot_at(x, y, 0.01) is None
+    assert session.robot_at(0.0, 0.0, 0.01) is None  # where absent robots' rows point
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
+        Session(SMALL, swarm_dt, speed=3.0)
+    with pytest.raises(FaultError, match="at most n_robots = 8"):
+        Session(SMALL, swarm_dt, 0, [Fault("FM1", 9)])
+    session = Session(SMALL, swarm_dt)
+    with pytest.raises(FaultError, match="did you mean 'FM4'"):
+        session.choose_mode("FM44")
+    for robot in (-1, 8):
+        with pytest.raises(SetupError, match=f"robot = {robot}"):
+            session.select(robot)
+
+
+class Wrong:
+    def reset(self, n_robots: int, seed: int) -> None:
+        pass
+
+    def act(self, observations: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        return np.zeros((1, 1))
+
+
+def test_policy_that_cannot_be_is_named() -> None:
+    with pytest.raises(PolicyError, match="Wrong at 0 s"):
+        Session(SMALL, Wrong).step()
+
+
+def test_every_key_does_something() -> None:
+    assert len({key.name for key in KEYS}) == len(KEYS)
+    for key in KEYS:
+        session = Session(SMALL, swarm_dt, 1, speed=1.0)
+        session.play(0.3)
+        session.select(2)
+        if key.name == "r":
+            session.break_robot()
+
+        def seen(session: Session = session) -> tuple[object, ...]:
+            return (
+                session.paused, session.speed, session.mode, session.seed, session.selected,
+                session.run.world.state.step, session.run.world.state.failed.any(),
+                session.scenario, session.note,
+            )  # fmt: skip
+
+        before = seen()
+        assert press(session, key.name) == (key.act is not None)
+        assert (seen() != before) == (key.act is not None), key.name
+    assert not press(Session(SMALL, swarm_dt), "F13")
+
+
+def test_observation_row_in_words() -> None:
+    scenario = SMALL.replace(message_size=2)
+    session = Session(scenario, swarm_dt)
+    session.play(3.0)
+    for robot in range(8):
+        row = session.run.sensed(robot)
+        words = dict(observation_words(row, scenario))
+        parts = observations.unflatten(row, scenario)
+        assert [name.partition(" [")[0] for name in words] == list(parts)
+        shown = [float(value) for value in words["range_walls [m]"].split()]
+        assert shown == pytest.approx(parts["range_walls"].tolist(), abs=0.0051)
+        n_items = int(parts["item_present"].sum())
+        assert words["item_present"] == f"{n_items} of 8"
+        assert len(words["item_x [m]"].replace("–", "").split()) == n_items
+        assert words["carrying"] == ("yes" if parts["carrying"][0] else "no")
+        assert "-0.00" not in " ".join(words.values())
