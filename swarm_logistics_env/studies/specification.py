@@ -23,6 +23,8 @@ from swarm_logistics_env.studies.policy_choice import PolicySource, policy_label
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 
 ScenarioFields = dict[str, Any]
+# More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
+MOST_SEEDS = 100_000
 Judged = Literal["S", "FT", "R", "A", "change"]
 
 
@@ -183,7 +185,7 @@ class Specification(_Part):
 
     name: str = "study"
     policies: Annotated[tuple[PolicySource, ...], Field(min_length=1)] = ("swarm-dt",)
-    seeds: PositiveInt = 20
+    seeds: Annotated[int, Field(ge=1, le=MOST_SEEDS)] = 20
     scenario: Annotated[Scenario, BeforeValidator(_scenario)] = Scenario()
     sizes: Annotated[tuple[Sizes, ...], BeforeValidator(_each(Sizes))] = ()
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
