@@ -108,7 +108,10 @@ class Worlds:
 
         Raises:
             CommandError: wrong shape or not finite.
+            SetupError: no episode was begun.
         """
+        if not any(self._n_robots):
+            raise SetupError("step before reset: call reset() first")
         given = np.asarray(commands)
         wanted = (self.n_rows, *self.command_space.shape)
         if given.shape != wanted or given.dtype.kind not in "fiub":

@@ -139,6 +139,8 @@ class IndicatorReward(Wrapper):
         # What can be known of the episodes to come is tried before any of them.
         for scenario in self.env.scenarios:
             self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
+        self.payments: dict[str, Payment] = {}
+        self._indicators: dict[str, EpisodeIndicator] = {}
         self._is_over = False
 
     def payments_of(self, condition: Condition) -> dict[str, Payment]:

@@ -309,6 +309,8 @@ def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) ->
 )
 def test_wrong_actions_are_refused_before_anything_happens(actions: Any) -> None:
     env = SwarmVecEnv(n_worlds=2, n_robots=3, seed=0, **SMALL)
+    with pytest.raises(SetupError, match="step before reset"):
+        env.step(np.zeros((6, 4)))
     env.reset()
     with pytest.raises(CommandError):
         env.step(actions)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_logistics_env import Fault, spi
 from swarm_logistics_env.env import SwarmLogisticsEnv
@@ -378,6 +379,16 @@ def test_a_copy_goes_on_as_the_original() -> None:
         if not env.agents:
             np.testing.assert_array_equal(env.reset_arrays(), other.reset_arrays())
     assert env.measured.conditions == other.measured.conditions
+
+
+def test_pettingzoos_own_tests_pass(conformance: ModuleType, make: Callable[..., Any]) -> None:
+    def rewarded() -> Any:
+        env = make("faults(sizes(changes))", 5)
+        return IndicatorReward(env, {"R": 1.0, "P": 0.1}, references=RunningMeans())
+
+    conformance.parallel_api_test(rewarded(), num_cycles=45)
+    conformance.parallel_seed_test(rewarded, num_cycles=20)
+    conformance.api_test(parallel_to_aec(rewarded()), num_cycles=25)
 
 
 @pytest.mark.parametrize("module", [conditions, indicator_reward, reference_performances])
