@@ -1,0 +1,57 @@
+"""The examples run, in small, and give what they are about."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env import FAILURE_MODES
+from swarm_logistics_env.studies import Study
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def main(name: str, **sizes: Any) -> Any:
+    return runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](**sizes)
+
+
+def test_evolution_moves_the_rates(capsys: pytest.CaptureFixture[str]) -> None:
+    found = main("evolve_arrays", generations=1, pairs=2, duration=40.0)
+    assert set(found) == {"taxis_gain", "drop_rate"}
+    assert "return on a new seed" in capsys.readouterr().out
+
+
+def test_ppo_learns_over_two_swarm_sizes(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("stable_baselines3", reason="needs the extra train")
+    delivered = main("ppo_swarm", total_timesteps=2_304, duration=10.0)
+    assert len(delivered) == 3
+
+
+def test_own_policy_is_judged_beside_swarm_dt(tmp_path: Path) -> None:
+    table = main("judge_my_policy", seeds=2, duration=20.0, out=tmp_path / "out")
+    assert sorted(set(table["policy"])) == ["Straight", "swarm-dt"]
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_own_failure_mode_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FAILURE_MODES, "hoarder", FAILURE_MODES["FM4"])  # gone again afterwards
+    estimates = main("failure_mode", seeds=2, n_robots=10, m=3, duration=60.0)
+    assert [estimate.indicator for estimate in estimates] == ["R", "FT"]
+
+
+def test_gate_judges_the_change(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main("regression_gate", seeds=2, duration=20.0, out=tmp_path) in (0, 1)
+    assert "change, no fault" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("study", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.name)
+def test_study_file_can_be_planned(study: Path) -> None:
+    assert list(Study.from_file(study).plan().runs())
+
+
+def test_examples_are_short() -> None:
+    for example in EXAMPLES.glob("*.py"):
+        assert len(example.read_text("utf-8").splitlines()) < 60, example.name
