@@ -121,10 +121,10 @@ def main() -> None:
     )
     table.add_column("VecEnv")
     for header in (
-        "step [us CPU]",
-        "step [us wall]",
-        "learn [us CPU]",
-        "learn [1/s]",
+        "step (us CPU)",
+        "step (us wall)",
+        "learn (us CPU)",
+        "learn (1/s)",
     ):
         table.add_column(header, justify="right")
     for name, measured in runs.items():
