@@ -87,7 +87,8 @@ def judge(
         num, den = _numerator(terms), reference
         test = paired_ratio(num, den, offset=offset, threshold=threshold, level=level)
         correlation = pairing_correlation(*list(samples.values())[:2])
-        if _skewed(num - (threshold - offset) * den):
+        # Where D has no spread there is nothing but rounding to be skewed.
+        if not test.degenerate and _skewed(num - (threshold - offset) * den):
             flags.append("skewed")
         if bootstrap is not None and n_seeds >= MIN_SEEDS:
             bootstrap_low, bootstrap_high = studentised_bootstrap(

@@ -202,6 +202,8 @@ def test_skewed_differences_are_flagged() -> None:
     lucky = np.where(np.arange(20) == 7, 39.0, p_o - 38)
     assert "skewed" not in spi.robustness(p_o, even, n=25, m=1).flags
     assert "skewed" in spi.robustness(p_o, lucky, n=25, m=1).flags
+    # Rounding alone is no skewness.
+    assert spi.robustness([60.1] * 20, [60.1] * 20, n=25, m=3).flags == ("degenerate",)
 
 
 counts = st.lists(st.integers(0, 60), min_size=2, max_size=8)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.analysis.bootstrap import bootstrap_check, bootstrap_verdict
 from swarm_logistics_env.studies.analysis.faulty_runs import anchoring_loads, fault_budgets
 from swarm_logistics_env.studies.analysis.paired import jackknife_interval
 from swarm_logistics_env.studies.analysis.policies import cell_contests, indicator_contests
@@ -251,3 +252,83 @@ def test_jackknife_of_a_mean_is_its_t_interval() -> None:
         return float(sample[seeds].mean())
 
     assert jackknife_interval(4, mean) == pytest.approx(spi.mean_interval(sample))
+
+
+def test_differences_of_policies_are_drawn_table_by_table() -> None:
+    figures = {f.name: f for f in figures_of(document(two_policies(8, 2.0)))}
+    sizes = figures["differences-Scalability"]
+    assert {row[:3] for row in sizes.rows} == {
+        ("P", "random-walk", "swarm-dt"),
+        ("S", "random-walk", "swarm-dt"),
+    }
+    at_10 = next(row for row in sizes.rows if row[0] == "P" and row[3] == "10")
+    assert at_10[4:] == pytest.approx(spi.mean_interval([20, 22, 24, 26] * 2))
+    faults = figures["differences-Fault-tolerance-and-robustness"]
+    assert {row[0] for row in faults.rows} == {"P", "FT", "R"}
+    assert {row[3] for row in faults.rows} == {"no fault", "removed 1", "FM1 1"}
+
+
+def test_ablation_is_drawn_with_its_threshold() -> None:
+    study = Study(seeds=4, ablations=[{"policy": "random-walk", "fall": 0.25}])
+    found = judged(
+        study,
+        lambda _, level, seed: Outcome(
+            "", np.arange(float((20 if level.name == "random-walk" else 40) + seed))
+        ),
+    )
+    (figure,) = figures_of(document(found))
+    assert figure.name == "change-Ablation"
+    ((_, _, indicator, label, value, *_),) = figure.rows
+    assert (indicator, label) == ("change", "random-walk, N = 25")
+    assert value == pytest.approx(21.5 / 41.5 - 1)
+
+
+def test_policies_that_differ_in_punctuation_have_files_of_their_own() -> None:
+    chosen = [{"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}, "label": "Swarm.DT"}]
+    study = Study(
+        policies=["swarm-dt", *chosen], seeds=1, faults=[{"modes": ["FM1"], "robots": [1]}]
+    )
+    found = judged(study, lambda *_: Outcome("", np.arange(30.0)))
+    names = [figure.name for figure in figures_of(document(found))]
+    assert len({name.lower() for name in names}) == len(names)
+    assert "FT-R-swarm-dt-Fault-tolerance-and-robustness" in names
+    assert "FT-R-Swarm-DT-Fault-tolerance-and-robustness-2" in names
+
+
+def test_no_law_is_fitted_to_a_flat_series() -> None:
+    study = Study(seeds=2, sizes=[{"values": [5, 10, 20, 40]}])
+    found = judged(study, lambda *_: Outcome("", np.arange(60.0)))
+    assert table(found, "Scaling laws") == []
+    assert "no law is fitted: P is 60.0 at every size" in markdown(document(found))
+
+
+def test_bootstrap_stands_beside_fieller_where_they_disagree() -> None:
+    # Two seeds in three gain nothing and none loses: the t-test sees a symmetric spread.
+    study = Study(seeds=12, sizes=[{"values": [5, 10]}])
+    p = {5: [10] * 12, 10: [10] * 8 + [12, 13, 14, 16]}
+    found = judged(
+        study, lambda _, level, seed: Outcome("", np.arange(float(p[int(level.value)][seed])))
+    )
+    check = bootstrap_check(found)
+    assert check.checked == 1
+    (judgement,) = found.judgements
+    estimate = judgement.estimate
+    assert estimate is not None
+    assert estimate.bootstrap_low is not None
+    assert estimate.bootstrap_high is not None
+    says = bootstrap_verdict(estimate)
+    assert (estimate.verdict, says) == ("inconclusive", "supported")
+    assert estimate.bootstrap_low > 0
+    assert check.differing == (judgement,)
+    ((policy, _, _, fieller, _, bootstrap),) = table(found, "Studentised bootstrap")
+    assert (policy, fieller, bootstrap) == ("swarm-dt", "inconclusive", "supported")
+    assert "The studentised bootstrap says otherwise" in markdown(document(found))
+
+
+def test_nine_seeds_have_no_bootstrap() -> None:
+    assert bootstrap_check(two_policies(9, 2.0)).checked == 0
+    agreed = bootstrap_check(two_policies(10, 2.0))
+    assert agreed.checked > 0
+    assert agreed.width is not None
+    least, median, most = agreed.width
+    assert least <= median <= most

@@ -105,7 +105,9 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
     needed = power["FT", "FM4, m = 3"].seeds_needed
     assert needed is not None
     assert needed < 10
-    assert "undefined: an effect of 0 lies at the threshold" in markdown(document(published))
+    text = markdown(document(published))
+    assert "undefined: an effect of 0 lies at the threshold" in text
+    assert "| undefined |" in text
 
 
 def test_holm_never_adds_a_verdict(published: Findings) -> None:

@@ -9,6 +9,8 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.reporting.document import document
+from swarm_logistics_env.studies.reporting.markdown import markdown
 
 FIELDS: dict[str, Any] = {
     "scenario": {
@@ -59,3 +61,18 @@ def test_looks_that_are_declared_late_change_nothing(tmp_path: Path) -> None:
     study = Study(out=tmp_path, seeds=3, looks=(3, 6), **FIELDS)
     study.run()
     assert study.findings().exploratory
+
+
+def test_report_tells_the_declared_looks_and_their_levels(tmp_path: Path) -> None:
+    study = Study(out=tmp_path, seeds=2, looks=(2, 4), **FIELDS)
+    study.run()
+    text = markdown(document(study.findings()))
+    first, last = spi.look_levels((2, 4))
+    assert f"| 1 of 2 | 2 | {first:.4f} | {100 * (1 - first):.4g} % | this report |" in text
+    assert f"| 2 of 2 | 4 | {last:.4f} | {100 * (1 - last):.4g} % | to come |" in text
+    assert f"| P [95 %] | one run [95 %] | S [{100 * (1 - first):.4g} %]" in text
+    assert "none of these looks" not in text
+    other = Study(out=tmp_path, seeds=3, looks=(2, 3), **FIELDS)
+    other.run()
+    told = markdown(document(other.findings()))
+    assert "3 seeds are none of these looks: every verdict is exploratory." in told

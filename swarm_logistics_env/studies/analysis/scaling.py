@@ -115,6 +115,8 @@ def _series(
     incomplete = [cell for cell, _ in cells if policy is not None and cell.problem]
     if incomplete:
         problem = f"{incomplete[0].arm.level}: {incomplete[0].problem}"
+    elif len({mean.value for mean in means}) == 1 < len(means):
+        problem = f"P is {means[0].value:.1f} at every size"
     else:
         try:
             for weighting in WEIGHTINGS:

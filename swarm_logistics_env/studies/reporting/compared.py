@@ -14,6 +14,7 @@ from swarm_logistics_env.studies.analysis.policies import (
 )
 from swarm_logistics_env.studies.judgement import Findings
 from swarm_logistics_env.studies.reporting import wording
+from swarm_logistics_env.studies.reporting.differences import difference_figures
 from swarm_logistics_env.studies.reporting.sections import Section
 
 _HOW_TO_READ = (
@@ -38,11 +39,14 @@ def compared(findings: Findings) -> Iterator[Section]:
         return
     yield _matrix(findings, policies)
     contests = tuple(indicator_contests(findings))
+    cells_by_table = cell_contests(findings)
+    for figure in difference_figures(findings, cells_by_table, contests):
+        yield Section("", figures=(figure,))
     level = wording.percent(findings.level)
     for table in dict.fromkeys(contest.table for contest in contests):
         here = [contest for contest in contests if contest.table == table]
         yield _indicators(table, here, policies, level)
-    for table, cells in cell_contests(findings).items():
+    for table, cells in cells_by_table.items():
         yield _cells(table, cells, policies[0])
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 from swarm_logistics_env.studies.analysis.scaling import size_series
 from swarm_logistics_env.studies.judgement import Findings
@@ -59,11 +59,33 @@ def document(findings: Findings) -> Document:
     ]
     if findings.reference:
         text.append(f'"paper" is {findings.reference.source}.')
-    return Document(
-        f"Study {plan.specification.name!r}",
-        tuple(text),
-        tuple(chapter for chapter in _chapters(findings) if chapter.sections),
-    )
+    chapters = (chapter for chapter in _chapters(findings) if chapter.sections)
+    return Document(f"Study {plan.specification.name!r}", tuple(text), tuple(_names_once(chapters)))
+
+
+def _names_once(chapters: Iterable[Chapter]) -> Iterator[Chapter]:
+    """Yield chapters whose figures have names of their own, upper and lower case being one.
+
+    Policies and tables that differ in punctuation alone give equal names.
+    """
+    taken: set[str] = set()
+
+    def named(figure: Figure) -> Figure:
+        name, number = figure.name, 1
+        while name.lower() in taken:
+            number += 1
+            name = f"{figure.name}-{number}"
+        taken.add(name.lower())
+        return replace(figure, name=name)
+
+    for chapter in chapters:
+        yield replace(
+            chapter,
+            sections=tuple(
+                replace(section, figures=tuple(named(figure) for figure in section.figures))
+                for section in chapter.sections
+            ),
+        )
 
 
 def figures_of(whole: Document) -> Iterator[Figure]:

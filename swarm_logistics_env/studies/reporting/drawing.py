@@ -45,10 +45,15 @@ class Point:
 
 @dataclass(frozen=True)
 class Series:
-    """Points of one label, drawn alike."""
+    """Points of one label, drawn alike.
+
+    Attributes:
+        style: place of its colour and marker; None: that of the series in its panel.
+    """
 
     label: str
     points: tuple[Point, ...]
+    style: int | None = None
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,8 @@ def _panel(axes: Axes, panel: Panel) -> None:
     spread = min(0.8, 0.24 * len(panel.series))
     for index, series in enumerate(panel.series):
         shift = spread * ((index + 0.5) / len(panel.series) - 0.5)
-        colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index % len(MARKERS)]
+        style = index if series.style is None else series.style
+        colour, marker = COLOURS[style % len(COLOURS)], MARKERS[style % len(MARKERS)]
         points = [(categories.index(p.category) + shift, p) for p in series.points]
         known = [(x, point, point.value) for x, point in points if point.value is not None]
         _bars(axes, [(x, p.low, p.high) for x, p, _ in known], (bottom, top), colour)
@@ -105,7 +111,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
     axes.set_xticks(range(len(categories)), categories)
     if len(categories) > 6:
         axes.tick_params(axis="x", labelsize=8.0)
-    if sum(map(len, categories)) > 75:
+    if sum(len(category) + 2 for category in categories) > 80:
         axes.tick_params(axis="x", rotation=40)
     axes.set_xlim(-0.6, len(categories) - 0.4)
     axes.set_ylim(bottom, top)

@@ -11,7 +11,7 @@ from swarm_logistics_env.studies.analysis.scaling import SizeSeries
 from swarm_logistics_env.studies.judgement import Findings, Judgement
 from swarm_logistics_env.studies.reporting import drawing
 from swarm_logistics_env.studies.reporting.drawing import Panel, Point, Series
-from swarm_logistics_env.studies.reporting.wording import decided, percent, seeds_text
+from swarm_logistics_env.studies.reporting.wording import decided, listed, percent, seeds_text
 
 _Key = TypeVar("_Key")
 Value = str | float | int | bool | None
@@ -47,10 +47,11 @@ def marks(findings: Findings) -> str:
 
 
 def indicator_figures(findings: Findings) -> Iterator[Figure]:
-    """Yield the paper's figures: S per step, FT and R per mode and m, A per parameter."""
+    """Yield S per step, FT and R per mode and m, A per parameter, and P without a part."""
     yield from _scalability(findings)
     yield from _faults(findings)
     yield from _adaptability(findings)
+    yield from _ablations(findings)
 
 
 def _scalability(findings: Findings) -> Iterator[Figure]:
@@ -74,6 +75,7 @@ def _scalability(findings: Findings) -> Iterator[Figure]:
 
 def _faults(findings: Findings) -> Iterator[Figure]:
     asked = [j for j in _thresholded(findings) if j.comparison.indicator in ("FT", "R")]
+    first = asked[0].comparison.policy if asked else ""
     keys = dict.fromkeys(
         (j.comparison.policy, j.comparison.table, j.comparison.changed.level.onset) for j in asked
     )
@@ -88,7 +90,7 @@ def _faults(findings: Findings) -> Iterator[Figure]:
         for indicator, label in (("FT", "fault tolerance FT"), ("R", "robustness R")):
             of_indicator = [j for j in here if j.comparison.indicator == indicator]
             series = [
-                Series(f"m = {m:g}", tuple(_points(js, lambda j: j.comparison.changed.level.name)))
+                Series(f"m = {m:g}", tuple(_points(js, _mode, published=policy == first)))
                 for m, js in _grouped(of_indicator, lambda j: j.comparison.changed.level.value)
             ]
             panels.append(Panel("", label, tuple(series), (0.0,), "failure mode"))
@@ -127,6 +129,27 @@ def _adaptability(findings: Findings) -> Iterator[Figure]:
     )
 
 
+def _ablations(findings: Findings) -> Iterator[Figure]:
+    asked = [j for j in findings.judgements if j.comparison.indicator == "change"]
+    for table in _tables(asked):
+        here = [j for j in asked if j.comparison.table == table]
+        series = [
+            Series(policy, tuple(_points(js, lambda j: j.comparison.label)))
+            for policy, js in _grouped(here, lambda j: j.comparison.policy)
+        ]
+        # 0 first: it is the threshold that always stands in the picture.
+        thresholds = {0.0: None, **{j.comparison.threshold: None for j in here}}
+        panel = Panel("", "change of P", tuple(series), tuple(thresholds), "in its place")
+        yield _intervals(
+            findings,
+            slug("change", table),
+            f"{_policies(here)}, {table}: relative change of P where another policy takes its "
+            "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share.",
+            here,
+            (panel,),
+        )
+
+
 def scaling_figure(findings: Findings, series: SizeSeries) -> Figure:
     """Return P(N) with the laws fitted to it under weights 1/P, and N* with its interval."""
     rows: list[tuple[Value, ...]] = [
@@ -139,6 +162,12 @@ def scaling_figure(findings: Findings, series: SizeSeries) -> Figure:
         rows += [(fit.law, n, p, None, None) for n, p in zip(grid, fit.predict(grid).tolist())]
         rows.append((f"N* of {fit.law}", fit.peak, None, fit.peak_low, fit.peak_high))
     who = series.policy or "published runs"
+    laws = (
+        "lines: scaling laws fitted with weights 1/P; bars at the foot: N* of each with its 95 % "
+        "interval, an arrow where it goes on"
+        if fits
+        else f"no scaling law fits: {series.problem}"
+    )
     seeds = (
         f"mean of {seeds_text(findings)}, bars: 95 % t-intervals"
         if series.policy
@@ -146,9 +175,8 @@ def scaling_figure(findings: Findings, series: SizeSeries) -> Figure:
     )
     return Figure(
         slug("P-N", series.policy or "published", series.table),
-        f"{who}, {series.table}: P against swarm size N ({seeds}); lines: scaling laws fitted with "
-        "weights 1/P; bars at the foot: N* of each with its 95 % interval, an arrow where it goes "
-        "on." + _saturation(any(series.saturated)),
+        f"{who}, {series.table}: P against swarm size N ({seeds}); {laws}."
+        + _saturation(any(series.saturated)),
         ("what", "N", "P", "low", "high"),
         tuple(rows),
         3.6,
@@ -238,12 +266,16 @@ def _step(judgement: Judgement) -> str:
     return f"{before.value:g}→{after.value:g}"
 
 
+def _mode(judgement: Judgement) -> str:
+    return judgement.comparison.changed.level.name
+
+
 def _tables(judgements: list[Judgement]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(judgement.comparison.table for judgement in judgements))
 
 
 def _policies(judgements: list[Judgement]) -> str:
-    return " and ".join(dict.fromkeys(judgement.comparison.policy for judgement in judgements))
+    return listed(list(dict.fromkeys(judgement.comparison.policy for judgement in judgements)))
 
 
 def _grouped(

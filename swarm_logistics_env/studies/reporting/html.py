@@ -28,10 +28,16 @@ def html(document: Document, drawings: Mapping[str, str]) -> str:
         keep_trailing_newline=True,
     )
     environment.filters["unbroken"] = _unbroken
+    environment.filters["arrows"] = _arrows
     template = environment.get_template("report.html.jinja")
     return template.render(document=document, drawings=drawings, marks=_MARKS)
 
 
 def _unbroken(text: str) -> str:
     """Return text whose numbers keep their units, and equations their two sides, on one line."""
-    return re.sub(r"(?<=\d) (?=%|s\b)| (?=[=<] )|(?<=[=<]) ", "\N{NO-BREAK SPACE}", text)
+    held = r"(?<=\d) (?=%|s\b)| (?=[=<→] )|(?<=[=<→]) "
+    return re.sub(held, "\N{NO-BREAK SPACE}", _arrows(text))
+
+
+def _arrows(text: str) -> str:
+    return text.replace("->", "→")

@@ -13,6 +13,7 @@ from swarm_logistics_env.studies.reporting.sentences import Sentence
 from swarm_logistics_env.studies.reproduction import Reproduction, reproductions
 
 NOTHING = wording.NOTHING
+_MOST_MISSES = 8  # more are no list that anybody reads
 _FLAGS = {
     "single_seed": "one seed gives a value, no interval and no verdict",
     "degenerate": "no spread between seeds, so the interval is the point",
@@ -165,6 +166,7 @@ def _claims(findings: Findings, policy: str) -> Iterator[Section]:
         f"Unadjusted: {wording.counted(plain)}.",
         f"Under Holm, family = all comparisons of one indicator: {wording.counted(adjusted)}.",
         'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
+        *(f"undefined: {reason}." for reason in dict.fromkeys(j.no_plan for j in claims) if reason),
     )
     yield Section(f"{policy}: claims", columns, tuple(rows), lines)
 
@@ -181,7 +183,7 @@ def _reproduction(figure: Reproduction) -> Section:
                 f"runs: {total - len(figure.misses)} of {total}."
             ),
             f"Mean width of those intervals: {figure.mean_interval_width:.1f} items.",
-            f"Misses: {', '.join(_miss(cell) for cell in figure.misses) or 'none'}.",
+            f"Misses: {_misses(figure.misses)}.",
         ]
     lines.append(f"Mean relative error of our mean P: {figure.mean_relative_error:.1%}.")
     pairs = [f"{a.arm.level} and {b.arm.level}" for a, b in figure.disorder]
@@ -190,6 +192,13 @@ def _reproduction(figure: Reproduction) -> Section:
         f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
     )
     return Section(f"{figure.policy}: reproduction", lines=tuple(lines))
+
+
+def _misses(cells: tuple[Cell, ...]) -> str:
+    told = [_miss(cell) for cell in cells[:_MOST_MISSES]]
+    if len(cells) > _MOST_MISSES:
+        told.append(f"and {len(cells) - _MOST_MISSES} more, in cells.csv")
+    return ", ".join(told) or "none"
 
 
 def _miss(cell: Cell) -> str:
@@ -218,10 +227,17 @@ def _warnings(findings: Findings) -> Iterator[str]:
                 f"{judgement.problem}."
             )
     for flag, meaning in _FLAGS.items():
-        flagged = [
-            f"{j.comparison.policy} {j.comparison.indicator}, {j.comparison.label}"
-            for j in findings.judgements
-            if j.estimate is not None and flag in j.estimate.flags
-        ]
+        flagged = [j for j in findings.judgements if j.estimate and flag in j.estimate.flags]
         if flagged:
-            yield f"{flag}: {meaning}: {'; '.join(dict.fromkeys(flagged))}."
+            yield f"{flag}: {meaning}: {'; '.join(_families(findings, flagged))}."
+
+
+def _families(findings: Findings, some: list[Judgement]) -> Iterator[str]:
+    """Name comparisons, those of one policy and indicator together."""
+    for family in dict.fromkeys(judgement.comparison.family for judgement in some):
+        policy, indicator = family
+        labels = {j.comparison.label: None for j in some if j.comparison.family == family}
+        whole = {j.comparison.label for j in findings.judgements if j.comparison.family == family}
+        all_of_them = len(labels) == len(whole) > 1
+        which = f"all {len(whole)}" if all_of_them else "; ".join(labels)
+        yield f"{policy}: {indicator} ({which})"

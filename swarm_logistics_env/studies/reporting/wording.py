@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 
 from swarm_logistics_env.spi.estimate import Verdict
 from swarm_logistics_env.spi.summaries import Interval
@@ -111,13 +112,19 @@ def power(judgement: Judgement) -> str:
     if judgement.published is None or judgement.estimate is None:
         return NOTHING
     if judgement.seeds_needed is None:
-        return f"undefined: {judgement.no_plan}"
+        return "undefined"
     return str(judgement.seeds_needed)
 
 
 def decided(judgement: Judgement) -> bool:
     """Return whether the Holm-adjusted verdict is either way."""
     return judgement.adjusted_verdict in ("supported", "refuted")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list, e.g. "swarm-dt, random-walk and central"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def seeds_text(findings: Findings) -> str:
