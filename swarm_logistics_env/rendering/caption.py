@@ -116,7 +116,7 @@ def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
         "shuffling": (robot(radius, SHUFFLING, 0, False), load),
         "delivering": (robot(radius, DELIVERING, 0, False), asked_for),
         "requested item": (item(0.9 * radius, True),),
-        "timer runs": (halo(0.6 * radius, 0), robot(0.6 * radius, SEARCHING, 0, False)),
+        "timer": (halo(0.6 * radius, 0), robot(0.6 * radius, SEARCHING, 0, False)),
     }.items():
         entries.append(_row([pictures, (words(name, text_height, INK),)], text_height // 4))
     return tuple(entries)

@@ -32,7 +32,7 @@ def draw_strip(
 
     Args:
         size: width and height [px].
-        curves: the first lies on top.
+        curves: the runs.
         duration: where the time axis ends [s].
     """
     width, height = size
@@ -73,7 +73,8 @@ def draw_strip(
         row = (row + 1) % 4 if x - last < sign.get_width() else 0
         last, y = x, plot.top + 2 + row * sign.get_height()
         canvas.blit(sign, sign.get_rect(midtop=(x, y)).clamp(plot))
-    for curve in reversed(curves):
+    # Thin over thick: where two runs are the same, both are seen.
+    for curve in sorted(curves, key=lambda curve: -RUNS[curve.style % len(RUNS)][1]):
         colour, thick = RUNS[curve.style % len(RUNS)]
         _draw_staircase(canvas, curve, place, colour, thick * max(1.0, text_height / 18))
     pygame.draw.rect(canvas, INK, plot.inflate(2, 2), 1)

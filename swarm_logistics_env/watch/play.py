@@ -18,6 +18,7 @@ class Play:
 
     Attributes:
         world: the warehouse; its scenario and faults may be changed between two steps.
+        seed: of the episode.
 
     Raises:
         FaultError, ScenarioError: as `Warehouse.reset`.
@@ -27,7 +28,7 @@ class Play:
         self, scenario: Scenario, policy: Policy, seed: int, faults: Sequence[Fault] = ()
     ) -> None:
         self.world = Warehouse(scenario)
-        self._policy = policy
+        self._policy, self.seed = policy, seed
         self._observations = self.world.reset(seed, faults)
         start(policy, scenario, seed)
 

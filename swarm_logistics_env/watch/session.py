@@ -215,7 +215,7 @@ class Session:
         self.note = f"swarm size {n_robots}: a swarm cannot grow in a run, so it began again"
         left_out = len(self._planned) - len(self.run.world.faults)
         if left_out:
-                self.note += f"; {left_out} faults befall more robots than there are: left out"
+            self.note += f"; {left_out} faults befall more robots than there are: left out"
 
     def set_delivery_width(self, width: float) -> None:
         """Make the delivery area that wide [m], in the run and in its twin, at once."""

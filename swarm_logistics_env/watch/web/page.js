@@ -292,7 +292,8 @@ function showStrip() {
     pen.fillText(text, x + 32, 12);
     x += 32 + pen.measureText(text).width + 28;
   }
-  for (const curve of [...view.curves].reverse()) {
+  // Thin over thick: where two runs are the same, both are seen.
+  for (const curve of [...view.curves].sort((a, b) => fixed.curves[b.style][1] - fixed.curves[a.style][1])) {
     const [colour, thickness] = fixed.curves[curve.style], steps = [at(0, 0)];
     curve.times.forEach((time, nth) => steps.push(at(time, nth), at(time, nth + 1)));
     steps.push(at(curve.until, curve.times.length));
@@ -372,7 +373,7 @@ function showLegend() {
     ["shuffling", (pen) => { body(pen, 11, 11, 7, 0, colours.SHUFFLING, false, colours); item(pen, 11, 11, 3, false, colours); }],
     ["delivering", (pen) => { body(pen, 11, 11, 7, 0, colours.DELIVERING, false, colours); item(pen, 11, 11, 3.5, true, colours); }],
     ["requested item", (pen) => item(pen, 11, 11, 6.5, true, colours)],
-    ["timer runs", (pen) => { halo(pen, 11, 11, 4.4, 0, colours.TIMER); body(pen, 11, 11, 4, 0, colours.SEARCHING, false, colours); }],
+    ["timer", (pen) => { halo(pen, 11, 11, 4.4, 0, colours.TIMER); body(pen, 11, 11, 4, 0, colours.SEARCHING, false, colours); }],
     ["failed, by mode", (pen) => badge(pen, 11, 11, 15, "4", colours)],
   ];
   for (const [name, draw] of entries) {

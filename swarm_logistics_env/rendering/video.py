@@ -1,0 +1,141 @@
+"""Pictures as a film: MP4 or GIF, by the ffmpeg that imageio-ffmpeg brings along."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import subprocess
+import tempfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import SetupError
+
+Frame = NDArray[np.uint8]  # (H, W, 3), both even
+SUFFIXES = (".mp4", ".gif")
+
+# Same frames, same bytes: no dates, no encoder's name.
+_EXACT = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"]
+_MP4 = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart", *_EXACT]
+_LOSSLESS = ["-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0"]
+_PALETTE = "palettegen=max_colors=64:stats_mode=diff"
+_GIF = "[0:v][1:v]paletteuse=dither=none:diff_mode=rectangle"
+
+
+def check_film(path: Path) -> None:
+    """Find out whether a film can be written there, before any of it is made.
+
+    Raises:
+        SetupError: no such kind of film, no such folder, or imageio-ffmpeg is not installed.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise SetupError(f"{path}: should end in {' or '.join(SUFFIXES)}")
+    if path.is_dir() or not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+        raise SetupError(f"{path}: should be a file in a folder that can be written to")
+    _ffmpeg()
+
+
+def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
+    """Write frames of one size as a film and return how many; nothing of it is left if it fails.
+
+    Args:
+        path: ends in .mp4 or .gif; what is there is replaced once the film is whole.
+        frame_rate: [1/s].
+
+    Raises:
+        SetupError: as `check_film`; there are no frames, or ffmpeg fails.
+    """
+    check_film(path)
+    with _becoming(path) as whole:
+        if path.suffix.lower() == ".mp4":
+            return _encode(frames, frame_rate, [*_MP4, str(whole)])
+        # A palette wants all frames first; a lossless film holds them, memory might not.
+        with tempfile.TemporaryDirectory() as folder:
+            film, palette = Path(folder, "film.mkv"), Path(folder, "palette.png")
+            count = _encode(frames, frame_rate, [*_LOSSLESS, str(film)])
+            _run(["-i", str(film), "-vf", _PALETTE, "-frames:v", "1", str(palette)])
+            _run(["-i", str(film), "-i", str(palette), "-lavfi", _GIF, *_EXACT, str(whole)])
+        return count
+
+
+@contextlib.contextmanager
+def _becoming(path: Path) -> Iterator[Path]:
+    """Give a path beside `path`, of the same kind; what is there in the end takes its place."""
+    part = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    try:
+        yield part
+        part.replace(path)
+    except OSError as error:
+        raise SetupError(f"{path}: cannot be written: {error.strerror}") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> int:
+    count = 0
+    process: subprocess.Popen[bytes] | None = None
+    with tempfile.TemporaryFile() as said:
+        try:
+            for frame in frames:
+                if process is None:
+                    height, width, _ = frame.shape
+                    pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+                    source = [*pixels, "-r", f"{frame_rate:g}", "-i", "-"]
+                    process = _start([*source, "-an", *output], said)
+                assert process.stdin is not None
+                process.stdin.write(frame.tobytes())
+                count += 1
+            if process is None:
+                raise SetupError("a film needs at least one frame")
+            process.communicate()
+        except BrokenPipeError:
+            assert process is not None
+            process.wait()
+        finally:
+            if process is not None and process.poll() is None:
+                process.kill()
+                process.communicate()
+        _check(process, said)
+    return count
+
+
+def _run(arguments: list[str]) -> None:
+    with tempfile.TemporaryFile() as said:
+        process = _start(arguments, said)
+        process.communicate()
+        _check(process, said)
+
+
+def _start(arguments: list[str], said: IO[bytes]) -> subprocess.Popen[bytes]:
+    command = [_ffmpeg(), "-y", "-hide_banner", "-loglevel", "error", *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said)
+
+
+def _check(process: subprocess.Popen[bytes], said: IO[bytes]) -> None:
+    if process.stdin is not None:
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.close()
+    if process.returncode != 0:
+        said.seek(0)
+        lines = said.read().decode(errors="replace").strip().splitlines()
+        reason = lines[-1] if lines else f"exit code {process.returncode}"
+        raise SetupError(f"ffmpeg cannot write the film: {reason}")
+
+
+def _ffmpeg() -> str:
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise SetupError(
+            f"a film needs imageio-ffmpeg ({error}): pip install swarm-logistics-env[render]"
+        ) from error
+    try:
+        program: str = imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise SetupError(f"a film needs ffmpeg: {error}") from error
+    return program
