@@ -7,7 +7,7 @@ import json
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BeforeValidator, Field, JsonValue, PlainSerializer
+from pydantic import BeforeValidator, Field, JsonValue, PlainSerializer, field_validator
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
@@ -29,6 +29,20 @@ class PolicyChoice(Record):
     name: str
     parameters: dict[str, JsonValue] = Field(default_factory=dict)
     label: str = ""
+
+    @field_validator("parameters")
+    @classmethod
+    def _policys_own(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
+        # These are `policies.load`'s: whether to trust code is not for a file to say.
+        for name in ("name", "trust_code"):
+            if name in parameters:
+                raise ValueError(f"{name!r} is no parameter of a policy")
+        return parameters
+
+
+def policy_name(source: object) -> str:
+    """Return what `policies.load` is asked for; of an object, the name of its class."""
+    return source.name if isinstance(source, PolicyChoice) else policy_label(source)
 
 
 def policy_label(source: object) -> str:

@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.studies.policy_choice import policy_name
 from swarm_logistics_env.studies.specification import Specification
 
 
@@ -47,7 +48,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise StudyError(f"{path}: {error}") from error
     named = [*specification.policies, *(ablation.policy for ablation in specification.ablations)]
-    for policy in named:
+    for policy in map(policy_name, named):
         if ":" in policy and not trust_code:
             raise StudyError(
                 f"{path}: policy {policy!r} is a class, and to load it runs code: should be a "

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import SwarmLogisticsError
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.merging import merge
 from swarm_logistics_env.studies.policy_choice import PolicyChoice, policy_of
@@ -88,6 +88,15 @@ def test_parameters_count_where_the_policy_does_not_tell_them() -> None:
     assert len(plan.conditions) == 4
 
 
+def test_file_may_not_name_code_by_way_of_parameters(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    policy = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
+    path.write_text(f"policies = [{policy}]\n[[sizes]]\nvalues = [2, 3]\n")
+    with pytest.raises(StudyError, match="is a class, and to load it runs code"):
+        Study.from_file(path)
+    assert Study.from_file(path, trust_code=True).plan().conditions
+
+
 def test_specification_survives_json_and_merging_has_each_policy_once(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(FILE)
@@ -107,6 +116,8 @@ def test_specification_survives_json_and_merging_has_each_policy_once(tmp_path: 
         ({"parameters": {"taxis_gain": 1}}, "PolicyChoice.name"),
         ({"name": "swarm-dt", "parameters": {"taxis_gian": 1.0}}, "did you mean 'taxis_gain'?"),
         ({"name": "swarm-dt", "parameters": {"taxis_gain": "x"}}, "taxis_gain = 'x'"),
+        ({"name": "swarm-dt", "parameters": {"trust_code": True}}, "'trust_code' is no parameter"),
+        ({"name": "swarm-dt", "parameters": {"name": "x"}}, "'name' is no parameter"),
         ({"name": "swarm-dt", "parameters": 3}, "PolicyChoice.parameters = 3"),
         ({"name": "swarm-td", "parameters": {"taxis_gain": 1.0}}, "did you mean 'swarm-dt'?"),
         (3, "a table of name and parameters"),
