@@ -33,20 +33,28 @@ autodoc_typehints = "none"  # the signatures hold them
 autodoc_preserve_defaults = True
 napoleon_numpy_docstring = False
 napoleon_use_rtype = False
+napoleon_use_ivar = True
+default_role = "code"  # docstrings mark code with single backticks
+toc_object_entries_show_parents = "hide"
+autodoc_mock_imports = ["stable_baselines3"]
 
 
 def setup(app: Sphinx) -> None:
     """Render formulas as MathML, which browsers draw themselves."""
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
-    app.connect("autodoc-process-docstring", escape_bars)
+    app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
 
 
 html_math_renderer = "mathml"
 
 
-def escape_bars(app: Any, what: Any, name: Any, obj: Any, options: Any, lines: list[str]) -> None:
-    """Keep |x|, which docstrings mean as absolute value, from being read as a substitution."""
+def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str]) -> None:
+    """Keep docstrings, which are plain text, from being read as more than they say."""
+    # |x| is an absolute value, no substitution.
     lines[:] = [line.replace("|", r"\|") for line in lines]
+    if what == "property":
+        # What stands before a colon is no type.
+        lines[0] = lines[0].replace(": ", ", ", 1)
 
 
 def inline(translator: Any, node: Any) -> None:
