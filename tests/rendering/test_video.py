@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.rendering import video
+
+Frame = NDArray[np.uint8]
+
+
+def frames(n: int = 6) -> Iterator[Frame]:
+    for nth in range(n):
+        frame = np.full((48, 64, 3), 255, np.uint8)
+        frame[8:40, 8 * nth : 8 * nth + 8] = (213, 94, 0)
+        yield frame
+
+
+def read(path: Path) -> Frame:
+    """The frames of a film: (T, 48, 64, 3)."""
+    command = [video._ffmpeg(), "-loglevel", "error", "-i", str(path)]
+    command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    return np.frombuffer(done.stdout, np.uint8).reshape(-1, 48, 64, 3)
+
+
+@pytest.mark.parametrize(("suffix", "tolerance"), [("mp4", 40), ("GIF", 4)])
+def test_film_holds_the_frames(suffix: str, tolerance: int, tmp_path: Path) -> None:
+    path = tmp_path / f"film.{suffix}"
+    path.write_text("what was there")
+    assert video.write_film(path, frames(), 10.0) == 6
+    shown = read(path).astype(int)
+    for nth, frame in enumerate(frames()):
+        # Where a colour meets another, half the resolution of MP4's colours smears it.
+        inner = slice(12, 36), slice(8 * nth + 2, 8 * nth + 6)
+        assert np.abs(shown[nth][inner] - frame[inner]).max() <= tolerance
+        assert np.abs(shown[nth][:, 56:] - 255).max() <= tolerance
+    assert len(shown) == 6
+    assert [item.name for item in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "gif"])
+def test_same_frames_same_bytes(suffix: str, tmp_path: Path) -> None:
+    paths = [tmp_path / f"{name}.{suffix}" for name in ("one", "two")]
+    for path in paths:
+        video.write_film(path, frames(), 10.0)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+class BrokenOffError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "gif"])
+def test_film_that_breaks_off_leaves_what_was_there(suffix: str, tmp_path: Path) -> None:
+    def stopping() -> Iterator[Frame]:
+        yield from frames(3)
+        raise BrokenOffError
+
+    path = tmp_path / f"film.{suffix}"
+    path.write_text("what was there")
+    with pytest.raises(BrokenOffError):
+        video.write_film(path, stopping(), 10.0)
+    assert path.read_text() == "what was there"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "gif"])
+def test_failing_ffmpeg_is_one_sentence(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"film.{suffix}"
+    odd = (np.zeros((5, 5, 3), np.uint8) for _ in range(2000))
+    if suffix == "mp4":  # whose halved colours want even sides
+        with pytest.raises(SetupError, match="ffmpeg cannot write the film: "):
+            video.write_film(path, odd, 10.0)
+    with pytest.raises(SetupError, match="at least one frame"):
+        video.write_film(path, iter(()), 10.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_written_is_refused_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "folder.mp4").mkdir()
+    for name, words in {
+        "film.avi": r"should end in \.mp4 or \.gif",
+        "film": "should end in",
+        "nowhere/film.mp4": "a folder that can be written to",
+        "folder.mp4": "should be a file",
+    }.items():
+        with pytest.raises(SetupError, match=words):
+            video.check_film(tmp_path / name)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(SetupError, match=r"pip install swarm-logistics-env\[render\]"):
+        video.check_film(tmp_path / "film.mp4")

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario, policies, run_episode
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.rendering.renderer import load_pygame
+from swarm_logistics_env.watch.play import Play
+
+load_pygame()
+
+from swarm_logistics_env.watch.film import Film, Take  # noqa: E402 - wants pygame
+
+SMALL = Scenario(n_robots=6, n_items=8, duration=12.0, warehouse_width=4, warehouse_height=4)
+
+
+def take(name: str = "a", faults: tuple[Fault, ...] = (), scenario: Scenario = SMALL) -> Take:
+    return Take(name, Play(scenario, policies.load("swarm-dt"), 3, faults))
+
+
+def test_frames_are_as_many_and_as_large_as_announced() -> None:
+    film = Film([take(), take("b")], until=10.0, speed=4.0, frame_rate=8.0, size=120)
+    frames = list(film.frames())
+    assert len(frames) == film.n_frames == 20 + 1 + 16
+    assert len({frame.shape for frame in frames}) == 1
+    assert all(side % 2 == 0 for side in frames[0].shape[:2])
+    assert frames[0].dtype == np.uint8
+    assert np.array_equal(frames[-1], frames[-16])
+    moved = [not np.array_equal(a, b) for a, b in itertools.pairwise(frames[:21])]
+    assert all(moved)
+
+
+def test_runs_go_on_one_clock_until_the_end() -> None:
+    takes = [take(), take("b", (Fault("FM4", 2, onset=5.0),))]
+    list(Film(takes, until=1e9, speed=3.0, frame_rate=7.0, size=100).frames())
+    for one, faults in zip(takes, ([], [Fault("FM4", 2, onset=5.0)])):
+        episode = run_episode(SMALL, policies.load("swarm-dt"), 3, faults)
+        assert one.play.is_over
+        assert one.play.world.state.delivery_times == episode.delivery_times.tolist()
+
+
+def test_same_runs_give_the_same_frames_and_faults_show() -> None:
+    def frames(*faults: Fault) -> list[bytes]:
+        film = Film([take("x", faults)], 3.0, 10.0, 10.0, 120, trails=True, all_links=True)
+        return [frame.tobytes() for frame in film.frames()]
+
+    assert frames() == frames()
+    assert frames(Fault("FM1", 1, onset=2.0)) != frames()
+
+
+def test_side_by_side_each_looks_as_it_does_alone() -> None:
+    both = Film([take("a"), take("b", (Fault("dead", 3),))], 1.0, 1.0, 1.0, 120)
+    alone = Film([take("b", (Fault("dead", 3),))], 1.0, 1.0, 1.0, 120)
+    *_, wide = both.frames()
+    *_, one = alone.frames()
+    tall = one.shape[0] - 2 * 18  # without the strip
+    assert wide.shape[1] == 2 * one.shape[1]
+    assert np.array_equal(wide[:tall, one.shape[1] :], one[:tall])
+
+
+def test_ends_when_everything_is_delivered() -> None:
+    scenario = SMALL.replace(n_items=1, duration=200.0)
+    one = take(scenario=scenario)
+    film = Film([one], 200.0, 20.0, 2.0, 100)
+    frames = list(film.frames())
+    assert one.play.world.all_delivered
+    assert len(frames) < film.n_frames
+
+
+@pytest.mark.parametrize(
+    ("n_takes", "until", "speed", "rate", "size", "words"),
+    [
+        (0, 5.0, 1.0, 10.0, 200, "0 runs: should be 1 to 4"),
+        (5, 5.0, 1.0, 10.0, 200, "5 runs"),
+        (1, 0.0, 1.0, 10.0, 200, "until = 0 s"),
+        (1, float("nan"), 1.0, 10.0, 200, "until = nan"),
+        (1, 5.0, 0.0, 10.0, 200, "speed = 0"),
+        (1, 5.0, 1.0, 100.0, 200, "frame rate = 100"),
+        (1, 5.0, 1.0, 10.0, 20, "size = 20"),
+    ],
+)
+def test_wrong_arguments(
+    n_takes: int, until: float, speed: float, rate: float, size: int, words: str
+) -> None:
+    with pytest.raises(SetupError, match=words):
+        Film([take()] * n_takes, until, speed, rate, size)
