@@ -72,7 +72,7 @@ def main() -> None:
         returns = advantage + flat["value"]
 
         for _epoch in range(EPOCHS):
-            for chosen in torch.randperm(len(advantage)).split(BATCH):
+            for chosen in torch.split(torch.randperm(len(advantage)), BATCH):
                 policy = distribution(flat["observation"][chosen])
                 new = policy.log_prob(flat["action"][chosen]).sum(-1)
                 ratio = (new - flat["log_probability"][chosen]).exp()
