@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -173,9 +174,11 @@ def test_study_run_prints_and_writes_the_report(tmp_path: Path) -> None:
         "Cells whose published P lies inside",
         "Mean relative error",
         "blocked",
-        "episodes/s",
     ):
         assert words in done.stdout
+    *_, last = done.stdout.splitlines()
+    told = r"68 runs played in [\d.]+ s by 1 process, [\d.]+ episodes/s; 0 were kept from before; "
+    assert re.fullmatch(told + "0 failed", last)
     report = (out / "report.md").read_text()
     assert "episodes/s" not in report
     assert "| duration | 0.5 (default 500) |" in report
@@ -232,9 +235,10 @@ def test_ctrl_c_stops_and_says_how_to_go_on(tmp_path: Path) -> None:
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130
     assert 0 < stored(out) < 68
-    assert errors.strip().splitlines() == [
-        f"Stopped. Every finished run is kept in {out}; the same command goes on."
-    ]
+    assert errors.strip() == (
+        f"Stopped. {stored(out)} of 68 runs are finished and kept in {out}; the same command goes "
+        f"on with the other {68 - stored(out)}."
+    )
 
 
 def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from swarm_logistics_env.studies.plan import Plan
     from swarm_logistics_env.studies.reporting.sections import Section
     from swarm_logistics_env.studies.shards import Shard
+    from swarm_logistics_env.studies.study import Tally
 
 StudyArgument = Annotated[
     str, typer.Argument(metavar="FILE|PRESET", help="TOML file of a study, or a preset's name.")
@@ -82,18 +83,17 @@ def run_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Play the runs that are missing, then print and write the report."""
+    import os
+
     from swarm_logistics_env.studies.engines import engine_named
     from swarm_logistics_env.studies.shards import Shard
 
     part = Shard.parse(shard) if shard else None
     chosen = study_of(asked, out / part.directory if part else out, seeds, policies, trust_code)
-    player = engine_named(
-        engine or ("ray" if address else "local" if processes == 1 else "process"),
-        processes,
-        address,
-    )
-    typer.echo(chosen.plan())
-    failed = _run(chosen, player, part)
+    engine = engine or ("ray" if address else "local" if processes == 1 else "process")
+    player = engine_named(engine, processes, address)
+    typer.echo(f"{chosen.plan()}\n")
+    tally = _run(chosen, player, part)
     if part is None:
         _show(chosen)
     else:
@@ -101,7 +101,12 @@ def run_command(
             f"When all {part.count} shards are done: swarm-logistics study merge "
             f"{out}/shard-*-of-{part.count} --out {out}"
         )
-    raise typer.Exit(1 if failed else 0)
+    players = {"local": "1 process", "ray": "Ray"}.get(
+        engine, f"{processes or os.cpu_count() or 1} processes"
+    )
+    # The last line: where it is looked for after a report of many pages.
+    typer.echo(_told(tally, players))
+    raise typer.Exit(1 if tally.failed else 0)
 
 
 @study.command("report")
@@ -201,28 +206,40 @@ def _conditions(plan: Plan) -> Section:
     return Section("Conditions", ("policy", "N", "stands in"), tuple(rows))
 
 
-def _run(asked: Study, engine: Engine, shard: Shard | None) -> int:
-    """Run a study, tell how it went, and return how many runs failed."""
+def _run(asked: Study, engine: Engine, shard: Shard | None) -> Tally:
+    """Run a study; Ctrl-C ends the command and says how to go on."""
     try:
-        tally = asked.run(engine, shard=shard)
+        return asked.run(engine, shard=shard)
     except KeyboardInterrupt:
+        done, total = asked.finished(shard)
         typer.echo(
-            f"\nStopped. Every finished run is kept in {asked.out}; the same command goes on.",
+            f"\nStopped. {done} of {total} runs are finished and kept in {asked.out}; the same "
+            f"command goes on with the other {total - done}.",
             err=True,
         )
         raise typer.Exit(130) from None
+
+
+def _told(tally: Tally, players: str) -> str:
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
-    typer.echo(
-        f"{tally.played} runs played in {tally.seconds:.1f} s{rate}; {tally.kept} were kept from "
-        f"before; {tally.failed} failed\n"
+    return (
+        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
+        f"were kept from before; {tally.failed} failed"
     )
-    return tally.failed
 
 
 def _show(asked: Study) -> None:
+    from dataclasses import replace
+
     from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.studies.reporting.beyond_faults import beyond_faults
+    from swarm_logistics_env.studies.reporting.images import how_to_get_figures, missing_packages
     from swarm_logistics_env.studies.reporting.sections import sections
 
-    for section in sections(asked.findings()):
-        show(section)
+    findings = asked.findings()
+    for section in (*sections(findings), *beyond_faults(findings)):
+        if section.columns or section.lines:  # else it is a figure
+            show(replace(section, figures=()))
     typer.echo(f"Written: {', '.join(str(path) for path in asked.report())}")
+    if missing := missing_packages():
+        typer.echo(how_to_get_figures(missing))

@@ -178,11 +178,25 @@ class Study:
             kept = len(whole) - len(runs)
             finished = engine(runs)
             # Closed at once where this stops early, so that no worker outlives it.
-            with closing(finished), Progress(len(runs), self.specification.name) as progress:
+            with closing(finished), Progress(runs, self.specification.name) as progress:
                 for run, outcome in finished:
                     store.add(run, outcome)
-                    progress.advance(outcome)
-                return Tally(progress.done, progress.failed, kept, progress.seconds)
+                    progress.advance(run, outcome)
+                return Tally(progress.done.total(), progress.failed, kept, progress.seconds)
+
+    def finished(self, shard: Shard | None = None) -> tuple[int, int]:
+        """Return how many runs have succeeded, and of how many.
+
+        Args:
+            shard: of which part; None: of all.
+        """
+        plan = self.plan()
+        asked = {run.key for run in (shard.of(plan.runs()) if shard else plan.runs())}
+        try:
+            with self._store(existing=True) as store:
+                return len(asked & store.succeeded()), len(asked)
+        except StudyError:  # nothing has been run
+            return 0, len(asked)
 
     def findings(self) -> Findings:
         """Return every cell and every verdict, from the runs that are there.
