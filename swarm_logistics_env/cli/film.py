@@ -8,8 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_logistics_env.cli.app import app
-from swarm_logistics_env.cli.options import PresetOption, SetOption, fault_of, scenario_of
-from swarm_logistics_env.cli.watch import FaultOption
+from swarm_logistics_env.cli.options import (
+    FaultOption,
+    PresetOption,
+    SetOption,
+    TrustPolicyOption,
+    fault_of,
+    scenario_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,9 +23,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from swarm_logistics_env.scenario import Scenario
     from swarm_logistics_env.warehouse.faults import Fault
-    from swarm_logistics_env.watch.film import Film, Take
+    from swarm_logistics_env.watch.film import Film
 
 
 @app.command("film")
@@ -49,8 +54,10 @@ def film_command(
     links: Annotated[
         bool, typer.Option("--links", help="Whom each robot follows, not the carrier alone.")
     ] = False,
+    trust_code: TrustPolicyOption = False,
 ) -> None:
     """Write an episode as a film; several policies, or with and without faults, side by side."""
+    from swarm_logistics_env import policies as known
     from swarm_logistics_env.errors import SetupError
     from swarm_logistics_env.rendering.renderer import load_pygame
     from swarm_logistics_env.rendering.video import check_film, write_film
@@ -61,10 +68,17 @@ def film_command(
         raise SetupError("--twin: is the run without its faults, so --fault should be given")
     check_film(out)
     load_pygame()
-    from swarm_logistics_env.watch.film import Film
+    from swarm_logistics_env.watch.film import Film, Take
+    from swarm_logistics_env.watch.play import Play
 
+    takes = []
+    for name in policies or ["swarm-dt"]:
+        for these in ([], befalling) if twin else (befalling,):
+            policy = known.load(name, trust_code=trust_code)
+            title = _title(name, these, bool(befalling))
+            takes.append(Take(title, Play(scenario, policy, seed, these)))
     film = Film(
-        _takes(policies or ["swarm-dt"], scenario, seed, befalling, twin),
+        takes,
         scenario.duration if until is None else until,
         speed,
         frame_rate,
@@ -78,22 +92,11 @@ def film_command(
     )
 
 
-def _takes(
-    names: list[str], scenario: Scenario, seed: int, faults: list[Fault], twin: bool
-) -> list[Take]:
-    from swarm_logistics_env import policies
-    from swarm_logistics_env.watch.film import Take
-    from swarm_logistics_env.watch.play import Play
-
-    takes = []
-    for name in names:
-        # Of a policy of one's own the end of its path says enough.
-        short = name if len(name) <= 24 else f"…{name[-23:]}"
-        for befalling in ([], faults) if twin else (faults,):
-            what = ", ".join(f"{fault.mode} × {_count(fault)}" for fault in befalling) or "no fault"
-            title = f"{short}, {what}" if faults else short
-            takes.append(Take(title, Play(scenario, policies.load(name), seed, befalling)))
-    return takes
+def _title(policy: str, faults: list[Fault], tells_faults: bool) -> str:
+    # Of a policy of one's own the end of its path says enough.
+    short = policy if len(policy) <= 24 else f"…{policy[-23:]}"
+    what = ", ".join(f"{fault.mode} × {_count(fault)}" for fault in faults) or "no fault"
+    return f"{short}, {what}" if tells_faults else short
 
 
 def _count(fault: Fault) -> int:

@@ -19,6 +19,13 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
 ]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
+]
+TrustPolicyOption = Annotated[
+    bool, typer.Option("--trust-code", help="Read a .zip policy: executes the code in it.")
+]
 
 _FAULT = re.compile(r"(?P<mode>\w+)(:(?P<robots>\d+))?(@(?P<onset>[\d.]+))?")
 

@@ -7,12 +7,14 @@ from typing import Annotated
 import typer
 
 from swarm_logistics_env.cli.app import app
-from swarm_logistics_env.cli.options import PresetOption, SetOption, fault_of, scenario_of
-
-FaultOption = Annotated[
-    list[str] | None,
-    typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
-]
+from swarm_logistics_env.cli.options import (
+    FaultOption,
+    PresetOption,
+    SetOption,
+    TrustPolicyOption,
+    fault_of,
+    scenario_of,
+)
 
 
 @app.command("watch")
@@ -31,6 +33,7 @@ def watch_command(
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Of --web, on this machine only; 0: any free.")
     ] = 8765,
+    trust_code: TrustPolicyOption = False,
 ) -> None:
     """Watch a run beside its fault-free twin; click robots to inspect, break and repair them."""
     from swarm_logistics_env import policies
@@ -38,7 +41,7 @@ def watch_command(
 
     session = Session(
         scenario_of(preset, changes),
-        lambda: policies.load(policy),
+        lambda: policies.load(policy, trust_code=trust_code),
         seed,
         [fault_of(text) for text in faults or []],
         speed,

@@ -51,6 +51,29 @@ MARKS = {
     "dead": "X",
 }
 
+# Where edges of one colour on another are smooth, and in how many steps.
+_EDGES = (
+    (FLOOR, TIMER, 8), (DELIVERY_AREA, TIMER, 6), (DELIVERY_AREA, DELIVERY_HATCH, 3),
+    (FLOOR, INK, 6), (INK, SEARCHING, 3),
+    (INK, SHUFFLING, 3), (INK, DELIVERING, 3), (INK, REQUESTED, 2), (FLOOR, REQUESTED, 3),
+    (FLOOR, SHUFFLING, 2), (FLOOR, LINK, 3), (DELIVERY_AREA, LINK, 2), (FLOOR, BEAM, 2),
+)  # fmt: skip
+
+
+def film_colours() -> list[RGB]:
+    """Return the colours of pictures that may have only a few: under 128, each once."""
+    plain = [
+        INK, SURROUNDINGS, FLOOR, FLOOR_LINE, DELIVERY_AREA, DELIVERY_HATCH, DELIVERY_WORD,
+        OBSTACLE, SEARCHING, SHUFFLING, DELIVERING, TIMER, REQUESTED, LINK, BEAM, ITEM,
+        ITEM_EDGE, TRAIL,
+    ]  # fmt: skip
+    smooth = [
+        mixed(one, other, (step + 1) / (steps + 1))
+        for one, other, steps in _EDGES
+        for step in range(steps)
+    ]
+    return list(dict.fromkeys([*plain, *smooth]))
+
 
 def mark(modes: tuple[str, ...]) -> str:
     """Return what a robot wears that fails in these modes, `1+V`; an unknown mode, its name."""

@@ -76,6 +76,11 @@ class Picture:
     def trails(self, wanted: bool) -> None:
         self._trails = Trails() if wanted else None
 
+    def note(self, state: WarehouseState) -> None:
+        """Let trails lead through a state that is not drawn."""
+        if self._trails is not None:
+            self._trails.note(state)
+
     def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
         """Return the picture of `state`, which stays as it is until the next call."""
         if self._shape != _shape(scenario):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.rendering.palette import film_colours
 
 Frame = NDArray[np.uint8]  # (H, W, 3), both even
 SUFFIXES = (".mp4", ".gif")
@@ -22,9 +23,9 @@ SUFFIXES = (".mp4", ".gif")
 # Same frames, same bytes: no dates, no encoder's name.
 _EXACT = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"]
 _MP4 = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart", *_EXACT]
-_LOSSLESS = ["-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0"]
-_PALETTE = "palettegen=max_colors=64:stats_mode=diff"
-_GIF = "[0:v][1:v]paletteuse=dither=none:diff_mode=rectangle"
+# Between two frames only the rectangle that changed is stored.
+_GIF = ["-lavfi", "[0:v][1:v]paletteuse=dither=none:diff_mode=rectangle", *_EXACT]
+_PALETTE_SIDE = 16  # px, as ffmpeg wants palettes
 
 
 def check_film(path: Path) -> None:
@@ -54,13 +55,20 @@ def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
     with _becoming(path) as whole:
         if path.suffix.lower() == ".mp4":
             return _encode(frames, frame_rate, [*_MP4, str(whole)])
-        # A palette wants all frames first; a lossless film holds them, memory might not.
         with tempfile.TemporaryDirectory() as folder:
-            film, palette = Path(folder, "film.mkv"), Path(folder, "palette.png")
-            count = _encode(frames, frame_rate, [*_LOSSLESS, str(film)])
-            _run(["-i", str(film), "-vf", _PALETTE, "-frames:v", "1", str(palette)])
-            _run(["-i", str(film), "-i", str(palette), "-lavfi", _GIF, *_EXACT, str(whole)])
-        return count
+            palette = Path(folder, "palette")
+            palette.write_bytes(_palette())
+            side = f"{_PALETTE_SIDE}x{_PALETTE_SIDE}"
+            source = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", side, "-i", str(palette)]
+            return _encode(frames, frame_rate, [*source, *_GIF, str(whole)])
+
+
+def _palette() -> bytes:
+    colours = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
+    known = film_colours()
+    colours[: len(known), :3], colours[: len(known), 3] = known, 255
+    # The rest is one transparent colour: what did not change.
+    return colours.tobytes()
 
 
 @contextlib.contextmanager
@@ -86,7 +94,7 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
                     height, width, _ = frame.shape
                     pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
                     source = [*pixels, "-r", f"{frame_rate:g}", "-i", "-"]
-                    process = _start([*source, "-an", *output], said)
+                    process = _start([*source, *output], said)
                 assert process.stdin is not None
                 process.stdin.write(frame.tobytes())
                 count += 1
@@ -102,13 +110,6 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
                 process.communicate()
         _check(process, said)
     return count
-
-
-def _run(arguments: list[str]) -> None:
-    with tempfile.TemporaryFile() as said:
-        process = _start(arguments, said)
-        process.communicate()
-        _check(process, said)
 
 
 def _start(arguments: list[str], said: IO[bytes]) -> subprocess.Popen[bytes]:

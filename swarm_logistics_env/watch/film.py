@@ -103,10 +103,11 @@ class Film:
         while time < self._until and not all(take.play.is_over for take in self._takes):
             count += 1
             time = min(count * self._period, self._until)
-            for take in self._takes:
+            for take, picture in zip(self._takes, self._pictures, strict=True):
                 world = take.play.world
                 while not take.play.is_over and world.state.time < time - 5e-7:
                     take.play.step()
+                    picture.note(world.state)
             frame = self._draw()
             yield frame
         for _ in range(self._n_last):

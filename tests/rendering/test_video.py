@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering import video
+from swarm_logistics_env.rendering.palette import film_colours
 
 Frame = NDArray[np.uint8]
 
@@ -98,3 +99,12 @@ def test_what_cannot_be_written_is_refused_first(
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(SetupError, match=r"pip install swarm-logistics-env\[render\]"):
         video.check_film(tmp_path / "film.mp4")
+
+
+def test_gif_keeps_the_colours_of_pictures_exactly(tmp_path: Path) -> None:
+    colours = film_colours()
+    assert len(set(colours)) == len(colours) < 128
+    frame = np.full((48, 64, 3), 30, np.uint8)
+    frame.reshape(-1, 3)[: 24 * len(colours)] = np.repeat(colours, 24, axis=0)
+    video.write_film(tmp_path / "film.gif", [frame, frame[::-1]], 10.0)
+    assert np.abs(read(tmp_path / "film.gif")[0].astype(int) - frame).max() <= 2
