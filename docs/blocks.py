@@ -30,7 +30,7 @@ LANGUAGES = {"python", "toml", "console", "text", "sh"}
 _BLOCK = re.compile(r"^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"# (\w+\.(?:py|toml))\n")
 # Lines about the machine rather than the result.
-_WALL_TIME = re.compile(r"times real time|runs played|On one process|Wrote .* in ")
+_WALL_TIME = re.compile(r"times real time|runs played|On one process| MB$")
 
 
 @dataclass(frozen=True)
