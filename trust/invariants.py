@@ -15,6 +15,7 @@ from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STOR
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
 JAM = 1.0  # [s] of overlap without a break make a jam
+_TOUCH = 0.01  # [m]
 SLACK = 0.002  # [m]: the solver's slop and its push-out
 
 
@@ -41,7 +42,7 @@ class Watch:
         self._modes: tuple[tuple[str, ...], ...] = ()
         self._before: dict[str, NDArray[Any]] = {}
         self._jammed = np.zeros((0, 0))
-        self._is_above_items = True
+        self._were_shoved = self._pushed = np.zeros(world.state.n_robots, np.bool_)
 
     def look(self) -> None:
         """Check everything."""
@@ -82,8 +83,10 @@ class Watch:
         times = np.array(state.delivery_times)
         self._demand(bool((np.diff(times) >= 0.0).all()), "delivery times fall")
         far = np.array([scenario.warehouse_width, scenario.warehouse_height])
-        here = state.item_position[state.item_status != DELIVERED]
-        self._demand(bool(((here >= 0.0) & (here <= far)).all()), "an item lies outside")
+        # As far out as a robot that was shoved may have put it down.
+        out = scenario.item_radius + 2.0 * scenario.max_speed * scenario.physics_period
+        here = state.item_position[state.item_status == STORED]
+        self._demand(bool(((here > -out) & (here < far + out)).all()), "an item lies outside")
 
     def _bodies(self) -> None:
         scenario, state = self.world.scenario, self.world.state
@@ -96,39 +99,53 @@ class Watch:
         to_solids -= radius + scenario.obstacle_radius
         far = np.array([scenario.warehouse_width, scenario.warehouse_height])
         to_walls = np.hstack([at, far - at]) - radius
-        depth = -np.hstack([np.where(off, np.inf, gaps), to_solids, to_walls])
+        depth = np.hstack([np.where(off, -np.inf, -gaps), -to_solids, -to_walls])
         depth[~here] = -np.inf
-        # The speed of the last step is that before or after a change. A laden robot that stands
-        # above an item is pushed off it, into whoever is there.
-        speed = max(self._speed, scenario.max_speed)
-        closing = 2.0 * speed * scenario.physics_period
-        if self._is_above_items:
-            closing += 1.5 * scenario.physics_period
-        deepest = float(depth.max(initial=-np.inf))
+        # The speed of the last step is that before or after a change.
+        closing = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period
+        free = ~self._shoved(depth)
+        deepest = float(depth[free].max(initial=-np.inf))
         self._demand(
             deepest <= closing + SLACK,
             f"bodies overlap by {deepest:.4f} m: should be at most {closing:.4f} m, what they "
             "close in one substep",
         )
-        inside = at[here]
-        self._demand(bool(((inside > 0.0) & (inside < far)).all()), "a robot is outside")
+        shoved = float(depth[~free].max(initial=-np.inf))
+        most = closing + radius + scenario.item_radius
+        self._demand(shoved <= most, f"an item shoves bodies {shoved:.4f} m into each other")
+        outside = np.maximum(-at, at - far).max(axis=1)[here]
+        self._demand(
+            bool((outside < np.where(free, 0.0, most - radius)[here]).all()), "a robot is out"
+        )
         self.deepest = max(self.deepest, deepest)
         # For how long each pair is deeper than it may be in a jam.
         if self._jammed.shape != depth.shape:
             self._jammed = np.zeros(depth.shape)
-        self._jammed = np.where(depth > SUSTAINED, self._jammed + scenario.control_period, 0.0)
-        lasting = depth[self._jammed > JAM]
-        self.deepest_jam = max(self.deepest_jam, float(lasting.max(initial=0.0)))
+        deep = (depth > SUSTAINED) & free[:, None]
+        self._jammed = np.where(deep, self._jammed + scenario.control_period, 0.0)
+        lasting = float(depth[self._jammed > JAM].max(initial=0.0))
         self._demand(
-            not len(lasting),
-            f"bodies have overlapped by more than {SUSTAINED} m for {JAM} s, now by "
-            f"{float(lasting.max(initial=0.0)):.4f} m",
+            lasting == 0.0,
+            f"bodies overlap by more than {SUSTAINED} m for {JAM} s, now by {lasting:.4f} m",
         )
-        # Noted for the next step.
-        free = state.item_position[state.item_status == STORED]
-        laden = at[here & (state.robot_item != NOBODY)]
-        away = np.linalg.norm(laden[:, None] - free[None], axis=2)
-        self._is_above_items = bool((away < radius + scenario.item_radius).any())
+
+    def _shoved(self, depth: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which robots an item may push into others, (N,): no room, no way to be solid.
+
+        A robot that takes an item while it stands above another is pushed off that one, and with
+        it those that it touches, and those that they touch.
+        """
+        scenario, state = self.world.scenario, self.world.state
+        stored = state.item_position[state.item_status == STORED]
+        away = np.linalg.norm(state.robot_position[:, None] - stored[None], axis=2)
+        above = (away < scenario.robot_radius + scenario.item_radius - SLACK).any(axis=1)
+        above &= state.robot_item != NOBODY
+        touching = depth[:, : len(above)] > -2.0 * _TOUCH
+        self._pushed = _reached(self._were_shoved, touching)
+        shoved = _reached(above | self._were_shoved, touching)
+        # Out of each other it goes slowly, whether or not the item is still there.
+        self._were_shoved = above | (shoved & (depth > SLACK).any(axis=1))
+        return shoved
 
     def _laden_and_items(self) -> None:
         """A laden robot enters no item that it was not above when it took its own."""
@@ -136,6 +153,7 @@ class Watch:
         if not before:
             return
         laden = (state.robot_item != NOBODY) & (state.robot_item == before["robot_item"])
+        laden &= ~self._pushed
         free = (state.item_status == STORED) & (before["item_status"] == STORED)
         free &= (state.item_position == before["item_position"]).all(axis=1)
         radii = scenario.robot_radius + scenario.item_radius
@@ -226,3 +244,10 @@ class Watch:
         asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
         flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
         self._demand(bool((flags.sum(axis=1) <= 1).all()), "a robot sees two requested items")
+
+
+def _reached(first: NDArray[np.bool_], touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the robots that touch one of `first`, or one that does, and so on."""
+    while not ((wider := first | touching[first].any(axis=0)) == first).all():
+        first = wider
+    return first

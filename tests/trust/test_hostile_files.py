@@ -66,6 +66,7 @@ SPICES = [
     "{" * 500, "[" * 5000,
 ]  # fmt: skip
 examples = settings(max_examples=max(40, settings().max_examples // 3))
+store_examples = settings(max_examples=max(25, settings().max_examples // 8))
 
 
 def mangled(source: random.Random, content: bytes) -> bytes:
@@ -246,7 +247,7 @@ ALLOWED = {"rows.csv", "merged", *(f"{FILE_NAME}{end}" for end in ("", "-wal", "
 
 
 @given(source=st.randoms(use_true_random=False))
-@examples
+@store_examples
 def test_any_store_is_read_or_refused(whole: Whole, source: random.Random) -> None:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
@@ -269,7 +270,7 @@ VALUES = [None, "x", "{", "[1, 2", -1, 1e300, b"\x01", b"\xff" * 16, "[]", "null
         max_size=2,
     )
 )
-@examples
+@store_examples
 def test_a_store_of_wrong_contents_is_read_or_refused(
     whole: Whole, changes: list[tuple[str, Any, int]]
 ) -> None:
@@ -291,7 +292,7 @@ def test_a_store_of_wrong_contents_is_read_or_refused(
     value=st.sampled_from(["", "x", "null", "{}", "[]", "-1", '{"a": 1}', "[[1]]", "1e9", b"\xff"])
     | st.none(),
 )
-@examples
+@store_examples
 def test_a_store_of_wrong_notes_is_read_or_refused(
     whole: Whole, name: str, value: str | bytes | None
 ) -> None:
