@@ -25,7 +25,7 @@ from typing import Any
 from swarm_logistics_env.cli import app
 
 DOCS = Path(__file__).parent
-LANGUAGES = {"python", "toml", "console", "text", "sh"}
+LANGUAGES = {"python", "toml", "console", "text", "sh", ""}
 
 _BLOCK = re.compile(r"^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"# (\w+\.(?:py|toml))\n")
