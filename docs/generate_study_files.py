@@ -4,18 +4,14 @@
 
 from __future__ import annotations
 
-import json
-import re
 from pathlib import Path
 
-from pydantic_core import PydanticUndefined
+from record_tables import fields, summary
 
-from swarm_logistics_env.records import Record
-from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
+from swarm_logistics_env.scenario import SCENARIO_PRESETS
 from swarm_logistics_env.studies.presets import presets
 from swarm_logistics_env.studies.specification import (
     Ablation,
-    Factor,
     Faults,
     Parameter,
     Sizes,
@@ -56,7 +52,7 @@ def page() -> str:
     """Return the page."""
     return TEXT.format(
         heads="\n".join(f"* `[[{name}]]`: {summary(kind)}" for name, kind in TABLES.items()),
-        study=fields(Specification),
+        study=fields(Specification, leave_out=TABLES),
         scenario_presets=", ".join(f"`{name}`" for name in SCENARIO_PRESETS),
         factors="\n\n".join(
             f"## `[[{name}]]`\n\n{summary(kind)}\n\n{fields(kind)}" for name, kind in TABLES.items()
@@ -87,48 +83,6 @@ def varied(study: Specification) -> str:
     ]
     parts += [f"without a part: {factor.policy}" for factor in study.ablations[:1]]
     return "; ".join(parts)
-
-
-def fields(record: type[Record]) -> str:
-    """Return a table of a record's fields with their defaults and what its docstring says."""
-    said = meanings(record)
-    rows = ["| field | default | meaning |", "| --- | --- | --- |"]
-    rows += [
-        f"| `{name}` | {default(record, name)} | {said[name]} |"
-        for name in record.model_fields
-        if name not in TABLES
-    ]
-    return "\n".join(rows)
-
-
-def default(record: type[Record], name: str) -> str:
-    """Return a field's default as TOML has it; "needed" where there is none."""
-    value = record.model_fields[name].get_default(call_default_factory=True)
-    if value is PydanticUndefined:
-        return "needed"
-    if value is None or value == {} or value == ():
-        return "none"
-    if isinstance(value, Scenario):
-        return "the paper's"
-    return f"`{json.dumps(value, default=str)}`"
-
-
-def meanings(record: type[Record]) -> dict[str, str]:
-    """Return what the docstrings of a record and its bases say of each field."""
-    found: dict[str, str] = {}
-    for kind in (Factor, record) if issubclass(record, Factor) else (record,):
-        text = (kind.__doc__ or "").split("Args:\n")[1].split("\n\n")[0]
-        for names, meaning in re.findall(
-            r"^ {8}([\w, ]+): (.*(?:\n {12}.*)*)", text + "\n", flags=re.MULTILINE
-        ):
-            sentence = " ".join(meaning.split())
-            found |= dict.fromkeys(names.split(", "), sentence)
-    return found
-
-
-def summary(documented: object) -> str:
-    """Return the first paragraph of a docstring, on one line."""
-    return " ".join((documented.__doc__ or "").split("\n\n")[0].split())
 
 
 if __name__ == "__main__":

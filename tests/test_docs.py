@@ -20,7 +20,8 @@ PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted(DOCS.glo
 
 
 @pytest.mark.parametrize("script", sorted(path.name for path in DOCS.glob("generate*.py")))
-def test_generated_page_is_current(script: str) -> None:
+def test_generated_page_is_current(script: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS)  # as for a script there
     generator = runpy.run_path(str(DOCS / script))
     assert PAGES[generator["PAGE"].name] == generator["page"](), (
         f"stale: run `python docs/{script}`"
