@@ -119,7 +119,7 @@ class Panel:
         self.scroll = max(0, min(self.scroll, len(lines) - room + 1 if len(lines) > room else 0))
         shown = lines[self.scroll : self.scroll + room]
         if self.scroll + room < len(lines):
-            shown[-1:] = [("…", "turn the mouse wheel here for more")]
+            shown[-1:] = [("…", "wheel: the rest")]
         for name, text in shown:
             if name:
                 self._put(words(name, _SMALL, INK), _GAP)

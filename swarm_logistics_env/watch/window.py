@@ -146,16 +146,17 @@ class WatchWindow:
 
 def _draw_help(screen: pygame.Surface) -> None:
     rows = [(key.label, key.meaning) for key in KEYS] + list(MOUSE)
-    height = 20
+    line = min(22, (screen.get_height() - 40) // len(rows))
+    height = line - 2
     keys = [words(name, height, INK) for name, _ in rows]
     meanings = [words(meaning, height, INK) for _, meaning in rows]
     column = max(key.get_width() for key in keys) + 20
     width = column + max(meaning.get_width() for meaning in meanings) + 40
-    area = pygame.Rect(0, 0, width, 22 * len(rows) + 30)
+    area = pygame.Rect(0, 0, width, line * len(rows) + 30)
     area.center = screen.get_rect().center
     screen.fill(FLOOR, area)
     pygame.draw.rect(screen, INK, area, 2)
     for place, (key, meaning) in enumerate(zip(keys, meanings)):
-        y = area.top + 15 + 22 * place
+        y = area.top + 15 + line * place
         screen.blit(key, (area.left + 20, y))
         screen.blit(meaning, (area.left + 20 + column, y))

@@ -4,7 +4,7 @@ const ACTIVITIES = { searching: "SEARCHING", shuffling: "SHUFFLING", delivering:
 const [STORED, NOBODY] = [0, -1];
 const element = (id) => document.getElementById(id);
 const options = { trails: false, links: false };
-let fixed = null, view = null, place = null, trail = [], isLost = false;
+let fixed = null, view = null, place = null, trail = [], isLost = false, problem = { text: "", until: 0 };
 
 // Talking to the command
 
@@ -15,7 +15,10 @@ async function order(what) {
       headers: { "Content-Type": "application/json" },
       body: JSON.stringify(what),
     });
-    if (!answer.ok) element("note").textContent = (await answer.json()).problem ?? "refused";
+    if (!answer.ok) {
+      problem = { text: (await answer.json()).problem, until: Date.now() + 5000 };
+      showWords();
+    }
   } catch {
     isLost = true;
   }
@@ -333,7 +336,7 @@ function showWords() {
   const total = scenario.restock ? "" : ` of ${scenario.n_items}`;
   const request = view.requested === NOBODY ? "all delivered" : `requested: item ${view.requested}`;
   element("score").textContent = `time ${view.time.toFixed(1)} s · N = ${scenario.n_robots} · P = ${view.curves[0].times.length}${total} · ${request}`;
-  element("note").textContent = view.note;
+  element("note").textContent = Date.now() < problem.until ? problem.text : view.note;
   for (const name of ["n_robots", "delivery_width"]) {
     if (document.activeElement !== element(name)) element(name).value = scenario[name];
   }
