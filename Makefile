@@ -2,6 +2,7 @@
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 SEEDS  ?= 20
+MINUTES ?= 10
 OUT    ?= results/paper
 
 DEV   := .venvs/dev
@@ -12,12 +13,17 @@ TORCHRL   := .venvs/torchrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
 
-.PHONY: help paper test check benchmark interop docs format clean
+INSTALLED := .venvs/lowest .venvs/newest
+
+.PHONY: help paper test check soak mutants test-lowest test-newest benchmark interop docs format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make check           lint and types only"
+	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
+	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
+	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics"
 	@echo "make interop         TorchRL, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
 	@echo "make docs            the documentation site, site/index.html"
@@ -28,12 +34,30 @@ paper: $(STUDY)/installed
 	$(STUDY)/bin/swarm-logistics study run paper --seeds $(SEEDS) --out $(OUT)
 
 test: check
-	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=term
+	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
+	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p trust.interpreted --numprocesses=2 --cov --cov-append --cov-report= $(KERNELS)
+	$(DEV)/bin/python -m coverage report
+
+# What reaches every line of the kernels in seconds, without the compiler.
+KERNELS := $(addprefix tests/warehouse/test_,logistics.py sensing.py driving.py layout.py grid.py) \
+	$(addprefix tests/policies/test_,swarm_dt.py routes.py)
 
 check: $(DEV)/installed
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/ruff format --check .
 	$(DEV)/bin/mypy
+
+soak: $(DEV)/installed
+	$(DEV)/bin/python -m trust.soak --minutes $(MINUTES)
+
+mutants: $(DEV)/installed
+	$(DEV)/bin/python -m trust.mutants
+
+# Tests from a copy of the tree without the package, so that the one that is installed is tested.
+test-lowest test-newest: test-%: .venvs/%/wheel
+	rm -rf build/installed-$* && mkdir -p build/installed-$*
+	git ls-files -z | grep -zv '^swarm_logistics_env/\|^policies$$\|^train$$' | xargs -0 tar -cf - | tar -xf - -C build/installed-$*
+	cd build/installed-$* && $(CURDIR)/.venvs/$*/bin/python -m pytest --numprocesses=2 --dist=loadgroup
 
 benchmark: $(STUDY)/installed
 	$(STUDY)/bin/python -m benchmarks
@@ -64,6 +88,21 @@ $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
 $(SUPERSUIT)/installed: OTHERS := supersuit
+
+# The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
+.venvs/lowest.txt: pyproject.toml trust/lowest.py
+	@mkdir -p $(@D)
+	$(PYTHON) trust/lowest.py study render > $@
+
+.venvs/lowest/wheel: BOUNDS := --constraint .venvs/lowest.txt
+.venvs/newest/wheel: BOUNDS := --upgrade --upgrade-strategy eager
+
+.PHONY: $(INSTALLED:=/wheel)
+$(INSTALLED:=/wheel): .venvs/lowest.txt
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip wheel --no-deps --wheel-dir build/wheels .
+	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) --force-reinstall --no-deps build/wheels/*.whl
+	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) "swarm-logistics-env[study,render]" build hypothesis pytest pytest-xdist setuptools
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
 .venvs/%/installed: pyproject.toml constraints.txt
