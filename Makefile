@@ -100,9 +100,11 @@ $(SUPERSUIT)/installed: OTHERS := supersuit
 .PHONY: $(INSTALLED:=/wheel)
 $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(PYTHON) -m venv $(@D)
+	rm -rf build
 	$(@D)/bin/python -m pip wheel --no-deps --wheel-dir build/wheels .
-	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) --force-reinstall --no-deps build/wheels/*.whl
-	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) "swarm-logistics-env[study,render]" build hypothesis pytest pytest-xdist setuptools
+	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
+	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
+		"$$(echo build/wheels/*.whl)[study,render]" build hypothesis pytest pytest-xdist setuptools
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
 .venvs/%/installed: pyproject.toml constraints.txt
