@@ -1,0 +1,52 @@
+"""A pytest plugin: kernels run by the interpreter, so that coverage sees their lines.
+
+    NUMBA_DISABLE_JIT=1 python -m pytest -p trust.interpreted tests/warehouse
+
+What only compiled code can do, calling C by address, is done by ctypes meanwhile.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numba
+import pytest
+
+from swarm_logistics_env.warehouse import engine
+
+
+class _Words(ctypes.Structure):
+    _fields_ = (("first", ctypes.c_int64), ("second", ctypes.c_int64))
+
+
+class _Doubles(ctypes.Structure):
+    _fields_ = (("first", ctypes.c_double), ("second", ctypes.c_double))
+
+
+def _call_at(address: int, arguments: tuple[Any, ...]) -> None:
+    given = [_passed(argument) for argument in arguments]
+    function = ctypes.CFUNCTYPE(None, *(type(argument) for argument in given))
+    function(int(address))(*given)
+
+
+def _passed(argument: Any) -> Any:
+    if not isinstance(argument, tuple):
+        is_real = isinstance(argument, float)
+        return ctypes.c_double(argument) if is_real else ctypes.c_int64(int(argument))
+    if isinstance(argument[0], float):
+        return _Doubles(*argument)
+    return _Words(*(int(word) for word in argument))
+
+
+def _store_at(address: int, value: int) -> None:
+    ctypes.c_int32.from_address(int(address)).value = int(value)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Put the interpreter's own in the place of what is compiled."""
+    if not numba.config.DISABLE_JIT:
+        raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
+    engine.call_at, engine.store_at = _call_at, _store_at
+    # Streams count modulo 2**64.
+    config.addinivalue_line("filterwarnings", "ignore:overflow encountered:RuntimeWarning")
