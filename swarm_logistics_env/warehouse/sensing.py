@@ -213,7 +213,8 @@ def sense(
 
         # Robots: in the beams, heard on the radio, in view.
         scan_square = (ranger_range[me] + robot_radius) ** 2 if sees_ranges else 0.0
-        view_square = view_range[me] ** 2
+        # Without cameras not even what lies at its very centre is seen.
+        view_square = view_range[me] ** 2 if view_range[me] > 0.0 else -1.0
         radio_square = radio_range**2
         touch_square = (robot_radius + touch) ** 2
         reach = max(

@@ -329,3 +329,12 @@ def test_a_failed_robot_is_not_told_so() -> None:
     healthy = Warehouse(scenario).reset(0)
     for mode in ("FM2", "FM4", "motor_slow", "motor_dead"):
         np.testing.assert_array_equal(Warehouse(scenario).reset(0, [Fault(mode, 5)]), healthy)
+
+
+def test_a_dead_robot_does_not_see_the_item_at_its_very_centre(build: Build) -> None:
+    world = build([(2.0, 2.0)], [(1.0, 9.0), (2.1, 2.0)], [Fault("dead", (0,), onset=0.15)])
+    world.step([(0.0, 0.0, 0.0, 1.0)])
+    rows = world.step([(0.0, 0.0, 0.0, -1.0)])  # put down, and dead from here on
+    np.testing.assert_array_equal(world.state.item_position[1], world.state.robot_position[0])
+    assert world.state.failure_modes == (("dead",),)
+    assert rows[0, row.ITEMS] == 0.0
