@@ -185,7 +185,7 @@ class Specification(_Part):
 
     name: str = "study"
     policies: Annotated[tuple[PolicySource, ...], Field(min_length=1)] = ("swarm-dt",)
-    seeds: Annotated[int, Field(ge=1, le=MOST_SEEDS)] = 20
+    seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     scenario: Annotated[Scenario, BeforeValidator(_scenario)] = Scenario()
     sizes: Annotated[tuple[Sizes, ...], BeforeValidator(_each(Sizes))] = ()
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
