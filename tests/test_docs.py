@@ -70,9 +70,11 @@ def parse(arguments: list[str]) -> None:
 
 def test_targets_of_make_exist() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    heads = re.findall(r"^([\w -]+):(?!=)", makefile, flags=re.MULTILINE)
+    known = {target for head in heads for target in head.split()}
     for text in PAGES.values():
         for target in re.findall(r"(?:^|`)make ([\w-]+)", text, flags=re.MULTILINE):
-            assert f"\n{target}:" in makefile, target
+            assert target in known
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
