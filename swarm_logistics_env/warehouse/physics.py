@@ -9,6 +9,7 @@ discard the contact solution and let robots sink into each other.
 from __future__ import annotations
 
 import sys
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -189,7 +190,8 @@ def _function_addresses() -> dict[int, int]:
     try:
         return {row: _address(ffi.addressof(lib, name)) for row, name in _FUNCTIONS.items()}
     except AttributeError as error:
-        raise SetupError(f"pymunk {pymunk.version} lacks a function: {error}") from None
+        # Not pymunk.version, which pymunk 7.0 gives as that of something else.
+        raise SetupError(f"pymunk {version('pymunk')} lacks a function: {error}") from None
 
 
 _FUNCTION_ADDRESSES = _function_addresses()
