@@ -33,6 +33,10 @@ class PolicyError(SwarmLogisticsError):
     """A policy that cannot be found, built or trusted, or whose output is wrong."""
 
 
+class TrainingError(SwarmLogisticsError):
+    """A training whose specification, directory or request cannot be."""
+
+
 class StudyError(SwarmLogisticsError):
     """A study whose specification, store or request cannot be."""
 

@@ -8,8 +8,16 @@ import typer
 
 from swarm_logistics_env.cli import judging  # noqa: F401 - adds its commands to `study`
 from swarm_logistics_env.cli.application import Application
-from swarm_logistics_env.cli.options import PresetOption, SetOption, fault_of, scenario_of
+from swarm_logistics_env.cli.options import (
+    FaultOption,
+    PresetOption,
+    SetOption,
+    TrustPolicyOption,
+    fault_of,
+    scenario_of,
+)
 from swarm_logistics_env.cli.study import study
+from swarm_logistics_env.cli.train import train_command
 
 app = Application(
     name="swarm-logistics",
@@ -19,6 +27,7 @@ app = Application(
     pretty_exceptions_enable=False,
 )
 app.add_typer(study)
+app.command("train")(train_command)
 
 
 def _print_version(wanted: bool) -> None:
@@ -58,13 +67,8 @@ def run_command(
     seed: Annotated[int, typer.Option(help="Decides everything random.")] = 0,
     preset: PresetOption = "paper",
     changes: SetOption = None,
-    faults: Annotated[
-        list[str] | None,
-        typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
-    ] = None,
-    trust_code: Annotated[
-        bool, typer.Option("--trust-code", help="Read a .zip policy: executes the code in it.")
-    ] = False,
+    faults: FaultOption = None,
+    trust_code: TrustPolicyOption = False,
 ) -> None:
     """Play one episode and print what it delivered."""
     import time

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+)
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
+from swarm_logistics_env.policies.motion_frame import INPUTS, OUTPUTS
 from swarm_logistics_env.records import Record
 
-# What a command row is made of, in its order.
-COMMANDS = ("forward", "left", "turn", "gripper")
-CommandName = Literal["forward", "left", "turn", "gripper"]
 Width = Annotated[int, Field(ge=1, le=4096)]
 
 
@@ -19,43 +24,37 @@ class _Part(Record):
     error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
 
 
-class Output(_Part):
-    """One output of the network: y, clipped to [-1, 1], commands `scale` y + `offset`.
-
-    Args:
-        command: which one; those that no output has are 0.
-        scale, offset: e.g. 0.5 and 0.5: speeds forward alone.
-    """
-
-    command: CommandName
-    scale: Annotated[float, Field(ge=-1, le=1)] = 1.0
-    offset: Annotated[float, Field(ge=-1, le=1)] = 0.0
-
-
 class Network(_Part):
     """What a trained policy reads, computes and commands.
 
     Args:
-        columns: names of `observations.columns` whose values it reads, in this order.
-        remembers_command: it also reads its last outputs, clipped, 0 at first.
-        noise: so many numbers that wander slowly about 0 with standard deviation 1, from the
-            robot's own stream, are read as well: what a random walk needs.
-        noise_time: after which they are forgotten to 1/e [s].
+        inputs: what it reads, in this order: `motion_frame.INPUTS`.
+        outputs: what it says, in this order: `motion_frame.OUTPUTS`.
         hidden: widths of the hidden layers.
         activation: between layers.
-        outputs: what the outputs command.
-        exploration: standard deviations of the training's Gaussian noise that are added to the
-            outputs, 0: none.
+        exploration: so many standard deviations of the training's noise are added to the outputs,
+            from each robot's own stream; 0: none.
+
+    Raises:
+        PolicyError: the inputs or outputs are not those that this version knows.
     """
 
-    columns: Annotated[tuple[str, ...], Field(min_length=1)]
-    remembers_command: bool = False
-    noise: Annotated[int, Field(ge=0, le=16)] = 0
-    noise_time: PositiveFloat = 1.0
-    hidden: Annotated[tuple[Width, ...], Field(max_length=8)]
+    inputs: tuple[str, ...] = INPUTS
+    outputs: tuple[str, ...] = OUTPUTS
+    hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
-    outputs: Annotated[tuple[Output, ...], Field(min_length=1, max_length=4)]
     exploration: NonNegativeFloat = 0.0
+
+    @field_validator("inputs", "outputs")
+    @classmethod
+    def _known(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
+        right = INPUTS if about.field_name == "inputs" else OUTPUTS
+        for place, (name, wanted) in enumerate(zip(names, right)):
+            if name != wanted:
+                raise ValueError(f"column {place} is {name!r}: should be {wanted!r}")
+        if len(names) != len(right):
+            raise ValueError(f"has {len(names)} columns: should have {len(right)}")
+        return names
 
 
 class Score(_Part):

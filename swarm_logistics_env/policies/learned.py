@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.policies.card import COMMANDS, Network, PolicyCard
-from swarm_logistics_env.policies.inputs import Inputs
+from swarm_logistics_env.policies.card import Network, PolicyCard
+from swarm_logistics_env.policies.exploration import explore
+from swarm_logistics_env.policies.motion_frame import MotionFrame
 from swarm_logistics_env.policies.network import FeedForward
-from swarm_logistics_env.policies.wandering import explore
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -47,7 +47,6 @@ class LearnedPolicy:
             [tensors[f"layers.{layer}.bias"] for layer in layers],
             rectify=network.activation == "relu",
         )
-        self._shift, self._scale = tensors["input_shift"], tensors["input_scale"]
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = {
             "network": network.model_dump(mode="json"),
@@ -57,13 +56,13 @@ class LearnedPolicy:
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: the control period."""
-        self._inputs = Inputs(self.card.network, scenario)
+        self._frame = MotionFrame(scenario)
         self.reset(0, 0)
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode."""
         self._keys = row_keys(seed, STREAM, n_robots)
-        self._inputs.begin(self._keys)
+        self._frame.begin(self._keys)
         self._step = 0
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -72,37 +71,21 @@ class LearnedPolicy:
             raise PolicyError(
                 f"observations of {observations.shape[0]} robots: reset was told {len(self._keys)}"
             )
-        read = self._inputs.read(observations)
-        outputs = self._network((read - self._shift) * self._scale)
+        outputs = self._network(self._frame.read(observations))
         if self.card.network.exploration:
             explore(self._keys, self._step, self._deviations, outputs)
         self._step += 1
-        self._inputs.note(outputs)
-        return commands_of(self.card.network, outputs)
-
-
-def commands_of(network: Network, outputs: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Return the commands (N, 4) that the network's outputs (N, outputs) ask for."""
-    commands = np.zeros((outputs.shape[0], len(COMMANDS)))
-    for place, output in enumerate(network.outputs):
-        asked = output.scale * np.clip(outputs[:, place], -1.0, 1.0) + output.offset
-        commands[:, COMMANDS.index(output.command)] = asked.clip(-1.0, 1.0)
-    return commands
+        return self._frame.command(outputs)
 
 
 def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:
     """Return the shape of each tensor that such a policy has.
 
-    An input x enters the first layer as (x - input_shift) * input_scale; `layers` are as torch
-    has them, weight (outputs, inputs); `deviations` are the training's, of each output.
+    `layers` are as torch has them, weight (outputs, inputs); `deviations` those of the training's
+    noise, of each output.
     """
-    width, n_outputs = Inputs(network, Scenario()).width, len(network.outputs)
-    shapes: dict[str, tuple[int, ...]] = {
-        "input_shift": (width,),
-        "input_scale": (width,),
-        "deviations": (n_outputs,),
-    }
-    widths = [width, *network.hidden, n_outputs]
+    widths = [len(network.inputs), *network.hidden, len(network.outputs)]
+    shapes: dict[str, tuple[int, ...]] = {"deviations": (widths[-1],)}
     for layer, (n_in, n_out) in enumerate(pairwise(widths)):
         shapes[f"layers.{layer}.weight"] = (n_out, n_in)
         shapes[f"layers.{layer}.bias"] = (n_out,)

@@ -19,21 +19,45 @@ from swarm_logistics_env.policies.executable import StableBaselinesPolicy
 from swarm_logistics_env.policies.files import SUFFIX, read_policy
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.policies.tuned import SUFFIX as TUNED
+from swarm_logistics_env.policies.tuned import read_tuned
 from swarm_logistics_env.records import Record
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
 WEIGHTS = Path(__file__).parent / "weights"
 
-NAMES: dict[str, Callable[..., Policy]] = {
+
+def load_tuned(path: Path, **parameters: Any) -> Policy:
+    """Return the scripted policy in a file of `swarm-logistics train --tune`.
+
+    Raises:
+        PolicyError: it cannot be read, or names no scripted policy with such parameters.
+    """
+    found = read_tuned(path)
+    if found.policy not in SCRIPTED:
+        raise PolicyError(
+            f"{path}: no scripted policy {found.policy!r}{suggest(found.policy, SCRIPTED)}"
+        )
+    return SCRIPTED[found.policy](**{**found.parameters, **parameters})
+
+
+SCRIPTED: dict[str, Callable[..., Policy]] = {
     "swarm-dt": SwarmDT,
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
     # Swarm D-T without its taxis: the ablation.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
     "central": Central,
-    # Trained, each by the training preset that its card names.
+}
+
+NAMES: dict[str, Callable[..., Policy]] = {
+    **SCRIPTED,
+    # Trained or tuned, each by the command that its file names.
     **{
         path.stem: functools.partial(read_policy, path)
         for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))
+    },
+    **{
+        path.stem: functools.partial(load_tuned, path) for path in sorted(WEIGHTS.glob(f"*{TUNED}"))
     },
 }
 
@@ -105,8 +129,12 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
         return functools.partial(read_policy, path)
     if path.suffix == EXECUTABLE:
         return functools.partial(StableBaselinesPolicy, path, trust_code=trust_code)
+    if path.suffix == TUNED:
+        return functools.partial(load_tuned, path)
     if path.is_file():
-        raise PolicyError(f"{name} is no policy file: should end in {SUFFIX} or {EXECUTABLE}")
+        raise PolicyError(
+            f"{name} is no policy file: should end in {SUFFIX}, {TUNED} or {EXECUTABLE}"
+        )
     return None
 
 

@@ -8,27 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swarm_logistics_env.policies.card import Network, Output, PolicyCard
+from swarm_logistics_env.observations import bounds
+from swarm_logistics_env.policies.card import Network, PolicyCard
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import tensor_shapes
+from swarm_logistics_env.scenario import Scenario
 
 Tensors = dict[str, NDArray[np.float32]]
 
 
 @pytest.fixture
 def card() -> PolicyCard:
-    network = Network(
-        columns=("range_walls", "item_present", "item_x", "carrying_requested", "lowest_timer"),
-        remembers_command=True,
-        noise=2,
-        hidden=(8, 6),
-        outputs=(
-            Output(command="forward", scale=0.5, offset=0.5),
-            Output(command="turn"),
-            Output(command="gripper"),
-        ),
-        exploration=0.5,
-    )
+    network = Network(hidden=(8, 6), exploration=0.5)
     return PolicyCard(name="small", network=network, seed=3, versions={"numpy": "2"})
 
 
@@ -50,4 +41,5 @@ def file(card: PolicyCard, tensors: Tensors, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def rows() -> NDArray[np.float32]:
-    return np.random.default_rng(1).normal(size=(7, 140)).astype(np.float32)
+    low, high = bounds(Scenario())
+    return np.random.default_rng(1).uniform(low, high, (7, len(low))).astype(np.float32)

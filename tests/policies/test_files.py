@@ -79,11 +79,13 @@ def test_missing_and_unknown_tensors_are_refused(
     refused(file, r"lack \['deviations'\] and have \['other'\]")
 
 
-def test_columns_that_no_observation_has_are_refused(
+def test_columns_that_are_not_read_any_more_are_refused(
     card: PolicyCard, tensors: Tensors, file: Path
 ) -> None:
-    rewrite(file, card.to_json().replace("range_walls", "range_wall"), tensors)
-    refused(file, "no observation column 'range_wall'; did you mean 'range_walls'")
+    rewrite(file, card.to_json().replace("wall_3", "wall_33"), tensors)
+    refused(file, "column 3 is 'wall_33': should be 'wall_3'")
+    rewrite(file, card.to_json().replace(',"whim_aside"', ""), tensors)
+    refused(file, "has 83 columns: should have 84")
 
 
 @pytest.mark.parametrize("text", ["", "[1]", '{"name": "x"}', '{"a": 1}', "\0"])
@@ -107,7 +109,7 @@ def test_an_unknown_format_is_refused(card: PolicyCard, tensors: Tensors, file: 
 def test_a_missing_file_and_one_of_another_kind_are_refused(tmp_path: Path) -> None:
     refused(tmp_path / "none.safetensors", "cannot read the policy file .*No such file")
     (tmp_path / "weights.pt").write_bytes(b"weights")
-    refused(tmp_path / "weights.pt", "is no policy file: should end in .safetensors or .zip")
+    refused(tmp_path / "weights.pt", "is no policy file: should end in .safetensors, .json or .zip")
 
 
 def test_a_model_of_stable_baselines3_asks_to_be_trusted(tmp_path: Path) -> None:

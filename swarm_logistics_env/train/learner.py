@@ -1,0 +1,82 @@
+"""The learner: stable-baselines3's PPO, and its policy in the form that is played without it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+
+from swarm_logistics_env.train.network_view import NetworkView
+from swarm_logistics_env.train.specification import Training
+
+ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
+
+
+def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
+    """Return PPO as the training asks for it; seeds the generators of torch and numpy."""
+    ppo, network = training.ppo, training.network
+    first, last = ppo.learning_rate, ppo.final_learning_rate
+    learner = PPO(
+        "MlpPolicy",
+        view,
+        learning_rate=lambda left: last + left * (first - last),
+        n_steps=ppo.n_steps,
+        batch_size=training.rows * ppo.n_steps // ppo.n_minibatches,
+        n_epochs=ppo.epochs,
+        gamma=ppo.gamma,
+        gae_lambda=ppo.gae_lambda,
+        clip_range=ppo.clip,
+        ent_coef=ppo.entropy,
+        vf_coef=ppo.value_weight,
+        max_grad_norm=ppo.max_grad_norm,
+        target_kl=ppo.target_kl,
+        policy_kwargs={
+            "net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)},
+            "activation_fn": ACTIVATIONS[network.activation],
+        },
+        seed=training.seed,
+        device=device,
+    )
+    with torch.no_grad():
+        learner.policy.log_std.copy_(torch.tensor(ppo.deviations).log())
+    return learner
+
+
+def device_of(asked: str | None) -> str:
+    """Return the device to learn on: as asked, else the GPU where there is one."""
+    return asked or ("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
+    """Return the tensors of a policy file (`policies.learned.tensor_shapes`) from PPO's policy."""
+    tensors = {
+        "deviations": _array(policy.log_std.exp()),
+    }
+    for layer, linear in enumerate(linears(policy)):
+        tensors[f"layers.{layer}.weight"] = _array(linear.weight)
+        tensors[f"layers.{layer}.bias"] = _array(linear.bias)
+    return tensors
+
+
+def linears(policy: Any) -> list[torch.nn.Linear]:
+    """Return the layers from inputs to outputs of PPO's policy."""
+    hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
+    return [*hidden, policy.action_net]
+
+
+def actor_parameters(policy: Any) -> list[torch.nn.Parameter]:
+    """Return what there is to learn between inputs and outputs."""
+    return [parameter for linear in linears(policy) for parameter in linear.parameters()]
+
+
+def outputs_of(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
+    """Return the most likely outputs (N, outputs) of PPO's policy, with their gradient."""
+    outputs: torch.Tensor = policy.action_net(policy.mlp_extractor.forward_actor(inputs))
+    return outputs
+
+
+def _array(tensor: torch.Tensor) -> NDArray[np.float32]:
+    return tensor.detach().cpu().numpy().astype(np.float32).copy()

@@ -1,0 +1,78 @@
+"""The scores on a policy's card: a study like any other, on seeds that nothing was learned from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from swarm_logistics_env.policies import Policy
+from swarm_logistics_env.policies.card import Score
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparisons import Arm
+from swarm_logistics_env.studies.judgement import Findings
+from swarm_logistics_env.train.specification import Training
+
+
+def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
+    """Return what `training.scores` asks for; the study lies in `out`, and goes on where it was."""
+    asked = training.scores
+    if not asked.seeds or not (len(asked.sizes) > 1 or asked.modes):
+        return ()
+    factors: dict[str, Any] = {}
+    if len(asked.sizes) > 1:
+        factors["sizes"] = [{"values": sorted(asked.sizes)}]
+    if asked.modes:
+        factors["faults"] = [{"modes": asked.modes, "robots": asked.robots}]
+    study = Study(
+        out=out,
+        name=f"{training.name}: scores",
+        policies=[policy],
+        seeds=asked.seeds,
+        scenario=training.scenario.replace(n_robots=asked.n_robots),
+        **factors,
+    )
+    study.run(processes=training.threads)
+    return scores_of(study.findings())
+
+
+def scores_of(findings: Findings) -> tuple[Score, ...]:
+    """Return every P and every indicator of a study with its interval."""
+    scores = []
+    for cell in findings.cells:
+        mean = cell.mean
+        if mean is None:
+            continue
+        scores.append(
+            Score(
+                measure="P",
+                condition=_in_words(cell.arm),
+                value=mean.value,
+                low=mean.low,
+                high=mean.high,
+                seeds=cell.performance.size,
+            )
+        )
+    for judgement in findings.judgements:
+        estimate, comparison = judgement.estimate, judgement.comparison
+        if estimate is None:
+            continue
+        scores.append(
+            Score(
+                measure=comparison.indicator,
+                condition=_in_words(comparison.changed),
+                value=estimate.value,
+                low=_finite(estimate.low),
+                high=_finite(estimate.high),
+                seeds=estimate.n_seeds,
+            )
+        )
+    return tuple(dict.fromkeys(scores))
+
+
+def _in_words(arm: Arm) -> str:
+    level = str(arm.level)
+    return level if arm.level.kind == "size" else f"N = {arm.condition.scenario.n_robots}, {level}"
+
+
+def _finite(limit: float | None) -> float | None:
+    return None if limit is None or abs(limit) == float("inf") else limit

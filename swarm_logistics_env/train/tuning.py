@@ -1,0 +1,192 @@
+"""The search for a scripted policy's parameters, against P and indicators at once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PositiveInt, field_validator
+
+from swarm_logistics_env import policies
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
+from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.policies.tuned import TunedPolicy
+from swarm_logistics_env.records import Record
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.train.evaluation import Evaluated, evaluate
+from swarm_logistics_env.train.reporting import Report
+from swarm_logistics_env.train.run_record import enter, versions
+from swarm_logistics_env.train.specification import Evaluation, as_scenario
+from swarm_logistics_env.warehouse.faults import Fault
+
+if TYPE_CHECKING:
+    import optuna
+
+STORAGE = "trials.sqlite"
+RESULT = "result.json"
+
+# Where each parameter of Swarm D-T is looked for: (lowest, highest), around what it is by default.
+RANGES: Mapping[str, tuple[float, float]] = {
+    "diffusion": (0.05, 3.0),
+    "avoidance_gain": (0.0, 5.0),
+    "avoidance_range": (0.25, 1.0),
+    "wall_distance": (0.13, 0.6),
+    "taxis_gain": (0.1, 3.0),
+    "drop_rate": (0.1, 10.0),
+}
+Objective = Literal["P", "R", "FT"]
+
+
+class Tuning(Record):
+    """What is searched for.
+
+    Args:
+        policy: name of the scripted policy.
+        objectives: all maximised: P without faults, and the means over `modes` of R and FT.
+        trials: parameters to try, the policy's own first.
+        seeds: episodes of each trial under each condition, the same for all trials.
+        scenario: the conditions.
+        modes, robots: failure modes and the number m of faulty robots.
+        seed: of the search.
+        threads: in which episodes are played; no result depends on it.
+
+    Raises:
+        TrainingError: a field is unknown or cannot be.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
+
+    policy: str
+    objectives: Annotated[tuple[Objective, ...], Field(min_length=1)] = ("P", "R")
+    trials: PositiveInt = 60
+    seeds: PositiveInt = 8
+    scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
+    modes: Annotated[tuple[str, ...], Field(min_length=1)] = ("FM1", "FM2", "FM3", "FM4")
+    robots: PositiveInt = 2
+    seed: int = 0
+    threads: PositiveInt = 2
+
+    @field_validator("policy")
+    @classmethod
+    def _scripted(cls, policy: str) -> str:
+        known = [name for name in policies.NAMES if isinstance(policies.load(name), SwarmDT)]
+        if policy not in known:
+            raise ValueError(f"no policy to tune{suggest(policy, known)}")
+        return policy
+
+    @field_validator("modes")
+    @classmethod
+    def _known(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
+        for mode in modes:
+            Fault(mode)
+        return modes
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Parameters that were tried, and what came of them, objective by objective."""
+
+    number: int
+    parameters: dict[str, float]
+    values: tuple[float, ...]
+    is_best: bool
+
+
+def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
+    """Search, or go on searching, and return all trials; those on the Pareto front are `is_best`.
+
+    What is in `out` afterwards: trials.sqlite, a study of Optuna's, from which the same call goes
+    on after a crash; result.json, a policy file with the best parameters by the first objective.
+
+    Raises:
+        TrainingError: the directory holds another search or cannot be used.
+    """
+    import optuna
+
+    out = Path(out)
+    enter(out, asked, command)
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(
+        study_name=asked.policy,
+        storage=f"sqlite:///{(out / STORAGE).resolve()}",
+        directions=["maximize"] * len(asked.objectives),
+        load_if_exists=True,
+    )
+    for trial in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):
+        study.tell(trial.number, state=optuna.trial.TrialState.FAIL)  # it was cut short
+    if not study.get_trials():
+        study.enqueue_trial(_own_parameters(asked.policy))
+    done = len(_completed(study))
+    with Report(f"tuning {asked.policy}", asked.trials, done, unit="trials") as report:
+        while done < asked.trials:
+            values = _try(study, asked, done)
+            done = len(_completed(study))
+            report.reach(done)
+            report.say(", ".join(f"{n} = {v:.3g}" for n, v in zip(asked.objectives, values)))
+    trials = _trials(study)
+    best = max(trials, key=lambda trial: trial.values[0])
+    record = TunedPolicy(
+        policy=asked.policy,
+        parameters=best.parameters,
+        command=command,
+        versions=versions(),
+        search=json.loads(asked.to_json()),
+    )
+    part = out / f"{RESULT}.part"
+    part.write_text(json.dumps(json.loads(record.to_json()), indent=2) + "\n", encoding="utf-8")
+    part.replace(out / RESULT)
+    return trials
+
+
+def values_of(asked: Tuning, found: Evaluated) -> tuple[float, ...]:
+    """Return the objectives' values, nothing delivered counting as the worst."""
+    p_o, p_s = found.performance, found.under_faults.get("removed", 0.0)
+    modes = list(asked.modes)
+    values = {
+        "P": p_o,
+        "R": np.mean([found.robustness[mode] for mode in modes]) if p_o else -1.0,
+        "FT": np.mean([found.under_faults[mode] - p_s for mode in modes]) / p_o if p_o else -1.0,
+    }
+    return tuple(float(values[objective]) for objective in asked.objectives)
+
+
+def _try(study: optuna.Study, asked: Tuning, done: int) -> tuple[float, ...]:
+    import optuna
+
+    # A sampler for each trial: a search that was cut short goes on as it would have.
+    study.sampler = optuna.samplers.TPESampler(seed=asked.seed * 100_003 + done)
+    trial = study.ask()
+    parameters: dict[str, Any] = {name: trial.suggest_float(name, *RANGES[name]) for name in RANGES}
+    needs_faults = asked.objectives != ("P",)
+    faults = dict.fromkeys((*asked.modes, "removed"), asked.robots) if needs_faults else {}
+    evaluation = Evaluation(seeds=asked.seeds, n_robots=asked.scenario.n_robots, faults=faults)
+    policy = policies.load(asked.policy, **parameters)
+    values = values_of(asked, evaluate(policy, asked.scenario, evaluation, asked.threads))
+    study.tell(trial, values)
+    return values
+
+
+def _own_parameters(policy: str) -> dict[str, Any]:
+    made: Any = policies.load(policy)
+    return {
+        name: min(max(getattr(made.parameters, name), low), high)
+        for name, (low, high) in RANGES.items()
+    }
+
+
+def _completed(study: optuna.Study) -> list[Any]:
+    import optuna
+
+    return list(study.get_trials(states=[optuna.trial.TrialState.COMPLETE]))
+
+
+def _trials(study: optuna.Study) -> list[Trial]:
+    best = {trial.number for trial in study.best_trials}
+    return [
+        Trial(t.number, dict(t.params), tuple(t.values), t.number in best)
+        for t in _completed(study)
+    ]

@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
+from swarm_logistics_env.train import Training, load_training, preset_names
+from swarm_logistics_env.train.specification import Conditions
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_can_be(name: str) -> None:
+    training = load_training(name)
+    assert training.name == name
+    assert Training.from_json(training.to_json()) == training
+    assert training.about
+
+
+def test_the_presets_that_are_promised_are_there() -> None:
+    assert {"delivery", "robust", "indicator"} <= set(preset_names())
+
+
+def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone() -> None:
+    indicator = load_training("indicator")
+    same_mix = load_training("indicator-arm-same-mix")
+    deliveries = load_training("indicator-arm-deliveries")
+    reward = {"indicators": None, "rewards": same_mix.rewards}
+    names = {"name": same_mix.name, "about": same_mix.about}
+    assert indicator.replace(**reward, **names) == same_mix
+    names = {"name": deliveries.name, "about": deliveries.about}
+    assert same_mix.replace(conditions=(), **names) == deliveries
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("agent_step = 5", "Training has no field 'agent_step'; did you mean 'agent_steps'"),
+        ("[ppo]\nlearnrate = 1", "no field 'learnrate'; did you mean 'learning_rate'"),
+        ("[[conditions]]\nmodes = ['FM9']", "no failure mode 'FM9'; did you mean"),
+        ("[rewards]\ndeliver = 1.0", "no reward term 'deliver'; did you mean 'delivery'"),
+        ("[scenario]\nn_itens = 5", "Scenario has no field 'n_itens'"),
+        ("[ppo]\nn_minibatches = 7", "should divide the batch of 150 robots x 128 steps"),
+        ("sizes = [1, 2]\nworlds = 1", "worlds = 1: should be at least 2"),
+        ("sizes = [2]\n[[conditions]]\nmodes = ['FM1']", "at most the smallest swarm, 2 robots"),
+        ("name = '../x'", "should be of letters, digits"),
+        ("[evaluation.faults]\nFM9 = 1", "FM9"),
+        ("[network]\nhidden = [0]", "hidden"),
+        ("seed =", "is not TOML"),
+    ],
+)
+def test_what_cannot_be_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(TrainingError, match=sentence):
+        load_training(str(path))
+
+
+def test_unknown_presets_and_files_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(TrainingError, match="no training preset 'deliver'; did you mean 'delivery"):
+        load_training("deliver")
+    with pytest.raises(TrainingError, match="cannot read the training"):
+        load_training(str(tmp_path / "none.toml"))
+
+
+def test_sizes_are_no_condition() -> None:
+    with pytest.raises(SwarmLogisticsError, match="swarm sizes belong in `sizes`"):
+        Conditions(scenario={"n_robots": [5]})

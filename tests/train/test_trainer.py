@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+
+pytest.importorskip("torch")
+pytest.importorskip("stable_baselines3")
+
+import torch
+
+from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.observations import bounds
+from swarm_logistics_env.policies.motion_frame import INPUTS
+from swarm_logistics_env.train import Training, trainer
+from swarm_logistics_env.train.checkpoint import save_checkpoint
+from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
+from swarm_logistics_env.train.specification import Conditions, Imitation, Indicators, Scores
+from swarm_logistics_env.train.trainer import train
+
+
+def same(one: Path, other: Path) -> bool:
+    first, second = load_file(one), load_file(other)
+    return all(first[name].tobytes() == second[name].tobytes() for name in first)
+
+
+def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> None:
+    scores = Scores(seeds=2, sizes=(2, 3), modes=("FM4",), robots=(1,), n_robots=3)
+    path = train(small(scores=scores), tmp_path, command="the command")
+    policy: Any = policies.load(str(path))
+    assert run_episode(Scenario(n_robots=4, duration=2.0), policy, seed=0).ended_at == 2.0
+    card = policy.card
+    assert (card.name, card.command, card.seed) == ("small", "the command", 0)
+    assert card.agent_steps == 640
+    assert card.scenario["warehouse_width"] == 5.0
+    assert {"torch", "swarm-logistics-env", "simulation"} <= card.versions.keys()
+    measured = {(score.measure, score.condition) for score in card.scores}
+    assert measured >= {("P", "N = 2"), ("P", "N = 3"), ("P", "N = 3, FM4, m = 1")}
+    curve = (tmp_path / "curve.csv").read_text().splitlines()
+    assert curve[0] == "agent_steps,seconds,P,P_FM4,R_FM4"
+    assert [line.split(",")[0] for line in curve[1:]] == ["0", "320", "640"]
+    assert list((tmp_path / "tensorboard").glob("events*"))
+    record = json.loads((tmp_path / "training.json").read_text())
+    assert record["command"] == "the command"
+
+
+def test_torch_and_the_policy_file_agree(small: Any) -> None:
+    training: Training = small()
+    view = trainer._new_view(training)
+    learner = make_learner(training, view, "cpu")
+    with torch.no_grad():
+        for parameter in learner.policy.parameters():
+            parameter.add_(0.3 * torch.randn_like(parameter))
+    tensors = tensors_of(learner.policy)
+    inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS))).astype(np.float32)
+    from swarm_logistics_env.policies.card import PolicyCard
+    from swarm_logistics_env.policies.learned import LearnedPolicy
+
+    policy = LearnedPolicy(PolicyCard(name="x", network=training.network), tensors)
+    with torch.no_grad():
+        told = outputs_of(learner.policy, torch.from_numpy(inputs)).numpy()
+    np.testing.assert_allclose(policy._network(inputs), told, rtol=0, atol=1e-5)
+    # What PPO takes for the most likely action is the same.
+    likely, _ = learner.predict(inputs, deterministic=True)
+    np.testing.assert_allclose(np.clip(told, -1.0, 1.0), likely, rtol=0, atol=1e-5)
+
+
+def test_the_view_trains_what_the_policy_plays(small: Any) -> None:
+    """One world in training and the policy file alone come to the same commands."""
+    from swarm_logistics_env.policies.motion_frame import MotionFrame
+
+    training: Training = small(sizes=(3,), worlds=1)
+    view = trainer._new_view(training)
+    view.seed(3)
+    inputs = view.reset()
+    frame = MotionFrame(training.scenario)
+    frame.begin(view.frame.keys)
+    rng = np.random.default_rng(0)
+    assert (frame.read(view.observations) == inputs).all()
+    for _ in range(20):
+        outputs = rng.uniform(-1, 1, (3, 3)).astype(np.float32)
+        frame.command(outputs)
+        inputs, *_ = view.step(outputs)
+        assert (frame.read(view.observations) == inputs).all()
+
+
+def test_the_same_seed_gives_the_same_policy(small: Any, tmp_path: Path) -> None:
+    paths = [
+        train(small(seed=seed), tmp_path / f"{number}") for number, seed in enumerate([0, 0, 1])
+    ]
+    assert same(paths[0], paths[1])
+    assert not same(paths[0], paths[2])
+
+
+class Killed(BaseException):
+    """Stands for kill -9: nothing of ours catches it."""
+
+
+def test_a_training_that_was_killed_goes_on_bit_by_bit(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = small(
+        conditions=(Conditions(), Conditions(modes=("FM1", "removed"), robots=(1,))),
+        indicators=Indicators(weights={"R": 1.0, "P": 0.1}),
+    )
+    whole = train(training, tmp_path / "whole")
+    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    real, saved = save_checkpoint, []
+
+    def saves_and_dies(*arguments: Any) -> None:
+        real(*arguments)
+        saved.append(1)
+        if len(saved) == 2:
+            raise Killed
+
+    monkeypatch.setattr(trainer, "save_checkpoint", saves_and_dies)
+    with pytest.raises(Killed):
+        train(training, tmp_path / "cut")
+    assert not (tmp_path / "cut" / "small.safetensors").exists()
+    monkeypatch.setattr(trainer, "save_checkpoint", real)
+    assert same(train(training, tmp_path / "cut"), whole)
+    steps = [line.split(",")[0] for line in (tmp_path / "cut/curve.csv").read_text().splitlines()]
+    assert steps == ["agent_steps", "0", "320", "640"]
+
+
+def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> None:
+    train(small(), tmp_path)
+    with pytest.raises(TrainingError, match="holds a training with another seed, sizes"):
+        train(small(seed=1, sizes=(5, 3)), tmp_path)
+
+
+def test_a_checkpoint_that_is_cut_short_is_refused(small: Any, tmp_path: Path) -> None:
+    train(small(), tmp_path)
+    path = tmp_path / "checkpoint.pt"
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(TrainingError, match=r"cannot be read .*: train into a new directory"):
+        train(small(), tmp_path)
+
+
+def test_imitation_brings_the_network_towards_the_teacher(small: Any) -> None:
+    from swarm_logistics_env.train.imitation import imitate
+    from swarm_logistics_env.train.teacher import taught
+
+    asked = Imitation(rounds=2, seconds=5.0, sizes=(4, 6), fit=150, last_fit=300, common_share=1.0)
+    training: Training = small()
+    view = trainer._new_view(training)
+    policy = make_learner(training, view, "cpu").policy
+    view.seed(1)
+    inputs = torch.from_numpy(view.reset())
+    commands = taught(view.frame, view.observations, training.scenario.control_period)
+    wanted = torch.from_numpy(view.frame.outputs_for(commands).astype(np.float32))
+
+    def error() -> float:
+        with torch.no_grad():
+            return float(((outputs_of(policy, inputs) - wanted) ** 2).mean())
+
+    before = error()
+    imitate(policy, training, asked)
+    assert error() < 0.3 * before
+
+
+def test_the_value_network_may_learn_alone_at_first(small: Any, tmp_path: Path) -> None:
+    training = small()
+    training = training.replace(ppo=training.ppo.replace(value_warmup=100))
+    path = train(training, tmp_path)
+    learner = make_learner(training, trainer._new_view(training), "cpu")
+    begun = tensors_of(learner.policy)
+    assert all((load_file(path)[name] == begun[name]).all() for name in begun)
+
+
+def test_the_teacher_is_a_policy_of_rows_alone() -> None:
+    teacher: Any = policies.load("swarm_logistics_env.train.teacher:Teacher")
+    low, high = bounds(Scenario())
+    rows = np.random.default_rng(0).uniform(low, high, (9, len(low))).astype(np.float32)
+    teacher.reset(9, 0)
+    commands = teacher.act(rows)
+    assert commands.shape == (9, 4)
+    assert (np.abs(commands) <= 1.0 + 1e-9).all()
+
+
+def test_the_teacher_delivers_more_than_swarm_dt() -> None:
+    scenario = Scenario(duration=60.0, restock=True)
+    delivered = {
+        name: run_episode(scenario, policies.load(name), seed=0).delivered
+        for name in ("swarm-dt", "swarm_logistics_env.train.teacher:Teacher")
+    }
+    assert delivered["swarm_logistics_env.train.teacher:Teacher"] > 2 * delivered["swarm-dt"]
+
+
+def test_checkpoints_hold_worlds_that_go_on(small: Any) -> None:
+    view = trainer._new_view(small())
+    view.seed(0)
+    view.reset()
+    rng = np.random.default_rng(0)
+    for _ in range(7):
+        view.step(rng.uniform(-1, 1, (8, 3)))
+    other = pickle.loads(pickle.dumps(view))
+    for _ in range(70):  # beyond the ends of episodes
+        actions = rng.uniform(-1, 1, (8, 3))
+        one, two = view.step(actions), other.step(actions)
+        assert one[0].tobytes() == two[0].tobytes()
+        assert one[1].tobytes() == two[1].tobytes()
