@@ -72,6 +72,7 @@ interop: $(TORCHRL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate.py
 	$(DOCS)/bin/python docs/generate_study_files.py
+	$(DOCS)/bin/python docs/generate_training_files.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
 
 format: $(DEV)/installed

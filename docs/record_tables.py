@@ -17,7 +17,7 @@ def fields(record: type[Record], leave_out: Container[str] = ()) -> str:
     said = meanings(record)
     rows = ["| field | default | meaning |", "| --- | --- | --- |"]
     rows += [
-        f"| `{name}` | {default(record, name)} | {said[name]} |"
+        f"| `{name}` | {default(record, name)} | {said.get(name, '')} |"
         for name in record.model_fields
         if name not in leave_out
     ]
@@ -36,6 +36,8 @@ def default(record: type[Record], name: str) -> str:
         return ", ".join(f"`{k} = {json.dumps(v)}`" for k, v in changed.items()) or "the paper's"
     if isinstance(value, Record):
         return "see below"
+    if isinstance(value, tuple) and len(value) > 20:
+        return f"all {len(value)}"
     return f"`{json.dumps(value, default=str)}`"
 
 

@@ -1,0 +1,71 @@
+"""Writes docs/training_files.md from the records: `python docs/generate_training_files.py`."""
+
+# ruff: noqa: E501  # the lines of the page
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from record_tables import fields, summary
+
+from swarm_logistics_env.policies.card import Network
+from swarm_logistics_env.train.preset_files import load_training, preset_names
+from swarm_logistics_env.train.specification import (
+    Conditions,
+    Evaluation,
+    Imitation,
+    Indicators,
+    PPOSettings,
+    Scores,
+    Training,
+)
+
+PAGE = Path(__file__).parent / "training_files.md"
+TABLES = {
+    "[network]": Network,
+    "[[conditions]]": Conditions,
+    "[indicators]": Indicators,
+    "[imitation]": Imitation,
+    "[ppo]": PPOSettings,
+    "[evaluation]": Evaluation,
+    "[scores]": Scores,
+}
+
+TEXT = """\
+# Training files
+
+<!-- Written by docs/generate_training_files.py from the code; change that, not this. -->
+
+A training is a TOML file; an unknown field is an error that suggests the one that was meant. [Training](training.md) explains what for.
+
+## The training
+
+{training}
+
+{tables}
+
+## Presets
+
+`swarm-logistics train NAME` knows these without a file:
+
+{presets}
+"""
+
+
+def page() -> str:
+    """Return the page."""
+    presets = {name: load_training(name) for name in preset_names()}
+    return TEXT.format(
+        training=fields(Training),
+        tables="\n\n".join(
+            f"## `{name}`\n\n{summary(kind)}\n\n{fields(kind)}" for name, kind in TABLES.items()
+        ),
+        presets="\n".join(
+            f"* `{name}`: {training.about} {training.agent_steps:,} agent-steps."
+            for name, training in presets.items()
+        ),
+    )
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
