@@ -171,12 +171,11 @@ class SwarmLogisticsEnv(DictView):
         rewards = self._rewards.pay(world)
         if len(self.agents) < len(was_present):
             rewards *= was_present
-        terminations = np.zeros(len(was_present), np.bool_)
-        truncations = np.zeros(len(was_present), np.bool_)
+        terminations, truncations = np.zeros((2, len(was_present)), np.bool_)
         is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
-        is_over_time = world.is_over_time or is_cut
+        is_over_time = is_cut or world.is_over_time
         # Seldom, so that the other steps do not pay for it.
-        if world.all_delivered or is_over_time or world.n_removed != self._n_removed:
+        if is_over_time or world.all_delivered or world.n_removed != self._n_removed:
             self._n_removed = world.n_removed
             self._present = world.state.robot_present.copy()
             terminations |= was_present & (~self._present | world.all_delivered)

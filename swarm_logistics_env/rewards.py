@@ -32,10 +32,12 @@ class RewardTerms:
             if isinstance(weight, str) or not np.isfinite(weight):
                 raise SetupError(f"rewards[{name!r}] = {weight!r}: should be a finite number")
         self._terms = [(REWARD_TERMS[name], weight) for name, weight in self.weights.items()]
+        self._follows_carrier = not _OF_CARRIER.isdisjoint(self.weights)
 
     def begin(self, world: Warehouse) -> None:
         """Note how an episode starts."""
-        self._before = Before(world)
+        self._before = Before()
+        self._before.note(world, self._follows_carrier)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
         """Return what the step just taken earns each robot, (N,)."""
@@ -44,7 +46,7 @@ class RewardTerms:
             earned = term(world, self._before)
             if earned is not None:
                 total += weight * earned
-        self._before = Before(world)
+        self._before.note(world, self._follows_carrier)
         return total
 
 
@@ -53,13 +55,15 @@ class Before:
 
     __slots__ = ("carrier", "carrier_x", "delivered", "requested")
 
-    def __init__(self, world: Warehouse) -> None:
-        self.delivered = world.state.delivered
+    def note(self, world: Warehouse, follows_carrier: bool) -> None:
+        """Note how things stand; who carries the requested item only if a term asks for it."""
+        self.delivered = len(world.state.delivery_times)
         self.requested = world.state.requested
-        self.carrier = carrier_of_requested(world)
-        self.carrier_x = 0.0
-        if self.carrier != NOBODY:
-            self.carrier_x = float(world.state.robot_position[self.carrier, 0])
+        self.carrier, self.carrier_x = NOBODY, 0.0
+        if follows_carrier:
+            self.carrier = carrier_of_requested(world)
+            if self.carrier != NOBODY:
+                self.carrier_x = float(world.state.robot_position[self.carrier, 0])
 
 
 Earned = NDArray[np.float64] | float | None  # per robot, the same for all, or nothing
@@ -119,6 +123,7 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "approach": approach,
     "contact": contact,
 }
+_OF_CARRIER = {"lift_requested", "approach"}
 
 
 def carrier_of_requested(world: Warehouse) -> int:

@@ -20,6 +20,7 @@ class Grid:
     Attributes:
         start: (n_columns * n_rows + 1,) where each cell's points begin in `members`.
         members: (n_points,) point numbers, cell by cell, row by row of cells.
+        places: (n_points, 2) where they are [m], in the same order.
         size: [cells along x, cells along y].
         cell: side of a cell [m].
     """
@@ -32,6 +33,7 @@ class Grid:
         )
         self.start = np.zeros(int(self.size[0] * self.size[1]) + 1, dtype=np.int64)
         self.members = np.zeros(n_points, dtype=np.int64)
+        self.places = np.zeros((n_points, 2))
 
 
 @kernel
@@ -45,18 +47,19 @@ def look_around(
     x: float,
     y: float,
     reach: float,
-    position: NDArray[np.float64],
+    left_out: int,
     cell: float,
     size: NDArray[np.int64],
     start: NDArray[np.int64],
     members: NDArray[np.int64],
+    places: NDArray[np.float64],
     found: NDArray[np.int64],
     squares: NDArray[np.float64],
 ) -> int:
-    """List the points within `reach` [m] of (x, y); returns how many there are.
+    """List the points within `reach` [m] of (x, y), but for `left_out`; returns how many.
 
-    `found` and `squares`, longer than there are points, get their numbers and the squares of
-    their distances [m^2].
+    `found` and `squares`, longer than there are points, get where the points stand in `members`
+    and `places`, and the squares of their distances [m^2].
     """
     n_found, limit = 0, reach * reach
     left = cell_along(x - reach, cell, size[0])
@@ -64,13 +67,12 @@ def look_around(
     top = cell_along(y + reach, cell, size[1])
     for row in range(cell_along(y - reach, cell, size[1]), top + 1):
         for index in range(start[row * size[0] + left], start[row * size[0] + right + 1]):
-            point = members[index]
-            dx, dy = position[point, 0] - x, position[point, 1] - y
+            dx, dy = places[index, 0] - x, places[index, 1] - y
             square = dx * dx + dy * dy
             # Written always and counted only if near: no branch to mispredict.
-            found[n_found] = point
+            found[n_found] = index
             squares[n_found] = square
-            n_found += 1 if square <= limit else 0
+            n_found += int((square <= limit) & (members[index] != left_out))
     return n_found
 
 
@@ -82,6 +84,7 @@ def fill(
     size: NDArray[np.int64],
     start: NDArray[np.int64],
     members: NDArray[np.int64],
+    places: NDArray[np.float64],
 ) -> None:
     """Sort the included points of `position` (n, 2) into the grid's cells."""
     start[:] = 0
@@ -100,4 +103,7 @@ def fill(
             column = cell_along(position[point, 0], cell, size[0])
             row = cell_along(position[point, 1], cell, size[1])
             start[row * size[0] + column] -= 1
-            members[start[row * size[0] + column]] = point
+            place = start[row * size[0] + column]
+            members[place] = point
+            places[place, 0] = position[point, 0]
+            places[place, 1] = position[point, 1]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, pair_key, uniform
-from swarm_logistics_env.warehouse.grid import cell_along, look_around
+from swarm_logistics_env.warehouse.grid import look_around
 from swarm_logistics_env.warehouse.state import NOBODY
 
 _TOUCH = 0.01  # [m], gap below which two things touch
@@ -22,6 +22,9 @@ _BEAM_X = np.cos(2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
 _BEAM_Y = np.sin(2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
 # Tangents of the angles half-way between the beams of the first quarter.
 _BORDERS = tuple(math.tan((beam + 0.5) * 2.0 * math.pi / row.N_BEAMS) for beam in range(4))
+# Beyond so many squares of its radius a disc meets only the beam nearest to its centre: it looks
+# less wide than the beams stand apart. A little more, so that rounding decides nothing.
+_ONE_BEAM = 1.001 / math.sin(math.pi / row.N_BEAMS) ** 2
 _RANGE_ROBOTS, _RANGE_WALLS, _RANGE_ITEMS = row.RANGE_ROBOTS, row.RANGE_WALLS, row.RANGE_ITEMS
 _N_BEAMS, _N_ITEMS, _N_NEIGHBOURS = row.N_BEAMS, row.N_ITEMS_IN_VIEW, row.N_NEIGHBOURS
 _RADIO, _ROBOT_SEEN, _ITEM_SEEN = 0, 1, 2  # purposes of the streams between two things
@@ -38,11 +41,19 @@ def scan_disc(
 ) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a disc at (x, y) in robot frame."""
     clearance = square - radius * radius
+    middle = nearest_beam(x, y)
+    if square > _ONE_BEAM * radius * radius:
+        # Without a branch: whether it is met cannot be predicted.
+        along = x * _BEAM_X[middle] + y * _BEAM_Y[middle]
+        inside = along * along - clearance
+        distance = along - math.sqrt(max(inside, 0.0))
+        met = inside > 0.0 and distance < scan[middle]
+        scan[middle] = distance if met else scan[middle]
+        return
     if clearance <= 0.0:
         scan[:] = 0.0
         return
     # Outwards from the beam that looks nearest to its centre: if that one misses, all do.
-    middle = nearest_beam(x, y)
     for way in (1, -1):
         for turned in range(_N_BEAMS // 2):
             beam = (middle + way * (turned if way > 0 else turned + 1)) % _N_BEAMS
@@ -80,24 +91,18 @@ def scan_walls(
 ) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall, for a robot at (x, y)."""
     reach = scan[0]
-    for wall in range(4):
-        # Its distance, and the way to it in the warehouse's frame.
-        if wall == 0:
-            distance, way_x, way_y = width - x, 1.0, 0.0
-        elif wall == 1:
-            distance, way_x, way_y = height - y, 0.0, 1.0
-        elif wall == 2:
-            distance, way_x, way_y = x, -1.0, 0.0
+    for axis in range(2):
+        if axis == 0:
+            back, front, ahead, aside = x, width - x, cosine, -sine
         else:
-            distance, way_x, way_y = y, 0.0, -1.0
-        if distance >= reach:
+            back, front, ahead, aside = y, height - y, sine, cosine
+        if min(back, front) >= reach:
             continue
-        distance = max(distance, 0.0)
-        ahead, aside = way_x * cosine + way_y * sine, way_y * cosine - way_x * sine
+        back, front = max(back, 0.0), max(front, 0.0)
         for beam in range(_N_BEAMS):
             towards = _BEAM_X[beam] * ahead + _BEAM_Y[beam] * aside
             # Without a branch: all beams together are a few vector instructions.
-            found = distance / towards if towards > 0.0 else math.inf
+            found = np.float32((front if towards > 0.0 else back) / abs(towards))
             scan[beam] = found if found < scan[beam] else scan[beam]
 
 
@@ -157,10 +162,12 @@ def sense(
     robot_size: NDArray[np.int64],
     robot_start: NDArray[np.int64],
     robot_members: NDArray[np.int64],
+    robot_places: NDArray[np.float64],
     item_cell: float,
     item_size: NDArray[np.int64],
     item_start: NDArray[np.int64],
     item_members: NDArray[np.int64],
+    item_places: NDArray[np.float64],
     full_range: float,
     contact: NDArray[np.bool_],
     heard: NDArray[np.float64],
@@ -178,6 +185,7 @@ def sense(
     n_things = max(position.shape[0], item_position.shape[0]) + 1
     found, squares = np.empty(n_things, np.int64), np.empty(n_things)
     near, near_squares = np.empty(n_things, np.int64), np.empty(n_things)
+    scanned = np.empty(n_things, np.int64)
     rows[:, :] = 0.0
     n_anchored = 0
     for me in range(position.shape[0]):
@@ -221,44 +229,39 @@ def sense(
             ranger_range[me] + robot_radius, view_range[me], radio_range, robot_radius + touch
         )
         lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
-        n_near, anchored = 0, False
-        left = cell_along(x - reach, robot_cell, robot_size[0])
-        right = cell_along(x + reach, robot_cell, robot_size[0])
-        for cells in range(
-            cell_along(y - reach, robot_cell, robot_size[1]),
-            cell_along(y + reach, robot_cell, robot_size[1]) + 1,
-        ):
-            first = robot_start[cells * robot_size[0] + left]
-            for index in range(first, robot_start[cells * robot_size[0] + right + 1]):
-                other = robot_members[index]
-                if other == me:
-                    continue
-                dx, dy = position[other, 0] - x, position[other, 1] - y
-                square = dx * dx + dy * dy
-                if square < scan_square:
-                    scan_disc(
-                        dx * cosine + dy * sine, dy * cosine - dx * sine,
-                        square, robot_radius, scan_robots,
-                    )  # fmt: skip
-                    if square < touch_square:
-                        touches = True
-                elif square < touch_square:
-                    touches = True
-                if square < touch_square and failed[other] and not failed[me]:
-                    anchored = True
-                is_heard = square <= radio_square and sends[other] and hears[me]
-                if is_heard and radio_loss > 0.0:
-                    is_heard = not is_missed(keys[me], other, step, _RADIO, radio_loss)
-                if is_heard and not math.isnan(told[other]):
-                    lower = told[other] < lowest_timer
-                    if lower or (told[other] == lowest_timer and square < lowest_square):
-                        lowest, lowest_square, lowest_timer = other, square, told[other]
-                is_seen = square <= view_square
-                if is_seen and dropout > 0.0:
-                    is_seen = not is_missed(keys[me], other, step, _ROBOT_SEEN, dropout)
-                if is_heard or is_seen:
-                    near[n_near], near_squares[n_near] = other, square
-                    n_near += 1
+        n_near, n_scanned, anchored = 0, 0, False
+        n_found = look_around(
+            x, y, reach, me, robot_cell, robot_size, robot_start, robot_members, robot_places,
+            found, squares,
+        )  # fmt: skip
+        # Without branches, where what they hang on cannot be predicted.
+        for index in range(n_found):
+            other, square = robot_members[found[index]], squares[index]
+            touches |= square < touch_square
+            anchored |= (square < touch_square) & failed[other] & (not failed[me])
+            scanned[n_scanned] = index
+            n_scanned += int(square < scan_square)
+            is_heard = (square <= radio_square) & sends[other] & hears[me]
+            if radio_loss > 0.0 and is_heard:
+                is_heard = not is_missed(keys[me], other, step, _RADIO, radio_loss)
+            lower = (told[other] < lowest_timer) | (
+                (told[other] == lowest_timer) & (square < lowest_square)
+            )
+            lower &= is_heard
+            lowest = other if lower else lowest
+            lowest_square = square if lower else lowest_square
+            lowest_timer = told[other] if lower else lowest_timer
+            is_seen = square <= view_square
+            if dropout > 0.0 and is_seen:
+                is_seen = not is_missed(keys[me], other, step, _ROBOT_SEEN, dropout)
+            near[n_near], near_squares[n_near] = other, square
+            n_near += int(is_heard | is_seen)
+        for index in range(n_scanned):
+            place, square = found[scanned[index]], squares[scanned[index]]
+            dx, dy = robot_places[place, 0] - x, robot_places[place, 1] - y
+            scan_disc(
+                dx * cosine + dy * sine, dy * cosine - dx * sine, square, robot_radius, scan_robots
+            )
         n_anchored += anchored
         for place in range(nearest_first(near_squares, near, n_near, _N_NEIGHBOURS)):
             other = near[place]
@@ -288,30 +291,26 @@ def sense(
         scan_square = (ranger_range[me] + item_radius) ** 2 if sees_ranges else 0.0
         touch_square = (touch + item_radius) ** 2
         reach = max(ranger_range[me] + item_radius, view_range[me], touch + item_radius)
-        n_items = 0
-        scanned = (ranger_range[me] + item_radius) ** 2 if sees_ranges else 0.0
+        n_items, is_laden = 0, robot_item[me] != NOBODY
         n_found = look_around(
-            x, y, reach, item_position, item_cell, item_size, item_start, item_members,
+            x, y, reach, NOBODY, item_cell, item_size, item_start, item_members, item_places,
             found, squares,
         )  # fmt: skip
         for index in range(n_found):
-            item, square = found[index], squares[index]
-            if square < scanned:
-                dx, dy = item_position[item, 0] - x, item_position[item, 1] - y
+            place, square = found[index], squares[index]
+            if square < scan_square:
+                dx, dy = item_places[place, 0] - x, item_places[place, 1] - y
                 scan_disc(
                     dx * cosine + dy * sine, dy * cosine - dx * sine,
                     square, item_radius, scan_items,
                 )  # fmt: skip
-            if square > view_square and square >= touch_square:
-                continue
-            if square < touch_square and robot_item[me] != NOBODY:
-                touches = True
+            touches |= is_laden & (square < touch_square)
             is_seen = square <= view_square
-            if is_seen and dropout > 0.0:
+            if dropout > 0.0 and is_seen:
+                item = item_members[place]
                 is_seen = not is_missed(keys[me], item, step, _ITEM_SEEN, dropout)
-            if is_seen:
-                near[n_items], near_squares[n_items] = item, square
-                n_items += 1
+            near[n_items], near_squares[n_items] = item_members[place], square
+            n_items += int(is_seen)
         for place in range(nearest_first(near_squares, near, n_items, _N_ITEMS)):
             item = near[place]
             dx, dy = item_position[item, 0] - x, item_position[item, 1] - y

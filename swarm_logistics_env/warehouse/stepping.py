@@ -92,9 +92,11 @@ def step(
     robot_size: NDArray[np.int64],
     robot_start: NDArray[np.int64],
     robot_members: NDArray[np.int64],
+    robot_places: NDArray[np.float64],
     item_size: NDArray[np.int64],
     item_start: NDArray[np.int64],
     item_members: NDArray[np.int64],
+    item_places: NDArray[np.float64],
     keys: NDArray[np.uint64],
     message: NDArray[np.float64],
     rows: NDArray[np.float32],
@@ -119,7 +121,7 @@ def step(
     return perceive(
         step, requested, constants, position, velocity, numbers, flags, links, memory,
         item_position, item_links, obstacle_position, robot_size, robot_start, robot_members,
-        item_size, item_start, item_members, keys, message, rows,
+        robot_places, item_size, item_start, item_members, item_places, keys, message, rows,
     )  # fmt: skip
 
 
@@ -246,9 +248,11 @@ def perceive(
     robot_size: NDArray[np.int64],
     robot_start: NDArray[np.int64],
     robot_members: NDArray[np.int64],
+    robot_places: NDArray[np.float64],
     item_size: NDArray[np.int64],
     item_start: NDArray[np.int64],
     item_members: NDArray[np.int64],
+    item_places: NDArray[np.float64],
     keys: NDArray[np.uint64],
     message: NDArray[np.float64],
     rows: NDArray[np.float32],
@@ -259,10 +263,13 @@ def perceive(
         flags[at.IN_DELIVERY], flags[at.PRESENT], flags[at.HONEST], numbers[at.HEARD],
         links[at.LAST_IN_DELIVERY], numbers[at.TIMER], numbers[at.TOLD],
     )  # fmt: skip
-    fill(position, flags[at.PRESENT], constants[ROBOT_CELL], robot_size, robot_start, robot_members)
+    fill(
+        position, flags[at.PRESENT],
+        constants[ROBOT_CELL], robot_size, robot_start, robot_members, robot_places,
+    )  # fmt: skip
     fill(
         item_position, item_links[at.STATUS] == at.STORED,
-        constants[ITEM_CELL], item_size, item_start, item_members,
+        constants[ITEM_CELL], item_size, item_start, item_members, item_places,
     )  # fmt: skip
     anchored = sense(
         constants[WIDTH], constants[HEIGHT], constants[ROBOT_RADIUS], constants[ITEM_RADIUS],
@@ -271,8 +278,8 @@ def perceive(
         numbers[at.HEADING], links[at.ITEM], memory, numbers[at.TIMER], numbers[at.TOLD],
         flags[at.IN_DELIVERY], item_position, obstacle_position, numbers[at.RANGER_RANGE],
         numbers[at.VIEW_RANGE], flags[at.SENDS], flags[at.HEARS], flags[at.FAILED],
-        constants[ROBOT_CELL], robot_size, robot_start, robot_members,
-        constants[ITEM_CELL], item_size, item_start, item_members,
+        constants[ROBOT_CELL], robot_size, robot_start, robot_members, robot_places,
+        constants[ITEM_CELL], item_size, item_start, item_members, item_places,
         constants[RANGER_RANGE], flags[at.CONTACT], numbers[at.HEARD], keys, step,
         constants[RADIO_LOSS], constants[SENSOR_DROPOUT], message, rows,
     )  # fmt: skip

@@ -187,6 +187,10 @@ class Warehouse:
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
         if self._seed is None:
             raise SetupError("step before reset: call reset(seed) first")
+        if isinstance(commands, np.ndarray) and commands.dtype == np.float64:
+            plain_numbers: NDArray[np.float64] = commands.copy()
+            if plain_numbers.shape == self._command_shape:
+                return plain_numbers
         try:
             if np.iscomplexobj(commands):
                 raise CommandError("commands should be numbers: real ones, not complex")
@@ -328,6 +332,7 @@ class Warehouse:
         return (
             self._constants, state.robot_position, state.robot_velocity, state.numbers, state.flags,
             state.links, state.robot_memory, state.item_position, state.item_links,
-            state.obstacle_position, robots.size, robots.start, robots.members, items.size,
-            items.start, items.members, self._sensor_keys, state.robot_message, rows,
+            state.obstacle_position, robots.size, robots.start, robots.members, robots.places,
+            items.size, items.start, items.members, items.places, self._sensor_keys,
+            state.robot_message, rows,
         )  # fmt: skip

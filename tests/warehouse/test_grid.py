@@ -13,7 +13,9 @@ def filled(
     grid: Grid, position: NDArray[np.float64], included: NDArray[np.bool_]
 ) -> list[list[int]]:
     """Return the points of each cell."""
-    fill(position, included, grid.cell, grid.size, grid.start, grid.members)
+    fill(position, included, grid.cell, grid.size, grid.start, grid.members, grid.places)
+    listed = grid.members[: grid.start[-1]]
+    np.testing.assert_array_equal(grid.places[: len(listed)], position[listed])
     return [
         grid.members[first:last].tolist()
         for first, last in zip(grid.start[:-1], grid.start[1:], strict=True)
