@@ -103,6 +103,8 @@ class Watch:
         depth[~here] = -np.inf
         # The speed of the last step is that before or after a change.
         closing = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period
+        # Slow robots close less than a jam may be deep.
+        closing = max(closing, SUSTAINED)
         free = ~self._shoved(depth)
         deepest = float(depth[free].max(initial=-np.inf))
         self._demand(
