@@ -257,9 +257,14 @@ class Store:
             self._database.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
 
     def _prepare(self) -> None:
-        (version,) = self._database.execute("PRAGMA user_version").fetchone()
-        (application,) = self._database.execute("PRAGMA application_id").fetchone()
-        (tables,) = self._database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        # One moment's answers: another process may be making the tables.
+        self._database.execute("BEGIN")
+        try:
+            (version,) = self._database.execute("PRAGMA user_version").fetchone()
+            (application,) = self._database.execute("PRAGMA application_id").fetchone()
+            (tables,) = self._database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        finally:
+            self._database.execute("ROLLBACK")
         if application != APPLICATION_ID and tables:
             raise StudyError(f"{self.path} is a database, but not the store of a study")
         if application == APPLICATION_ID and not 1 <= version <= SCHEMA_VERSION:

@@ -215,6 +215,7 @@ class Study:
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error."""
+        _need_pandas()
         import pandas as pd
 
         wanted = {run.key for run in self.plan().runs()}
@@ -223,6 +224,7 @@ class Study:
 
     def indicators(self) -> pd.DataFrame:
         """Return one row per comparison: indicator, interval, verdicts, claim."""
+        _need_pandas()
         import pandas as pd
 
         from swarm_logistics_env.studies.reporting.files import judgement_record
@@ -264,3 +266,12 @@ class Study:
                 raise StudyError("nothing has been run: call run() first")
             self._memory = Store(None)
         yield self._memory
+
+
+def _need_pandas() -> None:
+    try:
+        import pandas  # noqa: F401
+    except ImportError:
+        raise StudyError(
+            "a DataFrame needs pandas: pip install 'swarm-logistics-env[study]'"
+        ) from None

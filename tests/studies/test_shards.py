@@ -11,12 +11,9 @@ from swarm_logistics_env.studies.shards import Shard
 
 @pytest.mark.parametrize("count", [1, 2, 7, 1000])
 def test_every_run_is_in_one_shard(count: int) -> None:
-    runs = [run.key for run in Study.preset("quick").plan().runs()]
-    parts = [
-        [run.key for run in Shard(i, count).of(Study.preset("quick").plan().runs())]
-        for i in range(1, count + 1)
-    ]
-    assert Counter(key for part in parts for key in part) == Counter(runs)
+    runs = list(Study.preset("quick").plan().runs())
+    parts = [list(Shard(i, count).of(runs)) for i in range(1, count + 1)]
+    assert Counter(run.key for part in parts for run in part) == Counter(run.key for run in runs)
     assert max(map(len, parts)) - min(map(len, parts)) <= 1
 
 

@@ -165,24 +165,35 @@ def test_no_study_there(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+MAKER = """
+import pathlib, sys
+from swarm_logistics_env.studies.store import Store
+
+for line in sys.stdin:
+    with Store(pathlib.Path(line.strip())) as store:
+        store.set_note(sys.argv[1], "here")
+    print("made", flush=True)
+"""
+
+
 def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
-    script = (
-        "import sys, pathlib; from swarm_logistics_env.studies.store import Store; "
-        "input(); s = Store(pathlib.Path(sys.argv[1])); s.set_note(sys.argv[2], 'here')"
-    )
-    path = tmp_path / FILE_NAME
     makers = [
         subprocess.Popen(
-            [sys.executable, "-c", script, str(path), str(number)], stdin=subprocess.PIPE, text=True
+            [sys.executable, "-c", MAKER, str(number)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
         for number in range(2)
     ]
-    for maker in makers:
-        assert maker.stdin is not None
-        maker.stdin.write("go\n")
-        maker.stdin.flush()
-    for maker in makers:
-        maker.communicate()
-        assert maker.returncode == 0
-    with Store.existing(tmp_path) as store:
-        assert [store.note("0"), store.note("1")] == ["here", "here"]
+    with makers[0], makers[1]:
+        for attempt in range(40):
+            directory = tmp_path / str(attempt)
+            directory.mkdir()
+            for maker in makers:
+                print(directory / FILE_NAME, file=maker.stdin, flush=True)
+            for maker in makers:
+                assert maker.stdout is not None
+                assert maker.stdout.readline() == "made\n"
+            with Store.existing(directory) as store:
+                assert [store.note("0"), store.note("1")] == ["here", "here"]

@@ -22,7 +22,10 @@ from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.conditions import Run
 from swarm_logistics_env.studies.execution import Outcome
+from swarm_logistics_env.studies.reporting.document import document
 from swarm_logistics_env.studies.reporting.files import export_rows
+from swarm_logistics_env.studies.reporting.markdown import markdown
+from swarm_logistics_env.studies.shards import Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 DYING = """
@@ -46,6 +49,23 @@ from swarm_logistics_env.studies import Study
 if __name__ == "__main__":
     study = Study(out=sys.argv[1], **json.loads(sys.argv[2]))
     study.run(processes=int(sys.argv[3]))
+"""
+
+# Plays the study in a process group of its own per line that it reads, without a new interpreter.
+SEVERAL_TIMES = """
+import json, os, sys
+from swarm_logistics_env.studies import Study
+
+study = Study(**{**json.loads(sys.argv[2]), "seeds": 1, "faults": [], "parameters": []})
+study.run()  # loads what is compiled
+for _ in sys.stdin:
+    child = os.fork()
+    if child == 0:
+        Study(out=sys.argv[1], **json.loads(sys.argv[2])).run()
+        os._exit(0)
+    os.setpgid(child, child)
+    print(child, flush=True)
+    os.waitpid(child, 0)
 """
 
 
@@ -83,9 +103,7 @@ ONE: dict[str, Any] = {"sizes": [{"values": [2, 4]}]}
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small study, played in this process."""
     directory = tmp_path_factory.mktemp("undisturbed")
-    study = Study(out=directory, **SMALL)
-    study.run()
-    study.report()
+    Study(out=directory, **SMALL).run()
     return directory
 
 
@@ -118,6 +136,10 @@ def reports(directory: Path) -> list[bytes]:
     return [(directory / name).read_bytes() for name in ("report.md", "cells.csv", "claims.csv")]
 
 
+def told(directory: Path) -> str:
+    return markdown(document(Study.stored(directory).findings()))
+
+
 def test_swarm_delivers_and_rows_are_sound(undisturbed: Path) -> None:
     with Store.existing(undisturbed) as store:
         rows = list(store.rows())
@@ -127,38 +149,46 @@ def test_swarm_delivers_and_rows_are_sound(undisturbed: Path) -> None:
     assert all(row["error"] is None for row in rows)
 
 
-def test_processes_give_the_same_bytes(undisturbed: Path, tmp_path: Path) -> None:
-    study = Study(out=tmp_path, **SMALL)
-    study.run(processes=2)
-    study.report()
-    assert export(tmp_path) == export(undisturbed)
-    assert reports(tmp_path) == reports(undisturbed)
-
-
 def test_study_killed_at_ten_random_moments_goes_on(undisturbed: Path, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     out = tmp_path / "out"
     command = [sys.executable, str(script), str(out), json.dumps(SMALL)]
     total = len(list(Study(**SMALL).plan().runs()))
-    chance = random.Random()
     kept = 0
-    for kill in range(10):
-        # Mostly of one process: it starts the faster.
-        processes = "2" if kill in (3, 7) else "1"
-        process = subprocess.Popen(
-            [*command, processes], start_new_session=True, stderr=subprocess.PIPE
-        )
+
+    def killed(group: int) -> None:
+        nonlocal kept
         while stored(out) == kept:
-            assert process.poll() is None, process.communicate()
+            os.killpg(group, 0)  # it still runs
             time.sleep(0.002)
-        time.sleep(chance.uniform(0, 0.02))
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+        time.sleep(random.Random().uniform(0, 0.02))
+        os.killpg(group, signal.SIGKILL)
+
+    def counted() -> None:
+        nonlocal kept
         assert kept < stored(out) < total
         kept = stored(out)
-    subprocess.run([*command, "2"], check=True)
+
+    with subprocess.Popen(
+        [sys.executable, "-c", SEVERAL_TIMES, *command[2:]],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as warm:
+        assert warm.stdin is not None
+        assert warm.stdout is not None
+        for kill in range(10):
+            if kill == 5:  # from a new interpreter, with workers of its own
+                with subprocess.Popen([*command, "2"], start_new_session=True) as process:
+                    killed(process.pid)
+            else:
+                print(file=warm.stdin, flush=True)
+                killed(int(warm.stdout.readline()))
+            counted()
+    Study(out=out, **SMALL).run()
     assert export(out) == export(undisturbed)
+    assert told(out) == told(undisturbed)
 
 
 def stored(directory: Path) -> int:
@@ -303,10 +333,12 @@ def test_run_whose_worker_is_killed_is_tried_again_once(
         scenario=SMALL["scenario"],
         sizes=[{"values": [2, 4]}],
     )
-    tally = study.run(processes=2)
-    assert tally.played == 2
-    assert tally.failed == (2 if always == "yes" else 0)
-    if always == "yes":
+    # One run is enough where it ends its workers for good.
+    tally = study.run("process", processes=1, shard=Shard(1, 2) if always == "yes" else None)
+    if always == "no":
+        assert (tally.played, tally.failed) == (2, 0)
+    else:
+        assert (tally.played, tally.failed) == (1, 1)
         assert study.results()["error"].str.contains("SIGKILL").all()
 
 
@@ -318,15 +350,20 @@ def test_policy_that_cannot_travel_is_refused(tmp_path: Path) -> None:
         out=tmp_path, policies=[Local()], seeds=1, scenario=SMALL["scenario"], sizes=SMALL["sizes"]
     )
     with pytest.raises(StudyError, match="use one process"):
-        study.run(processes=2)
+        study.run("process", processes=1)
     assert study.run(processes=1).failed == 0
 
 
-def test_study_in_memory() -> None:
+def test_study_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     study = Study(**{**SMALL, "seeds": 2})
     with pytest.raises(StudyError, match="nothing has been run"):
         study.results()
     study.run()
+    with monkeypatch.context() as patched:
+        patched.setitem(sys.modules, "pandas", None)
+        for frame in (study.results, study.indicators):
+            with pytest.raises(StudyError, match=r"pip install 'swarm-logistics-env\[study\]'"):
+                frame()
     table = study.indicators()
     assert list(table["indicator"].unique()) == ["S", "FT", "R", "A", "change"]
     assert table["problem"].isna().all()
