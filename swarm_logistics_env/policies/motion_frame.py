@@ -33,8 +33,7 @@ def _names() -> tuple[str, ...]:
         *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in ("present", *vector)),
         "requested_present", "requested_along", "requested_aside", "requested_distance",
         "requested_nearness", "requested_recently_held",
-        "lowest_timer_present", "lowest_timer_along", "lowest_timer_aside",
-        "lowest_timer_distance", "lowest_timer",
+        "lead_present", "lead_along", "lead_aside", "lead_distance", "lead_timer",
         "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
         "velocity_along", "velocity_aside", "heading_along", "heading_aside",
         "home_along", "home_aside", "home_certainty", "failed", "stuck",
@@ -164,12 +163,16 @@ def read_rows(
                 told[at + 4] = max(0.0, 1.0 - away / NEAR)
                 told[at + 5] = sensed[there + 4]
         at += 6
+        sure = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
+        # The teller of the lowest timer may be a liar: it fades as the robot knows for itself.
+        heard = sensed[row.LOWEST_TIMER] * (1.0 - math.tanh(sure))
         x, y = sensed[row.LOWEST_TIMER + 1], sensed[row.LOWEST_TIMER + 2]
         away = math.sqrt(x * x + y * y)
-        unit = 1.0 / away if away > 0.0 else 0.0
-        told[at] = sensed[row.LOWEST_TIMER]
+        unit = heard / away if away > 0.0 else 0.0
+        told[at] = heard
         told[at + 1], told[at + 2] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
-        told[at + 3], told[at + 4] = away / 4.0, sensed[row.LOWEST_TIMER + 3] / 10.0
+        told[at + 3] = heard * away / 4.0
+        told[at + 4] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
         at += 5
         told[at] = sensed[row.CARRYING]
         told[at + 1] = sensed[row.CARRYING_REQUESTED]
@@ -185,7 +188,6 @@ def read_rows(
         told[at], told[at + 1] = cos * x + sin * y, 2.0 * (cos * y - sin * x)
         at += 2
         x, y = own[known.HOME_X], own[known.HOME_Y]
-        sure = math.sqrt(x * x + y * y)
         unit = math.tanh(sure) / sure if sure > 0.0 else 0.0
         told[at], told[at + 1] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
         told[at + 2] = math.tanh(sure / 3.0)

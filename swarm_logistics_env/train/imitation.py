@@ -42,8 +42,8 @@ def imitate(policy: Any, training: Training, asked: Imitation) -> None:
             samples.append(_collected(policy, view, training, asked, number))
             is_last = number == asked.rounds - 1
             loss = _fit(policy, optimizer, samples, asked, asked.last_fit if is_last else asked.fit)
-            report.reach(number + 1)
-            report.say(f"{sum(len(x) for x, _ in samples):,} samples, loss {loss:.4f}")
+            size = sum(len(inputs) for inputs, _ in samples)
+            report.reach(number + 1, f"{size:,} samples, loss {loss:.4f}")
     view.close()
 
 

@@ -53,19 +53,23 @@ class Report:
         """What was done per second since it was entered."""
         return (self._done - self._first) / max(time.monotonic() - self._start, 1e-9)
 
-    def reach(self, done: int) -> None:
-        """Show that so much is done."""
+    def reach(self, done: int, what: str = "") -> None:
+        """Show that so much is done; print `what` came of it, if anything is to be said."""
         self._done = done
         if self._bar:
             note = f"{self.rate:,.0f} {self._unit}/s"
             self._bar.update(self._bar.task_ids[0], completed=done, note=note)
-        elif time.monotonic() - self._last_line >= LINE_EVERY:
-            self.say("")
+        if what or (not self._bar and time.monotonic() - self._last_line >= LINE_EVERY):
+            self.say(what)
 
     def say(self, what: str) -> None:
         """Print a line: how far it is, and `what`."""
         self._last_line = time.monotonic()
-        parts = [f"{self._done:,} of {self._total:,} {self._unit}", f"{self.rate:,.0f}/s", what]
+        parts = [
+            f"{self._done:,} of {self._total:,} {self._unit}",
+            f"{self.rate:,.3g}/s" if self.rate < 10 else f"{self.rate:,.0f}/s",
+            what,
+        ]
         self._console.print(f"{self._label}: {', '.join(part for part in parts if part)}")
 
 

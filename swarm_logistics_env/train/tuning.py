@@ -125,8 +125,8 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
         while done < asked.trials:
             values = _try(study, asked, done)
             done = len(_completed(study))
-            report.reach(done)
-            report.say(", ".join(f"{n} = {v:.3g}" for n, v in zip(asked.objectives, values)))
+            shown = (f"{name} = {value:.3g}" for name, value in zip(asked.objectives, values))
+            report.reach(done, ", ".join(shown))
     trials = _trials(study)
     best = max(trials, key=lambda trial: trial.values[0])
     record = TunedPolicy(

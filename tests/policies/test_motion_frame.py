@@ -156,3 +156,17 @@ def test_peeking_changes_nothing() -> None:
     read = one.read(rows)
     assert (read == other.read(rows)).all()
     assert (peeked == read[2:4]).all()
+
+
+def test_a_robot_that_knows_the_way_home_is_not_led_astray() -> None:
+    frame = frame_of(1)
+    rows = nothing()
+    rows[0, row.LOWEST_TIMER : row.LOWEST_TIMER + 4] = 1.0, 2.0, 0.0, 5.0
+    read = frame.read(rows)
+    assert told(read, "lead_present") == 1.0
+    assert math.hypot(told(read, "lead_along"), told(read, "lead_aside")) == pytest.approx(1.0)
+    assert told(read, "lead_distance") == told(read, "lead_timer") == 0.5
+    frame.memory[0, known.HOME_X] = 6.0
+    read = frame.read(rows)
+    led = [value for name, value in zip(INPUTS, read[0]) if name.startswith("lead_")]
+    np.testing.assert_allclose(led, 0.0, atol=1e-4)

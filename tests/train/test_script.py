@@ -1,0 +1,30 @@
+"""`python train/ppo.py`, as the clone shows it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.skipif(not (ROOT / "train").exists(), reason="an sdist has no links")
+def test_the_script_finds_the_clone_it_stands_in(tmp_path: Path) -> None:
+    script = [sys.executable, str(ROOT / "train" / "ppo.py"), "--preset"]
+    # Not installed: what it needs it finds by its own place.
+    environment = {**os.environ, "PYTHONSAFEPATH": ""}
+    done = subprocess.run(
+        [*script, "deliver"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "no training preset 'deliver'; did you mean 'delivery'?" in done.stderr
+    assert list(tmp_path.iterdir()) == []
