@@ -48,5 +48,6 @@ def pytest_configure(config: pytest.Config) -> None:
     if not numba.config.DISABLE_JIT:
         raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
     engine.call_at, engine.store_at = _call_at, _store_at
-    # Streams count modulo 2**64.
-    config.addinivalue_line("filterwarnings", "ignore:overflow encountered:RuntimeWarning")
+    # Streams count modulo 2**64, and kernels divide as IEEE 754 says.
+    for what in ("overflow", "divide by zero"):
+        config.addinivalue_line("filterwarnings", f"ignore:{what} encountered:RuntimeWarning")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from swarm_logistics_env import Fault, Warehouse
 from swarm_logistics_env import observations as row
@@ -52,6 +53,48 @@ def test_the_requested_item_comes_before_a_nearer_one(build: Build) -> None:
     world = build([(2.0, 2.0)], [(2.2, 2.0), (1.95, 2.0)])
     world.step([HOLD])
     assert world.state.robot_item[0] == 0
+
+
+@pytest.mark.parametrize("items", [[(2.2, 2.0), (1.95, 2.0)], [(1.95, 2.0), (2.2, 2.0)]])
+def test_of_others_the_nearest_is_lifted_whatever_its_number(
+    build: Build, items: list[tuple[float, float]]
+) -> None:
+    world = build([(2.0, 2.0)], [FAR, *items])
+    world.step([HOLD])
+    assert world.state.robot_item[0] == 1 + items.index((1.95, 2.0))
+    np.testing.assert_array_equal(world.state.item_position, [FAR, *_with(items, (2.0, 2.0))])
+
+
+def _with(items: list[tuple[float, float]], carried: tuple[float, float]) -> ArrayLike:
+    return [carried if item == (1.95, 2.0) else item for item in items]
+
+
+def test_of_two_equally_near_the_lower_number_is_lifted(build: Build) -> None:
+    for items in ([(2.25, 2.625), (2.25, 2.375)], [(2.25, 2.375), (2.25, 2.625)]):
+        world = build([(2.25, 2.5)], [FAR, *items])
+        world.step([HOLD])
+        assert world.state.robot_item[0] == 1
+
+
+@pytest.mark.parametrize(("width", "height"), [(30.0, 4.0), (6.0, 30.0)])
+def test_items_are_found_anywhere_in_a_long_or_a_high_arena(
+    build: Build, width: float, height: float
+) -> None:
+    places = [(x, y) for x in (0.3, 3.0, width - 2.5) for y in (0.3, 2.0, height - 0.3)]
+    items = [(x + 0.1, y) for x, y in places]
+    world = build(places, items, warehouse_width=width, warehouse_height=height)
+    world.step([HOLD] * len(places))
+    assert world.state.robot_item.tolist() == list(range(len(places)))
+
+
+def test_an_empty_robot_that_opens_its_gripper_changes_nothing(build: Build) -> None:
+    world = build([(2.0, 2.0), (5.0, 5.0)], [FAR, (4.0, 9.0), (5.0, 5.1)])
+    world.step([STAY, HOLD])
+    world.step([OPEN, STAY])
+    assert world.state.robot_item.tolist() == [NOBODY, 2]
+    assert world.state.item_status.tolist() == [STORED, STORED, CARRIED]
+    assert world.state.item_carrier.tolist() == [NOBODY, NOBODY, 1]
+    assert (world.state.robot_memory == NOBODY).all()
 
 
 def test_nothing_is_lifted_from_beyond_the_pickup_range(build: Build) -> None:
