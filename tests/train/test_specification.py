@@ -12,7 +12,7 @@ from swarm_logistics_env.train.specification import Conditions
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_can_be(name: str) -> None:
     training = load_training(name)
-    assert training.name == name
+    assert training.name == f"ppo-{name}"
     assert Training.from_json(training.to_json()) == training
     assert training.about
 
