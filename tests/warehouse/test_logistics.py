@@ -55,18 +55,18 @@ def test_the_requested_item_comes_before_a_nearer_one(build: Build) -> None:
     assert world.state.robot_item[0] == 0
 
 
-@pytest.mark.parametrize("items", [[(2.2, 2.0), (1.95, 2.0)], [(1.95, 2.0), (2.2, 2.0)]])
+@pytest.mark.parametrize("items", [[(2.2, 3.0), (1.95, 3.0)], [(1.95, 3.0), (2.2, 3.0)]])
 def test_of_others_the_nearest_is_lifted_whatever_its_number(
     build: Build, items: list[tuple[float, float]]
 ) -> None:
-    world = build([(2.0, 2.0)], [FAR, *items])
+    world = build([(2.0, 3.0)], [FAR, *items])
     world.step([HOLD])
-    assert world.state.robot_item[0] == 1 + items.index((1.95, 2.0))
-    np.testing.assert_array_equal(world.state.item_position, [FAR, *_with(items, (2.0, 2.0))])
+    assert world.state.robot_item[0] == 1 + items.index((1.95, 3.0))
+    np.testing.assert_array_equal(world.state.item_position, [FAR, *_with(items, (2.0, 3.0))])
 
 
 def _with(items: list[tuple[float, float]], carried: tuple[float, float]) -> ArrayLike:
-    return [carried if item == (1.95, 2.0) else item for item in items]
+    return [carried if item == (1.95, 3.0) else item for item in items]
 
 
 def test_of_two_equally_near_the_lower_number_is_lifted(build: Build) -> None:
