@@ -56,6 +56,16 @@ def call_at(typing_context: Any, address: types.Type, arguments: types.Type) -> 
     return types.void(types.int64, arguments), generate
 
 
+@cast("Callable[..., Callable[[int], Any]]", intrinsic)
+def pointer_at(typing_context: Any, address: types.Type) -> Any:
+    """Return `address` as the pointer that `numba.carray` takes."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.inttoptr(values[0], context.get_value_type(types.voidptr))
+
+    return types.voidptr(types.int64), generate
+
+
 @_generated
 def store_at(typing_context: Any, address: types.Type, value: types.Type) -> Any:
     """Write `value` as a C int (32 bits) to `address`."""

@@ -40,6 +40,23 @@ class Column(Generic[T]):
         state.__dict__[self.table][self.index] = values
 
 
+class Array(Generic[T]):
+    """One array: what is assigned to it is copied into it, as kernels know where it lies."""
+
+    def __set_name__(self, owner: type[WarehouseState], name: str) -> None:
+        """Take the attribute's name."""
+        self.name = name
+
+    def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> NDArray[T]:
+        """Return the array."""
+        array: NDArray[T] = state.__dict__[self.name]
+        return array
+
+    def __set__(self, state: WarehouseState, values: NDArray[T]) -> None:
+        """Copy `values` into the array, which they become if there is none."""
+        state.__dict__.setdefault(self.name, values)[...] = values
+
+
 class WarehouseState:
     """What is true in the warehouse now. N robots, I items; a row is one robot or item for good.
 
@@ -72,6 +89,15 @@ class WarehouseState:
     item_status = Column[np.int64]("item_links", STATUS)  # (I,) STORED, CARRIED or DELIVERED
     item_carrier = Column[np.int64]("item_links", CARRIER)  # (I,) robot, or NOBODY
 
+    numbers, links, item_links = Array[np.float64](), Array[np.int64](), Array[np.int64]()
+    flags = Array[np.bool_]()
+    robot_position = Array[np.float64]()  # (N, 2) [m]
+    robot_velocity = Array[np.float64]()  # (N, 2) [m/s]
+    robot_memory = Array[np.int64]()  # (N, memory_size) put down, newest first
+    robot_message = Array[np.float64]()  # (N, message_size) in [-1, 1], broadcast
+    item_position = Array[np.float64]()  # (I, 2) [m], its carrier's while carried
+    obstacle_position = Array[np.float64]()  # (n_obstacles, 2) [m]
+
     def __init__(self, scenario: Scenario) -> None:
         n, items = scenario.n_robots, scenario.n_items
         self.numbers = np.full((8, n), np.nan)
@@ -80,13 +106,13 @@ class WarehouseState:
         self.flags[[IN_DELIVERY, CONTACT, FAILED]] = False
         self.links = np.full((2, n), NOBODY)
         self.item_links = np.full((2, items), NOBODY)
-        self.robot_position = np.zeros((n, 2))  # [m]
-        self.robot_velocity = np.zeros((n, 2))  # [m/s]
-        self.robot_memory = np.full((n, scenario.memory_size), NOBODY)  # put down, newest first
-        self.robot_message = np.zeros((n, scenario.message_size))  # in [-1, 1], broadcast
-        self.item_position = np.zeros((items, 2))  # [m], its carrier's while carried
+        self.robot_position = np.zeros((n, 2))
+        self.robot_velocity = np.zeros((n, 2))
+        self.robot_memory = np.full((n, scenario.memory_size), NOBODY)
+        self.robot_message = np.zeros((n, scenario.message_size))
+        self.item_position = np.zeros((items, 2))
         self.item_status[:] = STORED
-        self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
+        self.obstacle_position = np.zeros((scenario.n_obstacles, 2))
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * n  # per robot, those that hold
         self.step = 0  # control steps since the start
         self.time = 0.0  # [s]

@@ -24,6 +24,14 @@ from swarm_logistics_env.warehouse.logistics import (
     run_timers,
 )
 from swarm_logistics_env.warehouse.sensing import sense
+from swarm_logistics_env.warehouse.tables import (
+    count_row_in,
+    counts_in,
+    flags_in,
+    keys_in,
+    number_row_in,
+    numbers_in,
+)
 
 # Rows of the constants, one number each.
 (
@@ -62,43 +70,26 @@ def constants_of(scenario: Scenario, robot_cell: float, item_cell: float) -> NDA
     return constants
 
 
-_MESSAGE = 4  # first column of a command row that is broadcast, where there are any
+# Places of the arrays that a step works on, in the order of `Warehouse`'s tables.
+(
+    ENGINE, BODIES, VELOCITIES, CLAIM, CLAIM_SQUARE, EVENTS, CONSTANTS, POSITION, VELOCITY,
+    NUMBERS, FLAGS, LINKS, MEMORY, ITEM_POSITION, ITEM_LINKS, OBSTACLE_POSITION, ROBOT_SIZE,
+    ROBOT_START, ROBOT_MEMBERS, ROBOT_PLACES, ITEM_SIZE, ITEM_START, ITEM_MEMBERS, ITEM_PLACES,
+    KEYS, MESSAGE,
+) = range(26)  # fmt: skip
+
+_FIRST_OF_MESSAGE = 4  # column of a command row, where there are any
 # What `step` returns instead of a number of robots.
 NOT_FINITE, TO_BE_PERCEIVED = -1, -2
 
 
 @kernel
 def step(
+    tables: NDArray[np.int64],
     commands: NDArray[np.float64],
     step: int,
     requested: int,
     pauses: bool,
-    engine: NDArray[np.int64],
-    bodies: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    claim: NDArray[np.int64],
-    claim_square: NDArray[np.float64],
-    events: NDArray[np.int64],
-    constants: NDArray[np.float64],
-    position: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    numbers: NDArray[np.float64],
-    flags: NDArray[np.bool_],
-    links: NDArray[np.int64],
-    memory: NDArray[np.int64],
-    item_position: NDArray[np.float64],
-    item_links: NDArray[np.int64],
-    obstacle_position: NDArray[np.float64],
-    robot_size: NDArray[np.int64],
-    robot_start: NDArray[np.int64],
-    robot_members: NDArray[np.int64],
-    robot_places: NDArray[np.float64],
-    item_size: NDArray[np.int64],
-    item_start: NDArray[np.int64],
-    item_members: NDArray[np.int64],
-    item_places: NDArray[np.float64],
-    keys: NDArray[np.uint64],
-    message: NDArray[np.float64],
     rows: NDArray[np.float32],
 ) -> int:
     """Take control step number `step` and fill the observation rows.
@@ -107,22 +98,26 @@ def step(
     not finite; or `TO_BE_PERCEIVED`, with the rows still to be filled by `perceive`, if the
     requested item can now be delivered or if it `pauses` anyway.
     """
+    constants, flags = number_row_in(tables, CONSTANTS), flags_in(tables, FLAGS)
+    engine, bodies = count_row_in(tables, ENGINE), numbers_in(tables, BODIES)
+    velocities, numbers = numbers_in(tables, VELOCITIES), numbers_in(tables, NUMBERS)
     n_touching = set_out(commands, constants, numbers, flags, bodies, velocities)
     if n_touching < 0:
         return NOT_FINITE
     advance(engine, n_touching, int(constants[N_SUBSTEPS]), constants[PHYSICS_PERIOD])
-    send(commands, flags, message)
+    send(commands, flags, numbers_in(tables, MESSAGE))
     is_due = handle_items(
-        commands, requested, constants, engine, bodies, position, velocity, flags, links, memory,
-        item_position, item_links, claim, claim_square, item_size, item_start, item_members, events,
+        commands, requested, constants, engine, bodies,
+        numbers_in(tables, POSITION), numbers_in(tables, VELOCITY), flags,
+        counts_in(tables, LINKS), counts_in(tables, MEMORY),
+        numbers_in(tables, ITEM_POSITION), counts_in(tables, ITEM_LINKS),
+        count_row_in(tables, CLAIM), number_row_in(tables, CLAIM_SQUARE),
+        count_row_in(tables, ITEM_SIZE), count_row_in(tables, ITEM_START),
+        count_row_in(tables, ITEM_MEMBERS), counts_in(tables, EVENTS),
     )  # fmt: skip
     if is_due or pauses:
         return TO_BE_PERCEIVED
-    return perceive(
-        step, requested, constants, position, velocity, numbers, flags, links, memory,
-        item_position, item_links, obstacle_position, robot_size, robot_start, robot_members,
-        robot_places, item_size, item_start, item_members, item_places, keys, message, rows,
-    )  # fmt: skip
+    return perceive(tables, step, requested, rows)
 
 
 @kernel
@@ -132,7 +127,7 @@ def send(
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
     first = commands.shape[1] - message.shape[1]
     for robot in range(message.shape[0]):
-        sends = first == _MESSAGE and flags[at.PRESENT, robot] and flags[at.OBEYS, robot]
+        sends = first == _FIRST_OF_MESSAGE and flags[at.PRESENT, robot] and flags[at.OBEYS, robot]
         for place in range(message.shape[1]):
             given = commands[robot, first + place] if sends else 0.0
             message[robot, place] = min(max(given, -1.0), 1.0)
@@ -233,31 +228,21 @@ def deliver_requested(
 
 @kernel
 def perceive(
-    step: int,
-    requested: int,
-    constants: NDArray[np.float64],
-    position: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    numbers: NDArray[np.float64],
-    flags: NDArray[np.bool_],
-    links: NDArray[np.int64],
-    memory: NDArray[np.int64],
-    item_position: NDArray[np.float64],
-    item_links: NDArray[np.int64],
-    obstacle_position: NDArray[np.float64],
-    robot_size: NDArray[np.int64],
-    robot_start: NDArray[np.int64],
-    robot_members: NDArray[np.int64],
-    robot_places: NDArray[np.float64],
-    item_size: NDArray[np.int64],
-    item_start: NDArray[np.int64],
-    item_members: NDArray[np.int64],
-    item_places: NDArray[np.float64],
-    keys: NDArray[np.uint64],
-    message: NDArray[np.float64],
-    rows: NDArray[np.float32],
+    tables: NDArray[np.int64], step: int, requested: int, rows: NDArray[np.float32]
 ) -> int:
     """Run the timers and fill the observation rows; returns how many robots are anchored."""
+    constants, keys = number_row_in(tables, CONSTANTS), keys_in(tables, KEYS)
+    numbers, flags = numbers_in(tables, NUMBERS), flags_in(tables, FLAGS)
+    links, item_links = counts_in(tables, LINKS), counts_in(tables, ITEM_LINKS)
+    position, velocity = numbers_in(tables, POSITION), numbers_in(tables, VELOCITY)
+    memory, message = counts_in(tables, MEMORY), numbers_in(tables, MESSAGE)
+    item_position = numbers_in(tables, ITEM_POSITION)
+    obstacle_position = numbers_in(tables, OBSTACLE_POSITION)
+    robot_size, item_size = count_row_in(tables, ROBOT_SIZE), count_row_in(tables, ITEM_SIZE)
+    robot_start, item_start = count_row_in(tables, ROBOT_START), count_row_in(tables, ITEM_START)
+    robot_members = count_row_in(tables, ROBOT_MEMBERS)
+    item_members = count_row_in(tables, ITEM_MEMBERS)
+    robot_places, item_places = numbers_in(tables, ROBOT_PLACES), numbers_in(tables, ITEM_PLACES)
     run_timers(
         step, constants[CONTROL_PERIOD], constants[TIMER_LIMIT], constants[GOSSIP] > 0.0,
         flags[at.IN_DELIVERY], flags[at.PRESENT], flags[at.HONEST], numbers[at.HEARD],

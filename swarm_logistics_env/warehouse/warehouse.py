@@ -19,11 +19,12 @@ from swarm_logistics_env.warehouse.faults import Fault, apply_faults, failed_rob
 from swarm_logistics_env.warehouse.grid import Grid
 from swarm_logistics_env.warehouse.physics import Physics
 from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED, WarehouseState
+from swarm_logistics_env.warehouse.tables import Tables
 
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
-_NOT_KEPT = ("_physics", "_memory", "_log")
+_NOT_KEPT = ("_physics", "_tables", "_memory", "_log")
 
 
 class Warehouse:
@@ -82,9 +83,9 @@ class Warehouse:
         self._order = layout.request_order(scenario, seed)
         state.requested, self._asked = int(self._order[0]), 0
         self._sensor_keys = row_keys(seed, "sensors", scenario.n_robots)
-        self._physics = Physics(scenario, state)
         self._make_room_to_work(scenario)
         self._take_constants(scenario)
+        self._build_physics()
         self._apply_faults()
         self._perceive()
         self._log = []
@@ -108,14 +109,13 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         given = self._checked(commands)
-        state, physics, scenario = self.state, self._physics, self.scenario
+        state, scenario = self.state, self.scenario
         time = (state.step + 1) * scenario.control_period
         is_fault_due = bool(self._fault_times) and self._fault_times[0] <= time + 5e-7
         rows = self._blank_rows()
         anchored = stepping.step(
-            given, state.step + 1, state.requested, is_fault_due, physics.engine, physics.bodies,
-            physics.velocities, self._claim, self._claim_square, self._events, *self._seen(rows),
-        )  # fmt: skip
+            self._tables.addresses, given, state.step + 1, state.requested, is_fault_due, rows
+        )
         if anchored == stepping.NOT_FINITE:
             obeying = state.robot_present & state.obeys
             bad = np.argwhere(~np.isfinite(given) & obeying[:, None])[0]
@@ -216,6 +216,7 @@ class Warehouse:
         self._claim = np.full(items, NOBODY)
         self._claim_square = np.zeros(items)
         self._events = np.zeros((2 * n, 3), np.int64)
+        self._constants = np.zeros(stepping.N_CONSTANTS)
         self._command_shape = (n, len(COMMAND_COLUMNS) + scenario.message_size)
         size = math.prod(self._command_shape)
         self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
@@ -223,7 +224,7 @@ class Warehouse:
     def _take_constants(self, scenario: Scenario) -> None:
         self._n_steps = scenario.n_steps
         self._n_columns = n_columns(scenario)
-        self._constants = stepping.constants_of(
+        self._constants[:] = stepping.constants_of(
             scenario, self._robot_grid.cell, self._item_grid.cell
         )
 
@@ -234,7 +235,7 @@ class Warehouse:
         last such moment and the commands since, which unpickling replays.
         """
         if self.state.step > 0:
-            self._physics = Physics(self.scenario, self.state)
+            self._build_physics()
         self._log = []
         kept = {name: value for name, value in self.__dict__.items() if name not in _NOT_KEPT}
         self._memory = pickle.dumps(kept)
@@ -250,7 +251,7 @@ class Warehouse:
             return
         self.__dict__.update(pickle.loads(saved["_memory"]))
         self._memory, self._log = saved["_memory"], []
-        self._physics = Physics(self.scenario, self.state)
+        self._build_physics()
         for commands in saved["_log"]:
             self.step(commands)
 
@@ -321,18 +322,22 @@ class Warehouse:
     def _perceive(self) -> int:
         self._rows = self._blank_rows()
         state = self.state
-        return stepping.perceive(state.step, state.requested, *self._seen(self._rows))
+        return stepping.perceive(self._tables.addresses, state.step, state.requested, self._rows)
 
     def _blank_rows(self) -> NDArray[np.float32]:
         # New memory every time: what was handed out stays as it was.
         return np.empty((len(self.state.robot_position), self._n_columns), np.float32)
 
-    def _seen(self, rows: NDArray[np.float32]) -> tuple[Any, ...]:
-        state, robots, items = self.state, self._robot_grid, self._item_grid
-        return (
-            self._constants, state.robot_position, state.robot_velocity, state.numbers, state.flags,
-            state.links, state.robot_memory, state.item_position, state.item_links,
-            state.obstacle_position, robots.size, robots.start, robots.members, robots.places,
-            items.size, items.start, items.members, items.places, self._sensor_keys,
-            state.robot_message, rows,
-        )  # fmt: skip
+    def _build_physics(self) -> None:
+        self._physics = Physics(self.scenario, self.state)
+        state, physics = self.state, self._physics
+        robots, items = self._robot_grid, self._item_grid
+        # In the order of their places in `stepping`.
+        self._tables = Tables([
+            physics.engine, physics.bodies, physics.velocities, self._claim, self._claim_square,
+            self._events, self._constants, state.robot_position, state.robot_velocity,
+            state.numbers, state.flags, state.links, state.robot_memory, state.item_position,
+            state.item_links, state.obstacle_position, robots.size, robots.start, robots.members,
+            robots.places, items.size, items.start, items.members, items.places,
+            self._sensor_keys, state.robot_message,
+        ])  # fmt: skip

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
-from swarm_logistics_env.observations import bounds, n_columns
+from swarm_logistics_env.observations import bounds, n_columns, unflatten
 from swarm_logistics_env.warehouse import WarehouseState
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
@@ -393,3 +393,14 @@ def test_at_the_start_all_are_in_the_storage_and_timers_are_silent() -> None:
     assert (state.item_status == STORED).all()
     assert state.delivered == 0
     assert state.time == 0.0
+
+
+def test_what_is_assigned_to_the_state_is_what_the_next_step_works_on() -> None:
+    world = Warehouse(Scenario(n_robots=1, n_items=2))
+    world.reset(0)
+    before = world.state.item_position
+    world.state.item_position = world.state.robot_position[[0, 0]] + [[0.5, 0.0], [0.0, 0.5]]
+    assert world.state.item_position is before
+    columns = unflatten(world.step(np.zeros((1, 4))), world.scenario)
+    np.testing.assert_allclose(columns["item_present"][0, :2], 1.0)
+    assert not columns["item_present"][0, 2:].any()
