@@ -13,7 +13,7 @@ from typing import Any
 import numba
 import pytest
 
-from swarm_logistics_env.warehouse import engine
+from swarm_logistics_env.warehouse import engine, tables
 
 
 class _Words(ctypes.Structure):
@@ -48,6 +48,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if not numba.config.DISABLE_JIT:
         raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
     engine.call_at, engine.store_at = _call_at, _store_at
+    tables.pointer_at = lambda address: ctypes.c_void_p(int(address))
     # Streams count modulo 2**64, and kernels divide as IEEE 754 says.
     for what in ("overflow", "divide by zero"):
         config.addinivalue_line("filterwarnings", f"ignore:{what} encountered:RuntimeWarning")
