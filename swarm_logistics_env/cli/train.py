@@ -65,15 +65,16 @@ def train_command(
                 "trials": trials, "seeds": seeds, "seed": seed,
             }  # fmt: skip
             asked, tried, path = tune_as_asked(tune, out, **fields)
-            _show(asked, tried)
+            _show(asked, tried, path)
     except KeyboardInterrupt:
         typer.echo("\nStopped. The same command goes on.", err=True)
         raise typer.Exit(130) from None
     typer.echo(f"Written: {path}")
 
 
-def _show(asked: Tuning, trials: list[Trial]) -> None:
+def _show(asked: Tuning, trials: list[Trial], path: Path) -> None:
     from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.policies.tuned import read_tuned
     from swarm_logistics_env.studies.reporting.sections import Section
 
     names = list(trials[0].parameters)
@@ -87,4 +88,10 @@ def _show(asked: Tuning, trials: list[Trial]) -> None:
         for trial in sorted(shown, key=lambda trial: -trial.values[0])
     )
     title = f"{asked.policy}: best of {len(trials)} trials (Pareto front) and its own parameters"
-    show(Section(title, ("parameters", *asked.objectives, *names), rows))
+    lines = tuple(
+        f"{score.measure} ({score.condition}, {score.seeds} other seeds) = {score.value:.3g}, "
+        f"95 % interval {score.low:.3g} to {score.high:.3g}"
+        for score in read_tuned(path).scores
+        if score.low is not None and score.high is not None
+    )
+    show(Section(title, ("parameters", *asked.objectives, *names), rows, lines))

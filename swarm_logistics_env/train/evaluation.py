@@ -44,15 +44,8 @@ def evaluate(policy: Policy, scenario: Scenario, asked: Evaluation, threads: int
     """Play `policy` on the evaluation's seeds, without faults and with each of its faults."""
     scenario = scenario.replace(n_robots=asked.n_robots)
     kinds: list[Sequence[Fault]] = [(), *((Fault(m, k),) for m, k in asked.faults.items())]
-    jobs = [(faults, FIRST_SEED + seed) for faults in kinds for seed in range(asked.seeds)]
-
-    def played(job: tuple[Sequence[Fault], int]) -> int:
-        faults, seed = job
-        return run_episode(scenario, deepcopy(policy), seed, faults).delivered
-
-    with ThreadPoolExecutor(threads) as pool:
-        delivered = np.array(list(pool.map(played, jobs)), np.float64)
-    p_o, *p_f = delivered.reshape(len(kinds), asked.seeds)
+    seeds = range(FIRST_SEED, FIRST_SEED + asked.seeds)
+    p_o, *p_f = performances(policy, scenario, kinds, seeds, threads)
     by_mode = dict(zip(asked.faults, p_f))
     return Evaluated(
         performance=float(p_o.mean()),
@@ -62,6 +55,26 @@ def evaluate(policy: Policy, scenario: Scenario, asked: Evaluation, threads: int
             for mode, p in by_mode.items()
         },
     )
+
+
+def performances(
+    policy: Policy,
+    scenario: Scenario,
+    kinds: Sequence[Sequence[Fault]],
+    seeds: Sequence[int],
+    threads: int = 1,
+) -> NDArray[np.float64]:
+    """Return P under each kind of faults at each seed (kinds, seeds) [items]."""
+    jobs = [(faults, seed) for faults in kinds for seed in seeds]
+
+    def played(job: tuple[Sequence[Fault], int]) -> int:
+        faults, seed = job
+        # A policy of its own: one that remembers must not meet another episode's robots.
+        return run_episode(scenario, deepcopy(policy), seed, faults).delivered
+
+    with ThreadPoolExecutor(threads) as pool:
+        delivered = np.array(list(pool.map(played, jobs)), np.float64)
+    return delivered.reshape(len(kinds), len(seeds))
 
 
 def _robustness(p_o: NDArray[np.float64], p_f: NDArray[np.float64], n: int, m: int) -> float:

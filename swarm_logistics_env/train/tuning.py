@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PositiveInt, field_validator
+from pydantic import BeforeValidator, Field, NonNegativeInt, PositiveInt, field_validator
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
@@ -17,6 +17,7 @@ from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.policies.tuned import TunedPolicy
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.train.confirmation import confirm
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate
 from swarm_logistics_env.train.reporting import Report
 from swarm_logistics_env.train.run_record import enter, versions
@@ -53,6 +54,8 @@ class Tuning(Record):
         modes, robots: failure modes and the number m of faulty robots.
         seed: of the search.
         threads: in which episodes are played; no result depends on it.
+        confirm: seeds 0, 1, .. on which the best is then measured beside the policy's own
+            parameters; the search uses others.
 
     Raises:
         TrainingError: a field is unknown or cannot be.
@@ -69,6 +72,7 @@ class Tuning(Record):
     robots: PositiveInt = 2
     seed: int = 0
     threads: PositiveInt = 2
+    confirm: NonNegativeInt = 30
 
     @field_validator("policy")
     @classmethod
@@ -135,6 +139,9 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
         command=command,
         versions=versions(),
         search=json.loads(asked.to_json()),
+        scores=confirm(asked.policy, best.parameters, asked.scenario, asked.confirm, asked.threads)
+        if asked.confirm
+        else (),
     )
     part = out / f"{RESULT}.part"
     part.write_text(json.dumps(json.loads(record.to_json()), indent=2) + "\n", encoding="utf-8")

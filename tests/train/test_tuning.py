@@ -10,6 +10,7 @@ from swarm_logistics_env import policies
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import PolicyError, TrainingError
 from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.policies.tuned import read_tuned
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate
 from swarm_logistics_env.train.tuning import RANGES, Trial, Tuning, tune, values_of
 
@@ -21,7 +22,7 @@ SCENARIO = {
 
 
 def small(**fields: Any) -> Tuning:
-    given = {"trials": 4, "seeds": 2, "modes": ("FM4",), "robots": 1, "threads": 1}
+    given = {"trials": 4, "seeds": 2, "modes": ("FM4",), "robots": 1, "threads": 1, "confirm": 3}
     return Tuning(**{"policy": "swarm-dt-follow", "scenario": SCENARIO, **given, **fields})
 
 
@@ -39,6 +40,8 @@ def test_a_search_starts_from_the_policys_own_and_ends_in_a_policy(tmp_path: Pat
     assert policy.parameters.heading_follows
     for name, value in best.parameters.items():
         assert getattr(policy.parameters, name) == value
+    measures = [score.measure for score in read_tuned(tmp_path / "result.json").scores]
+    assert measures[:2] == ["P", "P"]
     front = [trial for trial in trials if trial.is_best]
     for trial in trials:
         assert trial.is_best or any(
