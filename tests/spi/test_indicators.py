@@ -206,6 +206,16 @@ def test_skewed_differences_are_flagged() -> None:
     assert spi.robustness([60.1] * 20, [60.1] * 20, n=25, m=3).flags == ("degenerate",)
 
 
+@pytest.mark.parametrize(("outlier", "flags"), [(4.1, ()), (4.3, ("skewed",))])
+def test_ten_differences_are_skewed_beyond_twice_the_standard_error_of_g(
+    outlier: float, flags: tuple[str, ...]
+) -> None:
+    # g = 1.341 and 1.439; the standard error of ten is .687 (Cramer), and Cochran's limit .632.
+    p_o = np.full(10, 40.0)
+    p_f = p_o + [-1, 1, -1, 1, -1, 1, -1, 1, 0, outlier]
+    assert spi.robustness(p_o, p_f, n=25, m=1).flags == flags
+
+
 counts = st.lists(st.integers(0, 60), min_size=2, max_size=8)
 
 

@@ -109,6 +109,11 @@ def test_table_1_sets_the_usl_no_upper_limit() -> None:
     assert fit.peak_high == math.inf
 
 
+def test_where_no_size_is_excluded_the_limits_are_0_and_infinity() -> None:
+    fit = spi.fit_scaling(SIZES, TABLE_I, law="usl", level=1 - 1e-7)
+    assert (fit.peak_low, fit.peak_high) == (0.0, math.inf)
+
+
 @pytest.mark.parametrize(
     ("law", "p"),
     [
