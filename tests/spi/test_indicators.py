@@ -212,7 +212,7 @@ def test_ten_differences_are_skewed_beyond_twice_the_standard_error_of_g(
 ) -> None:
     # g = 1.341 and 1.439; the standard error of ten is .687 (Cramer), and Cochran's limit .632.
     p_o = np.full(10, 40.0)
-    p_f = p_o + [-1, 1, -1, 1, -1, 1, -1, 1, 0, outlier]
+    p_f = p_o + np.array([-1, 1, -1, 1, -1, 1, -1, 1, 0, outlier])
     assert spi.robustness(p_o, p_f, n=25, m=1).flags == flags
 
 
