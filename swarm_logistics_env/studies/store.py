@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,7 @@ from swarm_logistics_env.studies.execution import Outcome
 
 FILE_NAME = "study.sqlite"
 SCHEMA_VERSION = 2
+TIMEOUT = 60.0  # s, for other processes that write
 APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
 
 _SCHEMA = """
@@ -87,7 +89,9 @@ class Store:
         self.path = path
         with self._explained():
             # Autocommit: transactions are opened by hand, one per run.
-            self._database = sqlite3.connect(path or ":memory:", timeout=60.0, isolation_level=None)
+            self._database = sqlite3.connect(
+                path or ":memory:", timeout=TIMEOUT, isolation_level=None
+            )
             try:
                 self._prepare()
             except BaseException:
@@ -273,7 +277,7 @@ class Store:
                 f"schemas 1 to {SCHEMA_VERSION}: export it with the version that wrote it"
             )
         # A process that is killed loses nothing; a power cut at most the latest runs.
-        self._database.execute("PRAGMA journal_mode = WAL")
+        self._change_to_wal()
         self._database.execute("PRAGMA synchronous = NORMAL")
         if application == APPLICATION_ID:
             if version < SCHEMA_VERSION:
@@ -288,6 +292,19 @@ class Store:
                 self._database.execute(statement)
             self._database.execute(f"PRAGMA application_id = {APPLICATION_ID}")
             self._database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+    def _change_to_wal(self) -> None:
+        give_up = time.monotonic() + TIMEOUT
+        while True:
+            try:
+                self._database.execute("PRAGMA journal_mode = WAL")
+            except sqlite3.OperationalError as error:
+                # Where two change a new file at once SQLite refuses one, without its timeout.
+                if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:
+                    raise
+                time.sleep(0.01)
+            else:
+                return
 
     def _migrate(self) -> None:
         with self._transaction():
