@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, SupportsIndex
 
 from .errors import IndicatorError
-from .inputs import count, finite, performance
+from .inputs import count, finite
 from .judgement import judge
-from .unpaired import Term
 
 if TYPE_CHECKING:
     import numpy as np
@@ -49,8 +48,8 @@ def scalability(
     return judge(
         "S",
         {
-            "p_nm": Term(performance("p_nm", p_nm), gain, 0.0),
-            "p_n": Term(performance("p_n", p_n), -gain, 1.0),
+            "p_nm": (p_nm, gain, 0.0),
+            "p_n": (p_n, -gain, 1.0),
         },
         offset=0.0,
         threshold=threshold,
@@ -98,9 +97,9 @@ def fault_tolerance(
     return judge(
         "FT",
         {
-            "p_f": Term(performance("p_f", p_f), 1.0, 0.0),
-            "p_s": Term(performance("p_s", p_s), -1.0, 0.0),
-            "p_o": Term(performance("p_o", p_o), 0.0, 1.0),
+            "p_f": (p_f, 1.0, 0.0),
+            "p_s": (p_s, -1.0, 0.0),
+            "p_o": (p_o, 0.0, 1.0),
         },
         offset=0.0,
         threshold=threshold,
@@ -145,8 +144,8 @@ def robustness(
     return judge(
         "R",
         {
-            "p_f": Term(performance("p_f", p_f), 1.0, 0.0),
-            "p_o": Term(performance("p_o", p_o), -1.0, 1.0),
+            "p_f": (p_f, 1.0, 0.0),
+            "p_o": (p_o, -1.0, 1.0),
         },
         offset=faulty / robots,
         threshold=threshold,
@@ -193,8 +192,8 @@ def adaptability(
     return judge(
         "A",
         {
-            "p_new": Term(performance("p_new", p_new), gain, 0.0),
-            "p_o": Term(performance("p_o", p_o), -gain, 1.0),
+            "p_new": (p_new, gain, 0.0),
+            "p_o": (p_o, -gain, 1.0),
         },
         offset=1.0,
         threshold=threshold,
@@ -232,8 +231,8 @@ def relative_change(
     return judge(
         "change",
         {
-            "p_new": Term(performance("p_new", p_new), 1.0, 0.0),
-            "p_o": Term(performance("p_o", p_o), -1.0, 1.0),
+            "p_new": (p_new, 1.0, 0.0),
+            "p_o": (p_o, -1.0, 1.0),
         },
         offset=0.0,
         threshold=threshold,

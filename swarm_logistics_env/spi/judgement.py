@@ -10,23 +10,22 @@ import numpy as np
 from .bootstrap import MIN_SEEDS, studentised_bootstrap
 from .errors import IndicatorError
 from .estimate import Estimate, verdict_at
-from .inputs import between_0_and_1, finite, positive_mean, same_seeds
+from .inputs import between_0_and_1, finite, performance, positive_mean, same_seeds
 from .ratio import paired_ratio
 from .summaries import pairing_correlation
-from .unpaired import unpaired_ratio
+from .unpaired import Term, unpaired_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from .estimate import Indicator
-    from .unpaired import Term
 
 
 def judge(
     indicator: Indicator,
-    terms: Mapping[str, Term],
+    terms: Mapping[str, tuple[ArrayLike, float, float]],
     *,
     offset: float,
     threshold: float,
@@ -38,8 +37,9 @@ def judge(
 
     Args:
         indicator: Its name.
-        terms: Sample name to sample and weights; the first two are the performances compared, the
-            last is the reference that the ratio divides by.
+        terms: Name to performances over seeds [items] and their weights in numerator and
+            denominator; the first two are compared, the last is the reference that the ratio
+            divides by.
         offset: Added to the ratio of means.
         threshold: What theta is tested against, finite.
         level: Confidence level, in (0, 1).
@@ -47,11 +47,16 @@ def judge(
         bootstrap: Source of the studentised bootstrap, run from ten paired seeds on; None: not run.
 
     Raises:
-        IndicatorError: Unequal seed sets, mean reference 0, threshold or level out of range.
+        IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
+            reference 0, threshold or level out of range.
     """
+    weighted = {
+        name: Term(performance(name, sample), in_num, in_den)
+        for name, (sample, in_num, in_den) in terms.items()
+    }
     finite("threshold", threshold)
     between_0_and_1("level", level)
-    samples = {name: term.sample for name, term in terms.items()}
+    samples = {name: term.sample for name, term in weighted.items()}
     if paired:
         same_seeds(**samples)
     elif bootstrap is not None:
@@ -61,7 +66,7 @@ def judge(
     n_seeds = min(sample.size for sample in samples.values())
     if n_seeds == 1:
         mean_den = float(reference.mean())
-        mean_num = sum(term.in_num * float(term.sample.mean()) for term in terms.values())
+        mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
         return Estimate(
             indicator=indicator,
             value=mean_num / mean_den + offset,
@@ -84,7 +89,7 @@ def judge(
     flags = []
     correlation, bootstrap_low, bootstrap_high = None, None, None
     if paired:
-        num, den = _numerator(terms), reference
+        num, den = _numerator(weighted), reference
         test = paired_ratio(num, den, offset=offset, threshold=threshold, level=level)
         correlation = pairing_correlation(*list(samples.values())[:2])
         # Where D has no spread there is nothing but rounding to be skewed.
@@ -95,7 +100,9 @@ def judge(
                 num, den, bootstrap, offset=offset, level=level
             )
     else:
-        test = unpaired_ratio(list(terms.values()), offset=offset, threshold=threshold, level=level)
+        test = unpaired_ratio(
+            list(weighted.values()), offset=offset, threshold=threshold, level=level
+        )
     if test.degenerate:
         flags.append("degenerate")
     if test.unbounded:

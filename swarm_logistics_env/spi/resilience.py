@@ -8,7 +8,6 @@ import numpy as np
 
 from .inputs import delivery_times, finite
 from .judgement import judge
-from .unpaired import Term
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,8 +52,8 @@ def resilience_index(
     return judge(
         "resilience",
         {
-            "faulty": Term(after_onset("faulty", faulty), 1.0, 0.0),
-            "reference": Term(after_onset("reference", reference), 0.0, 1.0),
+            "faulty": (after_onset("faulty", faulty), 1.0, 0.0),
+            "reference": (after_onset("reference", reference), 0.0, 1.0),
         },
         offset=0.0,
         threshold=threshold,
