@@ -13,7 +13,7 @@ from typing import Any
 import numba
 import pytest
 
-from swarm_logistics_env.warehouse import engine, tables
+from swarm_logistics_env.warehouse import building, engine, tables
 
 
 class _Words(ctypes.Structure):
@@ -24,10 +24,14 @@ class _Doubles(ctypes.Structure):
     _fields_ = (("first", ctypes.c_double), ("second", ctypes.c_double))
 
 
-def _call_at(address: int, arguments: tuple[Any, ...]) -> None:
+def _call_at(address: int, arguments: tuple[Any, ...], returned: Any = None) -> Any:
     given = [_passed(argument) for argument in arguments]
-    function = ctypes.CFUNCTYPE(None, *(type(argument) for argument in given))
-    function(int(address))(*given)
+    function = ctypes.CFUNCTYPE(returned, *(type(argument) for argument in given))
+    return function(int(address))(*given)
+
+
+def _made_at(address: int, arguments: tuple[Any, ...]) -> int:
+    return int(_call_at(address, arguments, ctypes.c_int64))
 
 
 def _passed(argument: Any) -> Any:
@@ -47,8 +51,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """Put the interpreter's own in the place of what is compiled."""
     if not numba.config.DISABLE_JIT:
         raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
-    engine.call_at, engine.store_at = _call_at, _store_at
-    tables.pointer_at = lambda address: ctypes.c_void_p(int(address))
+    for module in (building, engine):
+        vars(module).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
+    vars(tables).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
     # Streams count modulo 2**64, and kernels divide as IEEE 754 says.
     for what in ("overflow", "divide by zero"):
         config.addinivalue_line("filterwarnings", f"ignore:{what} encountered:RuntimeWarning")

@@ -13,16 +13,19 @@ from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.warehouse.logistics import LIFTED
 from swarm_logistics_env.warehouse.native import call_at, store_at
 
-# Rows of the table. Of the functions:
+# Rows of the table. Of the functions that a step calls, and of those that make and free things:
 (
     STEP, SET_ITERATIONS, EACH_BODY, READ_BODY, WRITE_BODY, SET_FILTER, SET_OFFSET, REINDEX,
+    NEW_SPACE, STATIC_BODY, SET_SLOP, NEW_BODY, NEW_CONTROL, SET_POSITION, SET_VELOCITY, NEW_CIRCLE,
+    NEW_SEGMENT, NEW_JOINT, SET_BIAS, SET_FORCE, ADD_BODY, ADD_SHAPE, ADD_JOINT,
+    FREE_SPACE, FREE_BODY, FREE_SHAPE, FREE_JOINT,
     # of the space, of the batches that are read and written, and of how far each is filled:
     SPACE, READ_BATCH, WRITE_BATCH, READ_COUNT, WRITE_COUNT,
     # what a filter says of whom a shape collides with (the two masks of a cpShapeFilter),
-    NO_ONE, EMPTY_ROBOT, LADEN_ROBOT, FREE_ITEM,
-    # and from here on the address of every robot's shape, then of every item's.
+    NO_ONE, EMPTY_ROBOT, LADEN_ROBOT, FREE_ITEM, SOLID,
+    # and from here on the address of every robot's shape, then of every item's, then of the rest.
     SHAPES,
-) = range(18)  # fmt: skip
+) = range(38)  # fmt: skip
 
 # Of the contact solver: few for robots that meet, many for a pile. With 4, a pile of 150 in a
 # corner stands 50 mm inside itself for good; with 16 always, a step costs a fifth more.
@@ -70,10 +73,15 @@ def follow(
             collide_with(engine, robot_shape, engine[LADEN_ROBOT])
         else:
             collide_with(engine, robot_shape, engine[EMPTY_ROBOT])
-            place = (item_position[item, 0], item_position[item, 1])
-            call_at(engine[SET_OFFSET], (item_shape, place))
-            collide_with(engine, item_shape, engine[FREE_ITEM])
-            call_at(engine[REINDEX], (engine[SPACE], item_shape))
+            put(engine, item_shape, item_position[item, 0], item_position[item, 1])
+
+
+@kernel
+def put(engine: NDArray[np.int64], item_shape: int, x: float, y: float) -> None:
+    """Make an item an obstacle at (x, y) [m] for the laden."""
+    call_at(engine[SET_OFFSET], (item_shape, (x, y)))
+    collide_with(engine, item_shape, engine[FREE_ITEM])
+    call_at(engine[REINDEX], (engine[SPACE], item_shape))
 
 
 @kernel

@@ -33,6 +33,22 @@ def _generated(function: Callable[..., Any]) -> Callable[..., None]:
     return cast("Callable[..., None]", intrinsic(function))
 
 
+def _call(returned: Any) -> Callable[..., Any]:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        where, packed = values
+        given: list[Any] = []
+        for kind, value in zip(
+            signature.args[1], cgutils.unpack_tuple(builder, packed), strict=True
+        ):
+            given += _passed(builder, kind, value, _BY_REFERENCE)
+        function = ir.FunctionType(returned, [value.type for value in given])
+        answer = builder.call(builder.inttoptr(where, function.as_pointer()), given)
+        is_void = isinstance(returned, ir.VoidType)
+        return context.get_dummy_value() if is_void else answer
+
+    return generate
+
+
 @_generated
 def call_at(typing_context: Any, address: types.Type, arguments: types.Type) -> Any:
     """Call the C function at `address`, which returns nothing, with a tuple of `arguments`.
@@ -41,19 +57,14 @@ def call_at(typing_context: Any, address: types.Type, arguments: types.Type) -> 
     the same kind: a structure of 16 bytes passed by value.
     """
     arguments = cast("Any", types).unliteral(arguments)
+    return types.void(types.int64, arguments), _call(ir.VoidType())
 
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        where, packed = values
-        given: list[Any] = []
-        for kind, value in zip(
-            signature.args[1], cgutils.unpack_tuple(builder, packed), strict=True
-        ):
-            given += _passed(builder, kind, value, _BY_REFERENCE)
-        function = ir.FunctionType(ir.VoidType(), [value.type for value in given])
-        builder.call(builder.inttoptr(where, function.as_pointer()), given)
-        return context.get_dummy_value()
 
-    return types.void(types.int64, arguments), generate
+@cast("Callable[..., Callable[[int, tuple[Any, ...]], int]]", intrinsic)
+def made_at(typing_context: Any, address: types.Type, arguments: types.Type) -> Any:
+    """Call the C function at `address` as `call_at` does; returns the pointer that it returns."""
+    arguments = cast("Any", types).unliteral(arguments)
+    return types.int64(types.int64, arguments), _call(ir.IntType(64))
 
 
 @cast("Callable[..., Callable[[int], Any]]", intrinsic)

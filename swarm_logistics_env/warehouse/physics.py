@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from importlib.metadata import version
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 import pymunk
@@ -21,7 +22,8 @@ from pymunk.batch import BodyFields
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import engine as at
-from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.warehouse.building import build, free, table_length
+from swarm_logistics_env.warehouse.state import WarehouseState
 
 _FUNCTIONS = {
     at.STEP: "cpSpaceStep",
@@ -32,9 +34,26 @@ _FUNCTIONS = {
     at.SET_FILTER: "cpShapeSetFilter",
     at.SET_OFFSET: "cpCircleShapeSetOffset",
     at.REINDEX: "cpSpaceReindexShape",
+    at.NEW_SPACE: "cpSpaceNew",
+    at.STATIC_BODY: "cpSpaceGetStaticBody",
+    at.SET_SLOP: "cpSpaceSetCollisionSlop",
+    at.NEW_BODY: "cpBodyNew",
+    at.NEW_CONTROL: "cpBodyNewKinematic",
+    at.SET_POSITION: "cpBodySetPosition",
+    at.SET_VELOCITY: "cpBodySetVelocity",
+    at.NEW_CIRCLE: "cpCircleShapeNew",
+    at.NEW_SEGMENT: "cpSegmentShapeNew",
+    at.NEW_JOINT: "cpPivotJointNew2",
+    at.SET_BIAS: "cpConstraintSetMaxBias",
+    at.SET_FORCE: "cpConstraintSetMaxForce",
+    at.ADD_BODY: "cpSpaceAddBody",
+    at.ADD_SHAPE: "cpSpaceAddShape",
+    at.ADD_JOINT: "cpSpaceAddConstraint",
+    at.FREE_SPACE: "cpSpaceFree",
+    at.FREE_BODY: "cpBodyFree",
+    at.FREE_SHAPE: "cpShapeFree",
+    at.FREE_JOINT: "cpConstraintFree",
 }
-_SLOP = 0.001  # [m]; pymunk's default 0.1 lets robots of this size pass through each other
-_WALL = 0.5  # [m], half the thickness of a wall
 _ROBOT, _SOLID, _ITEM = 1, 2, 4
 
 _NOTHING = pymunk.ShapeFilter(categories=0, mask=0)
@@ -54,18 +73,22 @@ class Physics:
 
     def __init__(self, scenario: Scenario, state: WarehouseState) -> None:
         n = state.n_robots
-        self._space = pymunk.Space(threaded=False)
-        self._space.collision_slop = _SLOP
-        self._add_solids(scenario, state.obstacle_position)
-        self._robots = self._add_robots(scenario, state)
-        self._items = self._add_items(scenario, state)
-        # A batch call reads and writes every body, in order of insertion: N robots, N controls, and
-        # the static body last.
+        # A batch call reads and writes every body: N robots, N controls, and room for a static one.
         self._read = _Batch(2 * n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY)
         self._written = _Batch(2 * n + 1, 2, BodyFields.VELOCITY)
         self.bodies = self._read.numbers  # x, y [m], and velocity [m/s], as read
         self.velocities = self._written.numbers  # [m/s], to be written
-        self.engine = self._table()
+        self._n_robots = n
+        self.engine = self._blank_table(scenario)
+        build(
+            self.engine, scenario.warehouse_width, scenario.warehouse_height, scenario.robot_mass,
+            scenario.robot_mass * scenario.max_acceleration, scenario.robot_radius,
+            scenario.item_radius, scenario.obstacle_radius, state.robot_position,
+            state.robot_velocity, state.robot_present, state.robot_item, state.item_position,
+            state.item_status, state.obstacle_position,
+        )  # fmt: skip
+        # Not at the end of the process, which frees everything anyway.
+        finalize(self, free, self.engine, n, scenario.n_items).atexit = False
         at.read_bodies(self.engine)
 
     def put_down(self, robot: int, item: int, x: float, y: float) -> None:
@@ -75,25 +98,24 @@ class Physics:
 
     def take_away(self, robot: int) -> None:
         """Make `robot` unladen; what it carried is gone."""
-        self._robots[robot].filter = _EMPTY_ROBOT
+        self._let_collide(robot, at.EMPTY_ROBOT)
 
     def place(self, item: int, x: float, y: float) -> None:
         """Make `item` an obstacle at (x, y) [m] for the laden."""
-        shape = self._items[item]
-        shape.unsafe_set_offset((x, y))
-        shape.filter = _FREE_ITEM
-        self._space.reindex_shape(shape)
+        at.put(self.engine, int(self.engine[at.SHAPES + self._n_robots + item]), x, y)
 
     def remove(self, robot: int) -> None:
         """Take `robot` out of everybody's way, for good."""
-        self._robots[robot].filter = _NOTHING
+        self._let_collide(robot, at.NO_ONE)
 
-    def _table(self) -> NDArray[np.int64]:
-        shapes = [*self._robots, *self._items]
-        table = np.zeros(at.SHAPES + len(shapes), np.int64)
+    def _let_collide(self, robot: int, met: int) -> None:
+        at.collide_with(self.engine, int(self.engine[at.SHAPES + robot]), int(self.engine[met]))
+
+    def _blank_table(self, scenario: Scenario) -> NDArray[np.int64]:
+        length = table_length(scenario.n_robots, scenario.n_items, scenario.n_obstacles)
+        table = np.zeros(length, np.int64)
         for row, address in _FUNCTION_ADDRESSES.items():
             table[row] = address
-        table[at.SPACE] = _address(self._space._space)
         table[at.READ_BATCH], table[at.READ_COUNT] = self._read.address, self._read.count_address
         table[at.WRITE_BATCH] = self._written.address
         table[at.WRITE_COUNT] = self._written.count_address
@@ -102,59 +124,10 @@ class Physics:
             (at.EMPTY_ROBOT, _EMPTY_ROBOT),
             (at.LADEN_ROBOT, _LADEN_ROBOT),
             (at.FREE_ITEM, _FREE_ITEM),
+            (at.SOLID, _SOLID_THING),
         ):
             table[row] = met.categories | met.mask << 32
-        table[at.SHAPES :] = [_address(shape._shape) for shape in shapes]
         return table
-
-    def _add_solids(self, scenario: Scenario, obstacles: NDArray[np.float64]) -> None:
-        body = self._space.static_body
-        left, bottom = -_WALL, -_WALL
-        right, top = scenario.warehouse_width + _WALL, scenario.warehouse_height + _WALL
-        corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
-        solids: list[pymunk.Shape] = [
-            pymunk.Segment(body, corners[side], corners[(side + 1) % 4], _WALL) for side in range(4)
-        ]
-        solids += [
-            pymunk.Circle(body, scenario.obstacle_radius, (float(x), float(y)))
-            for x, y in obstacles
-        ]
-        for solid in solids:
-            solid.filter = _SOLID_THING
-        self._space.add(*solids)
-
-    def _add_robots(self, scenario: Scenario, state: WarehouseState) -> list[pymunk.Circle]:
-        shapes, controls, joints = [], [], []
-        for robot in range(state.n_robots):
-            body = pymunk.Body(scenario.robot_mass, float("inf"))
-            body.position = tuple(state.robot_position[robot].tolist())
-            body.velocity = tuple(state.robot_velocity[robot].tolist())
-            shape = pymunk.Circle(body, scenario.robot_radius)
-            is_laden = state.robot_item[robot] != NOBODY
-            shape.filter = _LADEN_ROBOT if is_laden else _EMPTY_ROBOT
-            if not state.robot_present[robot]:
-                shape.filter = _NOTHING
-            control = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-            joint = pymunk.PivotJoint(body, control, (0.0, 0.0), (0.0, 0.0))
-            joint.max_bias = 0.0
-            joint.max_force = scenario.robot_mass * scenario.max_acceleration
-            shapes.append(shape)
-            controls.append(control)
-            joints.append(joint)
-        self._space.add(*(shape.body for shape in shapes if shape.body), *controls)
-        self._space.add(*shapes, *joints)
-        return shapes
-
-    def _add_items(self, scenario: Scenario, state: WarehouseState) -> list[pymunk.Circle]:
-        # All on the static body, moved by their offset: no body to integrate or to read.
-        shapes = [
-            pymunk.Circle(self._space.static_body, scenario.item_radius, (float(x), float(y)))
-            for x, y in state.item_position
-        ]
-        for shape, status in zip(shapes, state.item_status, strict=True):
-            shape.filter = _FREE_ITEM if status == STORED else _NOTHING
-        self._space.add(*shapes)
-        return shapes
 
 
 class _Batch:
