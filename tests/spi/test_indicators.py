@@ -196,6 +196,18 @@ def test_an_ablation_that_costs_a_third_refutes_less() -> None:
     assert tenth.verdict == "supported"
 
 
+def test_every_indicator_is_tested_against_0_unless_told_otherwise() -> None:
+    p = [30.0, 40.0, 50.0], [31.0, 42.0, 49.0]
+    estimates = (
+        spi.scalability(*p, n=5, m=5),
+        spi.robustness(*p, n=5, m=1),
+        spi.fault_tolerance(*p, p[0]),
+        spi.adaptability(*p, x_o=1.0, x_new=2.0),
+        spi.relative_change(*p),
+    )
+    assert [estimate.threshold for estimate in estimates] == [0.0] * 5
+
+
 def test_skewed_differences_are_flagged() -> None:
     p_o = np.full(20, 40.0) + np.tile([-1.0, 1.0], 10)
     even = p_o - 5 + np.tile([2.0, -2.0, 1.0, -1.0], 5)
