@@ -144,8 +144,11 @@ def test_without_taxis_it_follows_nobody() -> None:
     rows = carrying(hearing(nothing_near(), 0.0, 2.0), requested=True)
     walk = load("random-walk", diffusion=0.0)
     walk.reset(1, 0)
-    np.testing.assert_array_equal(
-        walk.act(rows)[0, :2], straight().act(carrying(nothing_near(), requested=True))[0, :2]
+    # To a float32's rounding: the interpreter multiplies its zero gain in that precision.
+    np.testing.assert_allclose(
+        walk.act(rows)[0, :2],
+        straight().act(carrying(nothing_near(), requested=True))[0, :2],
+        rtol=1e-6,
     )
 
 
