@@ -106,6 +106,8 @@ def _repair(repair: SelfRepair, window: float) -> tuple[str, ...]:
         reading = "not distinguishable from no fault"
     elif repair.censored:
         reading = "censored: not back within the run"
+    elif repair.low <= repair.null_limit:
+        reading = "longer than chance makes it, its interval is not"
     else:
         reading = "longer than chance makes it"
     return (

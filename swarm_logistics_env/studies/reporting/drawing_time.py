@@ -75,9 +75,17 @@ def repairs(canvas: Canvas, panels: Sequence[RepairPanel]) -> None:
                 for first, column in zip((0.0, 1.0, 1.0, 1.0), curve.curve)
             )
             seconds[-1] = curve.followed
-            low, high = (np.where(share > 0.0, limit, np.nan) for limit in (low, high))
+            # Where all runs are back no interval is defined; the last one ends there.
+            known = int(np.count_nonzero(share > 0.0))
+            ends = [*range(known), known - 1]
             axes.fill_between(
-                seconds, low, high, step="post", color=colour, alpha=0.14, linewidth=0
+                np.append(seconds[:known], seconds[min(known, seconds.size - 1)]),
+                low[ends],
+                high[ends],
+                step="post",
+                color=colour,
+                alpha=0.14,
+                linewidth=0,
             )
             axes.step(
                 seconds,
