@@ -30,6 +30,7 @@ class Network(_Part):
     Args:
         inputs: what it reads, in this order: `motion_frame.INPUTS`.
         outputs: what it says, in this order: `motion_frame.OUTPUTS`.
+        listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
         activation: between layers.
         exploration: so many standard deviations of the training's noise are added to the outputs,
@@ -41,6 +42,7 @@ class Network(_Part):
 
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
+    listens: bool = True
     hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
     exploration: NonNegativeFloat = 0.0

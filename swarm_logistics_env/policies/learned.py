@@ -56,7 +56,7 @@ class LearnedPolicy:
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: the control period."""
-        self._frame = MotionFrame(scenario)
+        self._frame = MotionFrame(scenario, self.card.network.listens)
         self.reset(0, 0)
 
     def reset(self, n_robots: int, seed: int) -> None:

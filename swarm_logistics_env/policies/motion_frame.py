@@ -42,6 +42,7 @@ def _names() -> tuple[str, ...]:
 
 
 INPUTS = _names()
+LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 
 
 class MotionFrame:
@@ -51,10 +52,12 @@ class MotionFrame:
 
     Args:
         scenario: for its control period.
+        listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, listens: bool = True) -> None:
         self._period = scenario.control_period
+        self._listens = listens
         self.begin(np.empty(0, np.uint64))
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
@@ -77,6 +80,8 @@ class MotionFrame:
         known.remember(observations, self._period, self.memory)
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
         read_rows(observations, self.memory, self.keys, self._whims(), inputs, self._turned)
+        if not self._listens:
+            inputs[:, LEAD] = 0.0
         self.counts += 1
         self._rows = observations
         return inputs
@@ -91,6 +96,8 @@ class MotionFrame:
         read_rows(
             observations, memory, self.keys[rows], self._whims()[rows], inputs, np.empty(len(rows))
         )
+        if not self._listens:
+            inputs[:, LEAD] = 0.0
         return inputs
 
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -34,7 +34,7 @@ def imitate(policy: Any, training: Training, asked: Imitation) -> None:
         policy: of the learner; its network from inputs to outputs is changed.
     """
     worlds = training.replace(sizes=asked.sizes, worlds=len(asked.sizes), indicators=None)
-    view = NetworkView(make_worlds(worlds), training.scenario)
+    view = NetworkView(make_worlds(worlds), training.scenario, training.network.listens)
     optimizer = torch.optim.Adam(actor_parameters(policy), lr=asked.learning_rate)
     samples: list[Sample] = []
     with Report(f"{training.name}: imitation", asked.rounds, unit="rounds") as report:

@@ -25,14 +25,15 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     Args:
         worlds: every robot is a row.
         scenario: of the worlds.
+        listens: whether the network reads the lowest timer heard.
 
     Attributes:
         frame: of each robot's motion, with its memory.
         observations: the latest rows (num_envs, D).
     """
 
-    def __init__(self, worlds: SwarmVecEnv, scenario: Scenario) -> None:
-        self.frame = MotionFrame(scenario)
+    def __init__(self, worlds: SwarmVecEnv, scenario: Scenario, listens: bool = True) -> None:
+        self.frame = MotionFrame(scenario, listens)
         self.observations = np.zeros((worlds.num_envs, 0), np.float32)
         self._begun, self._seed = 0, 0
         super().__init__(

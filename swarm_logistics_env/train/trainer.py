@@ -111,7 +111,7 @@ def train(
 
 
 def _new_view(training: Training) -> NetworkView:
-    return NetworkView(make_worlds(training), training.scenario)
+    return NetworkView(make_worlds(training), training.scenario, training.network.listens)
 
 
 def _write(

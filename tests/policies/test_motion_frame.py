@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import robot_memory as known
-from swarm_logistics_env.policies.motion_frame import INPUTS, MotionFrame
+from swarm_logistics_env.policies.motion_frame import INPUTS, LEAD, MotionFrame
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -170,3 +170,18 @@ def test_a_robot_that_knows_the_way_home_is_not_led_astray() -> None:
     read = frame.read(rows)
     led = [value for name, value in zip(INPUTS, read[0]) if name.startswith("lead_")]
     np.testing.assert_allclose(led, 0.0, atol=1e-4)
+
+
+def test_that_does_not_listen_reads_the_same_but_no_timer() -> None:
+    rows = nothing()
+    rows[0, row.LOWEST_TIMER : row.LOWEST_TIMER + 4] = (1.0, 0.5, -0.5, 3.0)
+    keys = row_keys(0, "test", 1)
+    hears, deaf = MotionFrame(Scenario()), MotionFrame(Scenario(), listens=False)
+    hears.begin(keys)
+    deaf.begin(keys)
+    heard, unheard = hears.read(rows), deaf.read(rows)
+    assert told(heard, "lead_present") == 1.0
+    assert not unheard[:, LEAD].any()
+    heard[:, LEAD] = 0.0
+    np.testing.assert_array_equal(unheard, heard)
+    np.testing.assert_array_equal(deaf.peek(rows, np.array([0]))[:, LEAD], unheard[:, LEAD])
