@@ -103,14 +103,12 @@ class Watch:
         depth[~here] = -np.inf
         # The speed of the last step is that before or after a change.
         closing = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period
-        # Slow robots close less than a jam may be deep.
-        closing = max(closing, SUSTAINED)
         free = ~self._shoved(depth)
         deepest = float(depth[free].max(initial=-np.inf))
         self._demand(
-            deepest <= closing + SLACK,
+            deepest <= closing + SUSTAINED,
             f"bodies overlap by {deepest:.4f} m: should be at most {closing:.4f} m, what they "
-            "close in one substep",
+            "close in one substep, beyond a jam's 20 mm",
         )
         lost = radius + scenario.item_radius
         outside = np.maximum(-at, at - far).max(axis=1)[here]
