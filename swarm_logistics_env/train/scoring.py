@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.studies import Study
@@ -14,7 +15,11 @@ from swarm_logistics_env.train.specification import Training
 
 
 def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
-    """Return what `training.scores` asks for; the study lies in `out`, and goes on where it was."""
+    """Return what `training.scores` asks for; the study lies in `out`, and goes on where it was.
+
+    Raises:
+        TrainingError: a run failed, so that the scores would not be of all seeds.
+    """
     asked = training.scores
     if not asked.seeds or not (len(asked.sizes) > 1 or asked.modes):
         return ()
@@ -32,7 +37,14 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
         **factors,
     )
     study.run(processes=training.threads)
-    return scores_of(study.findings())
+    findings = study.findings()
+    errors = [outcome.error for outcome in findings.outcomes.values() if outcome.error]
+    if errors:
+        raise TrainingError(
+            f"{len(errors)} runs of the scores failed ({errors[0].strip().splitlines()[-1]}); the "
+            "policy file is written, without scores: the same command plays them again"
+        )
+    return scores_of(findings)
 
 
 def scores_of(findings: Findings) -> tuple[Score, ...]:

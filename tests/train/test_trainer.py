@@ -50,6 +50,20 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
     assert record["command"] == "the command"
 
 
+def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_call(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from swarm_logistics_env.studies import execution
+
+    training = small(scores=Scores(seeds=1, sizes=(2, 3), n_robots=3))
+    with monkeypatch.context() as changed:
+        changed.setattr(execution, "code_version", lambda: "another")
+        with pytest.raises(TrainingError, match=r"runs of the scores failed .*the package changed"):
+            train(training, tmp_path)
+    assert policies.read_card(tmp_path / "small.safetensors").scores == ()
+    assert policies.read_card(train(training, tmp_path)).scores
+
+
 def test_torch_and_the_policy_file_agree(small: Any) -> None:
     training: Training = small()
     view = trainer._new_view(training)
