@@ -14,6 +14,8 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.studies.code_version import code_version
 
 FILE_NAME = "training.json"
+# What a training or search may go on with: it changes nothing of what was done.
+MAY_CHANGE = frozenset({"about", "threads", "scores", "trials", "confirm"})
 PACKAGES = (
     "swarm-logistics-env", "torch", "stable-baselines3", "numpy", "numba", "pymunk", "gymnasium",
     "optuna", "safetensors",
@@ -49,6 +51,7 @@ def enter(directory: Path, training: Record, command: str) -> bool:
         if is_begun:
             record = json.loads(path.read_text(encoding="utf-8"))
             _check_same(directory, record["training"], asked)
+            record |= {"command": command, "training": asked}
         record["sessions"].append(
             {"began": datetime.now(UTC).isoformat(timespec="seconds"), "versions": versions()}
         )
@@ -65,7 +68,7 @@ def enter(directory: Path, training: Record, command: str) -> bool:
 
 
 def _check_same(directory: Path, there: dict[str, Any], asked: dict[str, Any]) -> None:
-    differing = sorted(name for name in asked if there.get(name) != asked[name])
+    differing = sorted(n for n in asked if n not in MAY_CHANGE and there.get(n) != asked[n])
     if differing:
         raise TrainingError(
             f"{directory} holds a training with another {', '.join(differing)}: should be the same "

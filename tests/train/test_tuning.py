@@ -70,6 +70,9 @@ def test_a_search_that_was_cut_short_goes_on_as_it_would_have(
     assert found(tune(small(), tmp_path / "cut")) == found(whole)
     with pytest.raises(TrainingError, match="holds a training with another seed"):
         tune(small(seed=1), tmp_path / "cut")
+    more = tune(small(trials=5), tmp_path / "cut")
+    assert found(more)[:4] == found(whole)
+    assert len(more) == 5
 
 
 def test_objectives_are_p_and_means_over_the_modes() -> None:
