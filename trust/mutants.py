@@ -41,10 +41,8 @@ MUTANTS = (
     Mutant(
         "sign of R",
         "swarm_logistics_env/spi/indicators.py",
-        '"p_f": Term(performance("p_f", p_f), 1.0, 0.0),\n'
-        '            "p_o": Term(performance("p_o", p_o), -1.0, 1.0),',
-        '"p_f": Term(performance("p_f", p_f), -1.0, 0.0),\n'
-        '            "p_o": Term(performance("p_o", p_o), 1.0, 1.0),',
+        '"p_f": (p_f, 1.0, 0.0),\n            "p_o": (p_o, -1.0, 1.0),',
+        '"p_f": (p_f, -1.0, 0.0),\n            "p_o": (p_o, 1.0, 1.0),',
         ("tests/spi",),
     ),
     Mutant(
