@@ -14,4 +14,9 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
 # Beside an installed package (`make test-lowest`) there is no source tree to read.
 if not (Path(__file__).parents[1] / "swarm_logistics_env").is_dir():
-    collect_ignore = ["test_imports.py", "test_packaging.py", "trust/test_mutants.py"]
+    collect_ignore = [
+        "test_imports.py",
+        "test_packaging.py",
+        "trust/test_mutants.py",
+        "trust/test_ignores.py",
+    ]

@@ -50,5 +50,6 @@ def decide(
     They are checked where they are used, by `Warehouse.step`.
     """
     if getattr(policy, "needs_state", False):
+        # The protocol knows the one argument that all policies take.
         return as_heard(policy.act(observations, state), state)  # type: ignore[call-arg]
     return policy.act(observations)

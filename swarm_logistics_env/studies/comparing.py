@@ -69,6 +69,7 @@ def _indicators(gate: Gate, new: Findings) -> dict[str, Estimate | str]:
             continue
         try:
             asked[name] = replace(comparison, threshold=gate.number).estimate(
+                # No type can be given to a lambda's default.
                 lambda arm, used=used: used[arm].performance,  # type: ignore[misc]
                 paired=new.plan.paired,
             )

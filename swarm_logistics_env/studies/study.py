@@ -270,7 +270,7 @@ class Study:
 
 def _need_pandas() -> None:
     try:
-        import pandas  # noqa: F401
+        import pandas  # noqa: F401 - whether it is there
     except ImportError:
         raise StudyError(
             "a DataFrame needs pandas: pip install 'swarm-logistics-env[study]'"

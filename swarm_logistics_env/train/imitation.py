@@ -96,6 +96,6 @@ def _fit(
         errors = outputs_of(policy, inputs[chosen]) - wanted[chosen]
         loss = (weights * errors**2).sum(dim=1).mean()
         optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()  # type: ignore[no-untyped-call]  # torch leaves it untyped
         optimizer.step()
     return float(loss.item())

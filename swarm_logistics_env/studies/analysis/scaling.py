@@ -161,4 +161,5 @@ def _serial_fraction(speed_up: float, growth: float) -> float:
 
 
 def _scaled(interval: Interval, factor: float) -> Interval:
+    # A generator's length is no part of its type.
     return Interval(*(None if x is None else factor * x for x in interval))  # type: ignore[arg-type]
