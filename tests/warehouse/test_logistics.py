@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
 from swarm_logistics_env import Fault, Warehouse
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 Build = Callable[..., Warehouse]
+Places = list[tuple[float, float]]
 
 STAY = (0.0, 0.0, 0.0, 0.0)
 HOLD = (0.0, 0.0, 0.0, 1.0)
@@ -65,7 +65,7 @@ def test_of_others_the_nearest_is_lifted_whatever_its_number(
     np.testing.assert_array_equal(world.state.item_position, [FAR, *_with(items, (2.0, 3.0))])
 
 
-def _with(items: list[tuple[float, float]], carried: tuple[float, float]) -> ArrayLike:
+def _with(items: Places, carried: tuple[float, float]) -> Places:
     return [carried if item == (1.95, 3.0) else item for item in items]
 
 
