@@ -63,12 +63,18 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         agents = self.agents
         if not agents:
             return {}, {}, {}, {}, {}
-        rows = [_row(agent) for agent in agents]
         wanted = self.action_space(agents[0]).shape
-        commands = np.zeros((self.warehouse.state.n_robots, *wanted))
-        commands[rows] = _gathered(actions, agents, self.possible_agents, wanted)
-        outcome = self.step_arrays(commands)
-        observations, rewards, terminations, truncations = (part[rows] for part in outcome)
+        n_robots = self.warehouse.state.n_robots
+        commands = _gathered(actions, agents, self.possible_agents, wanted)
+        outcome: tuple[NDArray[Any], ...]
+        if len(agents) == n_robots:
+            outcome = self.step_arrays(commands)
+        else:
+            rows = [_row(agent) for agent in agents]
+            placed = np.zeros((n_robots, *wanted))
+            placed[rows] = commands
+            outcome = tuple(part[rows] for part in self.step_arrays(placed))
+        observations, rewards, terminations, truncations = outcome
         infos = self._infos(agents)
         if not self.agents:
             # Of a wrapper that has more to say.
@@ -118,10 +124,12 @@ def _gathered(
         for agent in agents:
             if agent not in actions:
                 raise CommandError(f"no command for {agent!r}: should be one for every agent")
-    try:
-        given = np.array([actions[agent] for agent in agents])
-    except (TypeError, ValueError):
-        given = np.array([])
+    wished = [actions[agent] for agent in agents]
+    if all(type(command) is np.ndarray and command.shape == wanted for command in wished):
+        # As nearly always; several times as fast as an array of arrays.
+        given = np.concatenate(wished).reshape(len(wished), *wanted)
+    else:
+        given = _array_of(wished)
     if given.shape != (len(agents), *wanted):
         agent = next(agent for agent in agents if _shape(actions[agent]) != wanted)
         raise CommandError(
@@ -130,6 +138,13 @@ def _gathered(
     if given.dtype.kind not in "fiub":
         raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
     return given.astype(np.float64)
+
+
+def _array_of(commands: Sequence[ArrayLike]) -> NDArray[Any]:
+    try:
+        return np.array(commands)
+    except (TypeError, ValueError):
+        return np.array([])
 
 
 def _shape(command: ArrayLike) -> tuple[int, ...] | str:
