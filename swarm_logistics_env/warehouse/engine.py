@@ -29,16 +29,16 @@ from swarm_logistics_env.warehouse.native import call_at, store_at
 
 # Of the contact solver: few for robots that meet, many for a pile. With 4, a pile of 150 in a
 # corner stands 50 mm inside itself for good; with 16 always, a step costs a fifth more.
-_FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 4, 16, 8
+_FEWEST_ITERATIONS, _MOST_ITERATIONS, _PILED_PER_ITERATION = 4, 16, 8
 
 
 @kernel
-def advance(engine: NDArray[np.int64], n_touching: int, n_substeps: int, period: float) -> None:
+def advance(engine: NDArray[np.int64], pile: int, n_substeps: int, period: float) -> None:
     """Write the bodies' velocities, take `n_substeps` of `period` [s], read the bodies.
 
-    `n_touching` robots touch something now, which says how hard the contacts are to solve.
+    The largest `pile` has so many robots now, which says how hard the contacts are to solve.
     """
-    iterations = min(_FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS)
+    iterations = min(_FEWEST_ITERATIONS + pile // _PILED_PER_ITERATION, _MOST_ITERATIONS)
     space = engine[SPACE]
     call_at(engine[SET_ITERATIONS], (space, iterations))
     store_at(engine[WRITE_COUNT], 0)

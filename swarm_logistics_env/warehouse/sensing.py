@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, pair_key, uniform
 from swarm_logistics_env.warehouse.grid import look_around
+from swarm_logistics_env.warehouse.piles import join
 from swarm_logistics_env.warehouse.state import NOBODY
 
 _TOUCH = 0.01  # [m], gap below which two things touch
@@ -170,6 +171,7 @@ def sense(
     item_places: NDArray[np.float64],
     full_range: float,
     contact: NDArray[np.bool_],
+    leader: NDArray[np.int64],
     heard: NDArray[np.float64],
     keys: NDArray[np.uint64],
     step: int,
@@ -178,7 +180,7 @@ def sense(
     message: NDArray[np.float64],
     rows: NDArray[np.float32],
 ) -> int:
-    """Fill the observation rows (N, D), who touches something and what was heard.
+    """Fill the observation rows (N, D), who touches something, the piles and what was heard.
 
     Returns how many robots that have not failed touch one that has.
     """
@@ -188,6 +190,8 @@ def sense(
     scanned = np.empty(n_things, np.int64)
     rows[:, :] = 0.0
     n_anchored = 0
+    for me in range(position.shape[0]):
+        leader[me] = me
     for me in range(position.shape[0]):
         contact[me] = False
         heard[me] = math.nan
@@ -237,8 +241,10 @@ def sense(
         # Without branches, where what they hang on cannot be predicted.
         for index in range(n_found):
             other, square = robot_members[found[index]], squares[index]
-            touches |= square < touch_square
-            anchored |= (square < touch_square) & failed[other] & (not failed[me])
+            if square < touch_square:
+                touches = True
+                anchored |= failed[other] & (not failed[me])
+                join(leader, me, other)
             scanned[n_scanned] = index
             n_scanned += int(square < scan_square)
             is_heard = (square <= radio_square) & sends[other] & hears[me]

@@ -15,7 +15,7 @@ NOBODY = -1
 # Rows of the tables.
 HEADING, TIMER, TOLD, HEARD, MAX_SPEED, MAX_TURN_RATE, RANGER_RANGE, VIEW_RANGE = range(8)
 PRESENT, IN_DELIVERY, CONTACT, LIFTS, DELIVERS, SENDS, HEARS, HONEST, OBEYS, FAILED = range(10)
-ITEM, LAST_IN_DELIVERY = range(2)
+ITEM, LAST_IN_DELIVERY, PILE = range(3)
 STATUS, CARRIER = range(2)
 
 T = TypeVar("T", bound=np.generic)
@@ -86,6 +86,7 @@ class WarehouseState:
 
     robot_item = Column[np.int64]("links", ITEM)  # (N,) item carried, or NOBODY
     last_in_delivery = Column[np.int64]("links", LAST_IN_DELIVERY)  # (N,) step, or NOBODY
+    robot_pile = Column[np.int64]("links", PILE)  # (N,) towards one robot of those it touches
     item_status = Column[np.int64]("item_links", STATUS)  # (I,) STORED, CARRIED or DELIVERED
     item_carrier = Column[np.int64]("item_links", CARRIER)  # (I,) robot, or NOBODY
 
@@ -104,7 +105,7 @@ class WarehouseState:
         self.numbers[HEADING] = 0.0
         self.flags = np.ones((10, n), np.bool_)
         self.flags[[IN_DELIVERY, CONTACT, FAILED]] = False
-        self.links = np.full((2, n), NOBODY)
+        self.links = np.full((3, n), NOBODY)
         self.item_links = np.full((2, items), NOBODY)
         self.robot_position = np.zeros((n, 2))
         self.robot_velocity = np.zeros((n, 2))

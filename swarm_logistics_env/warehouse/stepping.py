@@ -23,6 +23,7 @@ from swarm_logistics_env.warehouse.logistics import (
     open_grippers,
     run_timers,
 )
+from swarm_logistics_env.warehouse.piles import largest
 from swarm_logistics_env.warehouse.sensing import sense
 from swarm_logistics_env.warehouse.tables import (
     count_row_in,
@@ -101,10 +102,10 @@ def step(
     constants, flags = number_row_in(tables, CONSTANTS), flags_in(tables, FLAGS)
     engine, bodies = count_row_in(tables, ENGINE), numbers_in(tables, BODIES)
     velocities, numbers = numbers_in(tables, VELOCITIES), numbers_in(tables, NUMBERS)
-    n_touching = set_out(commands, constants, numbers, flags, bodies, velocities)
-    if n_touching < 0:
+    if not set_out(commands, constants, numbers, flags, bodies, velocities):
         return NOT_FINITE
-    advance(engine, n_touching, int(constants[N_SUBSTEPS]), constants[PHYSICS_PERIOD])
+    pile = largest(counts_in(tables, LINKS)[at.PILE])
+    advance(engine, pile, int(constants[N_SUBSTEPS]), constants[PHYSICS_PERIOD])
     send(commands, flags, numbers_in(tables, MESSAGE))
     is_due = handle_items(
         commands, requested, constants, engine, bodies,
@@ -141,10 +142,8 @@ def set_out(
     flags: NDArray[np.bool_],
     bodies: NDArray[np.float64],
     velocities: NDArray[np.float64],
-) -> int:
-    """Turn commands into the velocities to be written to the bodies.
-
-    Returns how many robots touch something now, or -1 if a command is not finite.
+) -> bool:
+    """Turn commands into the velocities to be written to the bodies; False if one is not finite.
 
     `bodies` (2N + 1, 4) is what was read of them, `velocities` (2N + 1, 2) what will be written.
     """
@@ -152,12 +151,11 @@ def set_out(
     able = flags[at.PRESENT] & flags[at.OBEYS]
     # What was just read, so that writing it back changes nothing for the robots themselves.
     velocities[:n] = bodies[:n, 2:4]
-    is_done = drive(
+    return drive(
         commands, able, numbers[at.MAX_SPEED], numbers[at.MAX_TURN_RATE],
         constants[CONTROL_PERIOD], numbers[at.HEADING], velocities[n : 2 * n],
         constants[SIDEWAYS] > 0.0,
     )  # fmt: skip
-    return int(np.count_nonzero(flags[at.CONTACT])) if is_done else -1
 
 
 @kernel
@@ -265,7 +263,7 @@ def perceive(
         numbers[at.VIEW_RANGE], flags[at.SENDS], flags[at.HEARS], flags[at.FAILED],
         constants[ROBOT_CELL], robot_size, robot_start, robot_members, robot_places,
         constants[ITEM_CELL], item_size, item_start, item_members, item_places,
-        constants[RANGER_RANGE], flags[at.CONTACT], numbers[at.HEARD], keys, step,
+        constants[RANGER_RANGE], flags[at.CONTACT], links[at.PILE], numbers[at.HEARD], keys, step,
         constants[RADIO_LOSS], constants[SENSOR_DROPOUT], message, rows,
     )  # fmt: skip
     is_exact = constants[RANGER_NOISE] == 0.0 and constants[POSITION_NOISE] == 0.0
