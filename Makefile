@@ -9,6 +9,9 @@ DEV   := .venvs/dev
 STUDY := .venvs/study
 DOCS  := .venvs/docs
 
+BENCHMARK := .venvs/benchmark
+PEERS     := .venvs/peers
+
 TORCHRL   := .venvs/torchrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
@@ -24,7 +27,7 @@ help:
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
 	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
-	@echo "make benchmark       cost of a control step beside the bare physics"
+	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make interop         TorchRL, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make format          sort imports and format"
@@ -60,8 +63,8 @@ test-lowest test-newest: test-%: .venvs/%/wheel
 	git ls-files -z | grep -zv '^swarm_logistics_env/\|^policies$$\|^train$$' | xargs -0 tar -cf - | tar -xf - -C build/installed-$*
 	cd build/installed-$* && $(CURDIR)/.venvs/$*/bin/python -m pytest --numprocesses=2 --dist=loadgroup
 
-benchmark: $(STUDY)/installed
-	$(STUDY)/bin/python -m benchmarks
+benchmark: $(BENCHMARK)/installed $(PEERS)/installed
+	$(BENCHMARK)/bin/python -m benchmarks --peers $(PEERS)/bin/python --out results/benchmark
 
 interop: $(TORCHRL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
 	$(TORCHRL)/bin/python -m interop.torchrl_specs
@@ -107,6 +110,17 @@ $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
 	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
 		"$$(echo build/wheels/*.whl)[study,render]" build hypothesis pytest pytest-xdist setuptools
+
+# What is measured beside this package: an environment of their own, as their requirements clash
+# with ours. One that cannot be installed is named in the benchmark's table.
+$(PEERS)/installed: constraints.txt
+	$(PYTHON) -m venv $(PEERS)
+	for peer in rware mpe2 vmas; do \
+		$(PEERS)/bin/python -m pip install --constraint constraints.txt $$peer || true; \
+	done
+	@touch $@
+
+$(BENCHMARK)/installed: EXTRAS := study,train
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
 .venvs/%/installed: pyproject.toml constraints.txt

@@ -1,129 +1,89 @@
-"""Print what a control step of ours costs beside the bare physics, in one run."""
+"""Measure the package beside the bare physics and its peers, in one run.
+
+python -m benchmarks --peers .venvs/peers/bin/python --out results/benchmark
+"""
 
 from __future__ import annotations
 
-import os
-import platform
-import statistics
-import time
-from collections.abc import Callable
+import argparse
+from pathlib import Path
 
-import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from benchmarks.floor import Floor
-from benchmarks.recording import Recording, record
-from swarm_logistics_env import Scenario, Warehouse, policies, run_episode
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from benchmarks import ours
+from benchmarks.instructions import instructions_of_a_step
+from benchmarks.recording import record
+from benchmarks.results import as_json, save, show
+from benchmarks.rivals import rivals
+from benchmarks.start_up import bytes_per_robot, first_step_seconds, import_seconds
+from benchmarks.timing import Contestant, in_turns
+from swarm_logistics_env import Scenario
 
-_STEPS = 1000
-_REPEATS = 15
-
-
-def floor_run(recording: Recording) -> Callable[[], None]:
-    """Return a run of the bare physics over the recording."""
-    floor = Floor(recording)
-
-    def run() -> None:
-        for step in range(_STEPS):
-            floor.step(step)
-
-    return run
+_STEPS, _MANY = 1000, (1_000, 10_000)
 
 
-def world_run(recording: Recording) -> Callable[[], None]:
-    """Return a run of the world alone, commands to observations."""
-    world = Warehouse(recording.scenario)
-    world.reset(seed=0)
-
-    def run() -> None:
-        for commands in recording.commands:
-            world.step(commands)
-
-    return run
-
-
-def array_run(recording: Recording) -> Callable[[], None]:
-    """Return a run of the environment's array path, with rewards and ends."""
-    env = SwarmLogisticsEnv(recording.scenario)
-    env.reset_arrays(seed=0)
-
-    def run() -> None:
-        for commands in recording.commands:
-            env.step_arrays(commands)
-
-    return run
-
-
-def dict_run(recording: Recording) -> Callable[[], None]:
-    """Return a run of our dict path, PettingZoo's `step`."""
-    env = SwarmLogisticsEnv(recording.scenario)
-    env.reset(seed=0)
-    actions = [
-        {f"robot_{row}": command for row, command in enumerate(commands)}
-        for commands in recording.commands.astype(np.float32)
-    ]
-
-    def run() -> None:
-        for action in actions:
-            env.step(action)
-
-    return run
-
-
-def microseconds(recording: Recording) -> dict[str, list[float]]:
-    """Return, per path, the processor time of a control step in each interleaved repeat [us]."""
-    makers = {
-        "pymunk floor": floor_run,
-        "Warehouse.step": world_run,
-        "env.step_arrays": array_run,
-        "env.step": dict_run,
-    }
-    costs: dict[str, list[float]] = {name: [] for name in makers}
-    for _ in range(_REPEATS):
-        for name, make in makers.items():
-            run = make(recording)
-            # Processor time: on a machine that does other things too, the wall clock counts them.
-            began = time.process_time()
-            run()
-            costs[name].append((time.process_time() - began) / _STEPS * 1e6)
-    return costs
+def contestants_of_ours() -> list[Contestant]:
+    """Return everything of this package that is timed, compiled and warm."""
+    recording = record(Scenario(restock=True), _STEPS)
+    found = [*ours.paths(recording), ours.policy(recording)]
+    found += [ours.vec_env(threads) for threads in (1, 2)]
+    found[-1].base = found[-2].name
+    for n_robots in _MANY:
+        found += ours.many_robots(n_robots)
+    in_turns(found, 1)
+    for contestant in found:
+        contestant.seconds.clear()
+    return found
 
 
 def main() -> None:
-    """Measure and print."""
-    console = Console()
-    scenario = Scenario(restock=True)
-    recording = record(scenario, _STEPS)
-    dict_run(recording)  # compiles
-    costs = microseconds(recording)
-    floor = costs["pymunk floor"]
-    n = scenario.n_robots
-    table = Table(
-        title=f"One control step, N = {n}, {scenario.n_items} items, {scenario.n_substeps} "
-        f"substeps; medians of {_REPEATS} interleaved runs of {_STEPS} steps, processor time"
-    )
-    for column in ("path", "us per step", "x floor", "agent-steps per s"):
-        table.add_column(column, justify="left" if column == "path" else "right")
-    for name, values in costs.items():
-        ratio = statistics.median(ours / bare for ours, bare in zip(values, floor, strict=True))
-        middle = statistics.median(values)
-        table.add_row(name, f"{middle:.0f}", f"{ratio:.2f}", f"{n / middle * 1e6:,.0f}")
-    console.print(table)
+    """Measure, print and save."""
+    parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
+    parser.add_argument("--repeats", type=int, default=15, help="turns of everybody")
+    parser.add_argument("--peers", default="", help="the interpreter that has the peers")
+    parser.add_argument("--out", type=Path, help="folder for benchmark.json and benchmark.png")
+    given = parser.parse_args()
 
-    policy = policies.load("swarm-dt")
-    began = time.perf_counter()
-    episode = run_episode(Scenario(), policy, seed=0)
-    took = time.perf_counter() - began
-    console.print(
-        f"One episode of swarm-dt, N = {n}: {episode.ended_at:g} s in {took:.2f} s of wall time, "
-        f"{episode.ended_at / took:.0f} times real time"
+    console = Console(width=150)
+    found = contestants_of_ours()
+    others, processes, missing = rivals(given.peers) if given.peers else ([], [], {})
+    try:
+        in_turns([*found, *others], given.repeats)
+    finally:
+        for process in processes:
+            process.close()
+    title = (
+        f"Medians of {given.repeats} interleaved runs, processor time; N = 25 unless said; "
+        "cost: per agent-step"
     )
+    show(console, [*found, *others], missing, title)
+
+    package, needed = import_seconds(5)
+    first_step, memory = first_step_seconds(3), bytes_per_robot()
+    counts = instructions_of_a_step()
     console.print(
-        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, "
-        f"Python {platform.python_version()}, numpy {np.__version__}"
+        f"import swarm_logistics_env: {package:.2f} s, {package / needed:.2f} times pettingzoo, "
+        f"pymunk and numba ({needed:.2f} s)\n"
+        f"second process, warm cache: first step after {first_step:.2f} s of wall time\n"
+        f"memory: {'unknown' if memory is None else f'{memory:,.0f} bytes'} a robot at N = 10,000"
     )
+    if counts is None:
+        console.print("valgrind is not installed: no instructions counted")
+    for name, count in (counts or {}).items():
+        console.print(f"{name}: {count:,.0f} instructions a control step")
+    if given.out:
+        start_up = {"import": package, "import_of_needed": needed, "first_step": first_step}
+        save(
+            given.out,
+            as_json(
+                [*found, *others],
+                peers_that_do_not_run=missing,
+                seconds=start_up,
+                bytes_per_robot=memory,
+                instructions=counts,
+            ),
+        )
+        console.print(f"written to {given.out}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,124 @@
+"""What is measured of this package: the floor under it, its paths, many worlds, many robots."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+from benchmarks.floor import Floor
+from benchmarks.recording import Recording, record
+from benchmarks.timing import Contestant
+from swarm_logistics_env import Scenario, Warehouse, policies
+from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.policies.policy import start
+
+FLOOR, ARRAYS = "pymunk floor", "env.step_arrays"
+_STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
+_WORLDS, _STEPS_OF_WORLDS = 8, 250
+SENSES = "all sensors, logistics, timers"
+
+
+def paths(recording: Recording) -> Iterator[Contestant]:
+    """Yield the floor and the ways to step one world, on the same commands."""
+    n, steps = recording.scenario.n_robots, len(recording.commands)
+    actions = [
+        {f"robot_{row}": command for row, command in enumerate(commands)}
+        for commands in recording.commands.astype(np.float32)
+    ]
+
+    def floor() -> float:
+        return _timed(Floor(recording).step, range(steps))
+
+    def world() -> float:
+        made = Warehouse(recording.scenario)
+        made.reset(seed=0)
+        return _timed(made.step, recording.commands)
+
+    def arrays() -> float:
+        env = SwarmLogisticsEnv(recording.scenario)
+        env.reset_arrays(seed=0)
+        return _timed(env.step_arrays, recording.commands)
+
+    def dicts() -> float:
+        env = SwarmLogisticsEnv(recording.scenario)
+        env.reset(seed=0)
+        return _timed(env.step, actions)
+
+    for name, includes, run, base in (
+        (FLOOR, "bodies alone, no sensing", floor, None),
+        ("Warehouse.step", SENSES, world, FLOOR),
+        (ARRAYS, f"{SENSES}, rewards, ends", arrays, FLOOR),
+        ("env.step", "the same, as PettingZoo's dicts", dicts, ARRAYS),
+    ):
+        yield Contestant(name, includes, run, n * steps, steps, base)
+
+
+def policy(recording: Recording) -> Contestant:
+    """Return Swarm D-T alone, on the observations of an episode."""
+    scenario, steps = recording.scenario, len(recording.commands)
+    world, chosen = Warehouse(scenario), policies.load("swarm-dt")
+    observations = [world.reset(seed=0)]
+    observations += [world.step(commands) for commands in recording.commands[:-1]]
+
+    def run() -> float:
+        start(chosen, scenario, seed=0)
+        return _timed(chosen.act, observations)
+
+    return Contestant(
+        "policy swarm-dt", "its commands alone", run, scenario.n_robots * steps, steps, ARRAYS
+    )
+
+
+def many_robots(n_robots: int) -> Iterator[Contestant]:
+    """Yield the floor and the world at the default density, with so many robots."""
+    times = n_robots / 25
+    side = 10.0 * times**0.5
+    scenario = Scenario(
+        n_robots=n_robots,
+        n_items=round(60 * times),
+        warehouse_width=side,
+        warehouse_height=side,
+        delivery_width=side / 5.0,
+        restock=True,
+    )
+    recording = record(scenario, max(_AGENT_STEPS_OF_MANY // n_robots, 4))
+    for contestant in paths(recording):
+        if contestant.name in (FLOOR, ARRAYS):
+            base = contestant.name
+            contestant.name = f"{base}, N = {n_robots:,}"
+            contestant.base = base
+            yield contestant
+
+
+def vec_env(threads: int) -> Contestant:
+    """Return several worlds behind stable-baselines3's VecEnv."""
+    from swarm_logistics_env.adapters import SwarmVecEnv
+
+    env = SwarmVecEnv(Scenario(restock=True), n_worlds=_WORLDS, threads=threads, seed=0)
+    env.reset()
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (20, env.num_envs, 4)).astype(np.float32)
+
+    def run() -> None:
+        for step in range(_STEPS_OF_WORLDS):
+            env.step(actions[step % len(actions)])
+
+    return Contestant(
+        f"SwarmVecEnv, {threads} thread{'s' if threads > 1 else ''}",
+        f"{_WORLDS} worlds: {SENSES}, rewards, resets; wall time",
+        run,
+        env.num_envs * _STEPS_OF_WORLDS,
+        _STEPS_OF_WORLDS,
+        ARRAYS,
+        uses_wall=True,
+    )
+
+
+def _timed(step: Callable[[Any], object], given: Iterable[Any]) -> float:
+    began = time.process_time()
+    for each in given:
+        step(each)
+    return time.process_time() - began

@@ -1,0 +1,66 @@
+"""What a process pays before its first step, and what a robot takes of memory."""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+_ROOT = Path(__file__).parents[1]
+_IMPORT = "import time; t = time.process_time(); {}; print(time.process_time() - t)"
+_NEEDED = "import pettingzoo, pymunk, numba"
+_FIRST_STEP = """
+import time; t = time.perf_counter()
+from swarm_logistics_env import swarm_logistics_v0
+env = swarm_logistics_v0.parallel_env(); env.reset(seed=0)
+env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+print(time.perf_counter() - t)
+"""
+_MEMORY = """
+import sys, numpy as np
+from pathlib import Path
+from swarm_logistics_env import Scenario, Warehouse
+
+def resident():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+def step(n, times):
+    side = 10.0 * (n / 25) ** 0.5
+    world = Warehouse(Scenario(n_robots=n, n_items=round(2.4 * n), warehouse_width=side,
+        warehouse_height=side, delivery_width=side / 5))
+    world.reset(0)
+    for _ in range(times):
+        world.step(np.zeros((n, 4)))
+    return world
+
+small = step(25, 5)
+before = resident()
+large = step(10_000, 20)
+print((resident() - before) / 10_000)
+"""
+
+
+def import_seconds(repeats: int) -> tuple[float, float]:
+    """Return the processor time [s] of importing the package, and of what it stands on alone."""
+    ours = [_number(_IMPORT.format("import swarm_logistics_env")) for _ in range(repeats)]
+    needed = [_number(_IMPORT.format(_NEEDED)) for _ in range(repeats)]
+    return statistics.median(ours), statistics.median(needed)
+
+
+def first_step_seconds(repeats: int) -> float:
+    """Return the wall time [s] in which a process with warm caches reaches its first step."""
+    _number(_FIRST_STEP)  # warms them
+    return statistics.median(_number(_FIRST_STEP) for _ in range(repeats))
+
+
+def bytes_per_robot() -> float | None:
+    """Return what a robot takes in a world of 10,000, its log of 20 steps included [bytes]."""
+    return _number(_MEMORY) if Path("/proc/self/statm").exists() else None
+
+
+def _number(script: str) -> float:
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=_ROOT, capture_output=True, text=True, check=True
+    )
+    return float(done.stdout.split()[-1])

@@ -1,0 +1,66 @@
+"""What is made of the times of a benchmark; no time is asserted."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from benchmarks import rivals
+from benchmarks.floor import Floor
+from benchmarks.recording import record
+from benchmarks.results import as_json, save, show
+from benchmarks.timing import Contestant, in_turns
+from swarm_logistics_env import Scenario, Warehouse
+
+
+def contestants() -> list[Contestant]:
+    seconds = {"base": iter([1.0, 2.0, 4.0]), "twice": iter([2.0, 4.0, 80.0])}
+    return [
+        Contestant("base", "little", lambda: next(seconds["base"]), 100, 10),
+        Contestant("twice", "more", lambda: next(seconds["twice"]), 100, 10, base="base"),
+    ]
+
+
+def test_ratios_are_medians_over_turns_and_rates_count_agent_steps() -> None:
+    base, twice = contestants()
+    in_turns([base, twice], 3)
+    assert twice.ratio_to(base) == 2.0
+    assert (base.rate, twice.microseconds) == (50.0, 400_000.0)
+
+
+def test_results_are_shown_and_written_with_who_is_missing(tmp_path: Path) -> None:
+    found = contestants()
+    in_turns(found, 3)
+    console = Console(width=150, record=True)
+    show(console, found, {"Absent": "No module named 'absent'"}, "title")
+    text = console.export_text()
+    assert "2.00 x base" in text
+    assert "does not run: No module named 'absent'" in text
+    save(tmp_path, as_json(found, seconds={"import": 1.0}))
+    written = json.loads((tmp_path / "benchmark.json").read_text())
+    assert [row["cost_to_base"] for row in written["contestants"]] == [None, 2.0]
+    assert (tmp_path / "benchmark.png").stat().st_size > 1000
+
+
+def test_a_peer_that_cannot_be_imported_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rivals, "PEERS", {"nobody": ("Nobody", lambda: None)})
+    found, processes, missing = rivals.rivals(sys.executable)
+    assert (found, processes) == ([], [])
+    assert missing == {"Nobody": "KeyError: 'nobody'"}
+
+
+def test_the_floor_moves_robots_exactly_as_the_world_does() -> None:
+    scenario = Scenario(n_robots=5, n_items=1)
+    recording = record(scenario, 20)
+    bare, world = Floor(recording), Warehouse(scenario)
+    world.reset(seed=0)
+    for step in range(20):
+        bare.step(step)
+        world.step(recording.commands[step])
+    assert np.linalg.norm(world.state.robot_position - recording.start, axis=1).max() > 0.5
+    np.testing.assert_allclose(bare._state[:5, :2], world.state.robot_position, atol=1e-9)
