@@ -166,8 +166,11 @@ class SwarmLogisticsEnv(DictView):
         Raises:
             CommandError: wrong shape or not finite; nothing has happened then.
         """
+        return self.outcome(self.warehouse.step(commands))
+
+    def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
+        """Return what `step_arrays` does of the step that the warehouse has just taken."""
         world, was_present = self.warehouse, self._present
-        observations = world.step(commands)
         rewards = self._rewards.pay(world)
         if len(self.agents) < len(was_present):
             rewards *= was_present

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import operator
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.adapters.buffers import Buffers
+from swarm_logistics_env.dict_view import ArrayStep
 from swarm_logistics_env.env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.crew import Crew
 from swarm_logistics_env.wrappers import Wrapper
 
 World: TypeAlias = SwarmLogisticsEnv | Wrapper
@@ -63,15 +64,19 @@ class Worlds:
         self.is_over = [False] * n_worlds
         self.present = np.zeros(self.n_rows, np.bool_)
         self._n_robots = [0] * n_worlds
+        self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
+        self._layers = [_layers(env) for env in self.envs]
         # Largest first, so that no thread is left with much work at the end.
-        self._order = sorted(range(n_worlds), key=lambda world: -sizes[world])
+        order = sorted(range(n_worlds), key=lambda world: -sizes[world])
+        self._shared_out = [world for world in order if self._layers[world]]
+        self._alone = [world for world in order if not self._layers[world]]
         # The thread that asks for a step works as well.
-        self._n_helpers = min(threads, n_worlds) - 1
-        self._pool = self._new_pool()
+        self._n_helpers = max(min(threads, len(self._shared_out)) - 1, 0)
+        self._crew = Crew(len(self._shared_out), self._n_helpers)
 
     def blank(self) -> NDArray[np.float32]:
         """Return zeros for the observations of all rows, (R, D)."""
-        return np.zeros((self.n_rows, *self.observation_space.shape), np.float32)
+        return self._buffers.zeros()
 
     def begin(
         self,
@@ -129,59 +134,85 @@ class Worlds:
 
     def step(self, commands: NDArray[Any]) -> RowsStep:
         """Take one control period in every world, with `checked` commands (R, 4)."""
-        # New memory every time: what was handed out stays as it was.
+        # Memory of the caller's own: what was handed out stays as it was.
         outcome = RowsStep(
             self.blank(),
             np.zeros(self.n_rows, np.float32),
             np.zeros(self.n_rows, np.bool_),
             np.zeros(self.n_rows, np.bool_),
         )
-        waiting = deque(self._order)
-        if self._pool is None:
-            self._work(waiting, commands, outcome)
-            return outcome
-        helpers = [
-            self._pool.submit(self._work, waiting, commands, outcome)
-            for _ in range(self._n_helpers)
-        ]
-        try:
-            self._work(waiting, commands, outcome)
-        finally:
-            wait(helpers)
-        for helper in helpers:
-            helper.result()
+        if self._shared_out:
+            outcome = self._step_together(commands, outcome)
+        for world in self._alone:
+            given = commands[self._robots(world)]
+            told = self.envs[world].step_arrays(given)
+            outcome.observations[self._robots(world)] = told[0]
+            self._take(world, told, outcome)
         return outcome
 
     def close(self) -> None:
         """Release threads and what rendering holds; harmless when called twice."""
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._crew.close()
         for env in self.envs:
             env.close()
 
-    def _work(self, waiting: deque[int], commands: NDArray[Any], outcome: RowsStep) -> None:
-        observations, rewards, terminated, truncated = outcome
-        while True:
-            try:
-                world = waiting.popleft()
-            except IndexError:
-                return
-            env, first = self.envs[world], self.rows[world].start
-            at = slice(first, first + self._n_robots[world])
-            observations[at], rewards[at], terminated[at], truncated[at] = env.step_arrays(
-                commands[at]
-            )
-            self.is_over[world] = not env.agents
+    def _step_together(self, commands: NDArray[Any], outcome: RowsStep) -> RowsStep:
+        given = np.array(commands, np.float64, order="C")
+        for world in self._shared_out:
+            for wrapper in self._layers[world][:-1]:
+                robots = self._robots(world)
+                given[robots] = wrapper.before_step(given[robots])
+        warehouses = [self._layers[world][-1].warehouse for world in self._shared_out]
+        firsts = [self.rows[world].start for world in self._shared_out]
+        # The worlds keep what they sensed, whatever the wrappers make of it.
+        changed: dict[int, NDArray[np.float32]] = {}
 
-    def _new_pool(self) -> ThreadPoolExecutor | None:
-        return ThreadPoolExecutor(self._n_helpers, "swarm-worlds") if self._n_helpers else None
+        def arrived(place: int, sensed: NDArray[np.float32]) -> None:
+            world = self._shared_out[place]
+            *wrappers, core = self._layers[world]
+            told = core.outcome(sensed)
+            for wrapper in reversed(wrappers):
+                told = wrapper.after_step(told)
+            if told[0] is not sensed:
+                changed[world] = told[0]
+            self._take(world, told, outcome)
+
+        self._crew.step(warehouses, firsts, given, outcome.observations, arrived)
+        if changed:
+            outcome = outcome._replace(observations=outcome.observations.copy())
+            for world, rows in changed.items():
+                outcome.observations[self._robots(world)] = rows
+        return outcome
+
+    def _take(self, world: int, told: ArrayStep, outcome: RowsStep) -> None:
+        robots = self._robots(world)
+        _, rewards, terminated, truncated = told
+        outcome.rewards[robots] = rewards
+        outcome.terminated[robots], outcome.truncated[robots] = terminated, truncated
+        self.is_over[world] = not self.envs[world].agents
+
+    def _robots(self, world: int) -> slice:
+        first = self.rows[world].start
+        return slice(first, first + self._n_robots[world])
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_pool": None}
+        return {**self.__dict__, "_crew": None, "_buffers": None}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self.__dict__.update(saved)
-        self._pool = self._new_pool()
+        self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
+        self._crew = Crew(len(self._shared_out), self._n_helpers)
+
+
+def _layers(env: World) -> list[Any]:
+    """Return the wrappers, outermost first, and the environment; nothing if it steps alone."""
+    layers: list[Any] = [env]
+    while isinstance(layers[-1], Wrapper):
+        layers.append(layers[-1].env)
+    core = layers[-1]
+    steps = [type(wrapper).step_arrays is Wrapper.step_arrays for wrapper in layers[:-1]]
+    is_plain = getattr(type(core), "step_arrays", None) is SwarmLogisticsEnv.step_arrays
+    return layers if is_plain and all(steps) else []
 
 
 def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:

@@ -23,6 +23,7 @@ class Tables:
 
     Attributes:
         addresses: (n, 3): of each array its address, its first length, and its second or 1.
+        where: the address of these.
     """
 
     def __init__(self, arrays: Sequence[NDArray[Any]]) -> None:
@@ -30,6 +31,7 @@ class Tables:
         self.addresses = np.array(
             [(array.ctypes.data, *array.shape, 1)[:3] for array in arrays], np.int64
         )
+        self.where: int = self.addresses.ctypes.data
 
 
 @kernel

@@ -87,6 +87,7 @@ class Warehouse:
         self._take_constants(scenario)
         self._build_physics()
         self._apply_faults()
+        self._rows = self._blank_rows()
         self._perceive()
         self._log = []
         self._remember()
@@ -108,31 +109,57 @@ class Warehouse:
             CommandError: wrong shape, not numbers, or not finite; the world is as it was.
             SetupError: the world was never reset.
         """
-        given = self._checked(commands)
-        state, scenario = self.state, self.scenario
-        time = (state.step + 1) * scenario.control_period
-        is_fault_due = bool(self._fault_times) and self._fault_times[0] <= time + 5e-7
-        rows = self._blank_rows()
-        anchored = stepping.step(
-            self._tables.addresses, given, state.step + 1, state.requested, is_fault_due, rows
+        given, rows = self._checked(commands), self._blank_rows()
+        state = self.state
+        outcome = stepping.step(
+            self._tables.addresses, given, state.step + 1, state.requested, self._pauses(), rows
         )
-        if anchored == stepping.NOT_FINITE:
+        return self.arrive(given, rows, outcome)
+
+    def order(self) -> tuple[int, int, int, int, int, bool]:
+        """Return what `stepping.step` has to know of the next step, for `Crew`.
+
+        The address and length of the tables, N, the step's number, the requested item, and
+        whether to pause before perceiving.
+
+        Raises:
+            SetupError: the world was never reset.
+        """
+        if self._seed is None:
+            raise SetupError("step before reset: call reset(seed) first")
+        state, tables = self.state, self._tables
+        return (
+            tables.where, len(tables.addresses), len(state.robot_position), state.step + 1,
+            state.requested, self._pauses(),
+        )  # fmt: skip
+
+    def arrive(
+        self, commands: NDArray[np.float64], rows: NDArray[np.float32], outcome: int
+    ) -> NDArray[np.float32]:
+        """Take over what `stepping.step` made of `commands` and returned; returns `rows`.
+
+        Raises:
+            CommandError: a robot's command is not finite; the world is as it was.
+        """
+        state, scenario = self.state, self.scenario
+        if outcome == stepping.NOT_FINITE:
             obeying = state.robot_present & state.obeys
-            bad = np.argwhere(~np.isfinite(given) & obeying[:, None])[0]
+            bad = np.argwhere(~np.isfinite(commands) & obeying[:, None])[0]
             raise CommandError(
-                f"commands[{bad[0]}, {bad[1]}] = {given[bad[0], bad[1]]}: should be finite"
+                f"commands[{bad[0]}, {bad[1]}] = {commands[bad[0], bad[1]]}: should be finite"
             )
-        self._log.append(given)
-        self._rows, state.step, state.time = rows, state.step + 1, time
-        if anchored == stepping.TO_BE_PERCEIVED:
+        is_fault_due = self._pauses()
+        self._log.append(commands)
+        self._rows, state.step, state.time = rows, state.step + 1, self._next_time()
+        if outcome == stepping.TO_BE_PERCEIVED:
             self._deliver()
             if is_fault_due:
                 self._apply_faults()
-            anchored = self._perceive()
-        state.anchoring_seconds += anchored * scenario.control_period
+            outcome = self._perceive()
+        state.anchoring_seconds += outcome * scenario.control_period
         if len(self._log) >= self._longest_log:
             self._remember()
-        return self.observe()
+        return rows
 
     def change(self, **fields: Any) -> None:
         """Change conditions while the robots are at work, from the next step on.
@@ -319,8 +346,14 @@ class Warehouse:
         for zeroed in (state.robot_position, state.robot_velocity, state.robot_heading):
             zeroed[robot] = 0.0
 
+    def _next_time(self) -> float:
+        return (self.state.step + 1) * self.scenario.control_period
+
+    def _pauses(self) -> bool:
+        """Return whether a fault begins or ends with the next step."""
+        return bool(self._fault_times) and self._fault_times[0] <= self._next_time() + 5e-7
+
     def _perceive(self) -> int:
-        self._rows = self._blank_rows()
         state = self.state
         return stepping.perceive(self._tables.addresses, state.step, state.requested, self._rows)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from swarm_logistics_env.dict_view import ArrayStep
 from swarm_logistics_env.errors import SetupError, suggest
@@ -202,9 +202,9 @@ class IndicatorReward(Wrapper):
         self._carriers = set[int]()  # of the requested item since it was asked for
         self._take_condition()
 
-    def step_arrays(self, commands: ArrayLike) -> ArrayStep:
-        """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
-        observations, own, terminations, truncations = self.env.step_arrays(commands)
+    def after_step(self, outcome: ArrayStep) -> ArrayStep:
+        """Pay for the step; everything else is as it was."""
+        observations, own, terminations, truncations = outcome
         world = self.unwrapped.warehouse
         state = world.state
         rewards = self.own_reward * own if self.own_reward else np.zeros(state.n_robots)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from swarm_logistics_env.dict_view import ArrayStep
 from swarm_logistics_env.errors import ScenarioError, suggest
 from swarm_logistics_env.reset_options import scenario_fields
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
@@ -106,13 +105,13 @@ class ParameterChange(Wrapper):
             self.value = present
         self._is_due = self.value != present
 
-    def step_arrays(self, commands: ArrayLike) -> ArrayStep:
-        """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
+    def before_step(self, commands: ArrayLike) -> ArrayLike:
+        """Make the change if it is due."""
         # Half a microsecond of grace: times are sums of control periods.
         if self._is_due and self.warehouse.state.time >= (self.time or 0.0) - 5e-7:
             self.warehouse.change(**{self.name: self.value})
             self._is_due = False
-        return super().step_arrays(commands)
+        return commands
 
     def _drawn(self, seed: int) -> tuple[Any, float | None]:
         rng = generator(seed, f"change of {self.name}", self._place())

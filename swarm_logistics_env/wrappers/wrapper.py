@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo ships no types
     """An environment around an environment, which leaves everything as it is; for subclasses.
 
-    They override `plan`, for what an episode should be like, `begun`, or the array methods; the
-    dict methods follow. Everything else is the wrapped environment's.
+    They override `plan`, for what an episode should be like, `begun`, `before_step`, `after_step`
+    or the array methods themselves; the dict methods follow. Everything else is the wrapped
+    environment's. Threads share out the worlds of a vector environment only if no wrapper
+    overrides `step_arrays`.
 
     Args:
         env: a `SwarmLogisticsEnv` or a wrapper of one.
@@ -73,7 +75,14 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
         """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
-        outcome: ArrayStep = self.env.step_arrays(commands)
+        return self.after_step(self.env.step_arrays(self.before_step(commands)))
+
+    def before_step(self, commands: ArrayLike) -> ArrayLike:
+        """Return the commands to step the wrapped environment with, of the same shape."""
+        return commands
+
+    def after_step(self, outcome: ArrayStep) -> ArrayStep:
+        """Return what to tell of the step that the wrapped environment has taken."""
         return outcome
 
     @property

@@ -22,6 +22,7 @@ from swarm_logistics_env.wrappers import (
     ParameterChange,
     RunningMeans,
     SwarmSize,
+    Wrapper,
 )
 
 pytest.importorskip("stable_baselines3")
@@ -317,7 +318,7 @@ def test_wrong_actions_are_refused_before_anything_happens(actions: Any) -> None
     assert [world.warehouse.state.step for world in env.worlds] == [0, 0]
 
 
-def test_what_a_world_raises_in_a_thread_is_raised() -> None:
+def test_what_a_world_raises_is_raised() -> None:
     class Broken(SwarmLogisticsEnv):
         def step_arrays(self, commands: Any) -> Any:
             raise RuntimeError("broken")
@@ -329,6 +330,51 @@ def test_what_a_world_raises_in_a_thread_is_raised() -> None:
         env.reset()
         with pytest.raises(RuntimeError, match="broken"):
             env.step(np.zeros((8, 4)))
+
+
+class Halved(Wrapper):
+    """Robots drive at half of what is asked and see themselves twice as far."""
+
+    def before_step(self, commands: Any) -> Any:
+        return np.asarray(commands) * [0.5, 0.5, 1.0, 1.0]
+
+    def after_step(self, outcome: Any) -> Any:
+        observations, rewards, *ends = outcome
+        return observations * 2.0, rewards + 1.0, *ends
+
+
+class HalvedByItself(Wrapper):
+    """The same, without the methods that let worlds be shared out."""
+
+    def step_arrays(self, commands: Any) -> Any:
+        halved = np.asarray(commands) * [0.5, 0.5, 1.0, 1.0]
+        observations, rewards, *ends = super().step_arrays(halved)
+        return observations * 2.0, rewards + 1.0, *ends
+
+
+def test_wrappers_change_commands_and_outcomes_however_worlds_are_stepped() -> None:
+    def trace(wrappers: list[Any], threads: int) -> list[Any]:
+        def make_env(world: int) -> Any:
+            env = SwarmLogisticsEnv(n_robots=2 + world, **SMALL)
+            return env if wrappers[world] is None else wrappers[world](env)
+
+        env = SwarmVecEnv(make_env=make_env, n_worlds=3, threads=threads, seed=3)
+        seen = [env.reset()]
+        rng = np.random.default_rng(0)
+        for _ in range(60):
+            seen += env.step(rng.uniform(-1.0, 1.0, (9, 4)))[:3]
+        own = [world.unwrapped.warehouse.observe() for world in env.worlds]
+        env.close()
+        return [*seen, *own]
+
+    shared_out = trace([Halved, None, Halved], threads=2)
+    for wrappers, threads in (
+        ([Halved, None, Halved], 1),
+        ([HalvedByItself, None, Halved], 2),
+        ([HalvedByItself, None, HalvedByItself], 1),
+    ):
+        for mine, theirs in zip(shared_out, trace(wrappers, threads), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
 
 
 def learned(n_steps: int) -> Any:

@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.warehouse.crew import Crew
+
+SMALL: dict[str, Any] = {
+    "warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.5, "n_items": 6,
+    "restock": True,
+}  # fmt: skip
+SIZES = (2, 5, 1, 3)
+COLUMNS = 140
+
+
+def worlds() -> list[Warehouse]:
+    made = []
+    for seed, n_robots in enumerate(SIZES):
+        world = Warehouse(Scenario(n_robots=n_robots, **SMALL))
+        world.reset(seed, faults=[Fault("dead", 1, onset=1.0)])
+        made.append(world)
+    return made
+
+
+def commands(step: int) -> NDArray[np.float64]:
+    given = np.random.default_rng(step).uniform(-1.0, 1.0, (sum(SIZES), 4))
+    given[:, 3] = 1.0 if step % 20 < 15 else -1.0
+    return given
+
+
+FIRSTS = [0, 2, 7, 8]
+
+
+def step(crew: Crew, made: list[Warehouse], given: NDArray[np.float64]) -> NDArray[np.float32]:
+    rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
+    order = []
+
+    def arrived(place: int, sensed: NDArray[np.float32]) -> None:
+        order.append(place)
+        assert np.shares_memory(sensed, rows)
+        assert sensed is made[place].observe()
+
+    crew.step(made, FIRSTS, given, rows, arrived)
+    assert order == [0, 1, 2, 3]
+    return rows
+
+
+@pytest.mark.parametrize("n_helpers", [0, 1, 3])
+def test_a_crew_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
+    crew, together, apart = Crew(len(SIZES), n_helpers), worlds(), worlds()
+    for number in range(120):
+        given = commands(number)
+        rows = step(crew, together, given)
+        for world, first in zip(apart, FIRSTS):
+            own = slice(first, first + world.state.n_robots)
+            np.testing.assert_array_equal(rows[own], world.step(given[own]))
+    for mine, theirs in zip(together, apart):
+        assert mine.state.delivery_times == theirs.state.delivery_times
+        assert mine.state.anchoring_seconds == theirs.state.anchoring_seconds
+    crew.close()
+
+
+def test_helpers_end_with_the_crew() -> None:
+    before = set(threading.enumerate())
+    crew, made = Crew(len(SIZES), 2), worlds()
+    step(crew, made, commands(0))
+    helpers = [t for t in set(threading.enumerate()) - before if t.name == "swarm-crew"]
+    assert len(helpers) == 2
+    crew.close()
+    for helper in helpers:
+        helper.join(10.0)
+    assert not any(helper.is_alive() for helper in helpers)
+
+
+def test_all_worlds_are_taken_over_when_the_caller_fails_at_one() -> None:
+    crew, made = Crew(len(SIZES), 1), worlds()
+    rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
+
+    def arrived(place: int, sensed: NDArray[np.float32]) -> None:
+        raise RuntimeError(f"not {place}")
+
+    with pytest.raises(RuntimeError, match="not 0"):
+        crew.step(made, FIRSTS, commands(0), rows, arrived)
+    assert [world.state.step for world in made] == [1, 1, 1, 1]
+    step(crew, made, commands(1))
+    assert [world.state.step for world in made] == [2, 2, 2, 2]
+    crew.close()
+
+
+def test_what_a_world_refuses_is_raised() -> None:
+    crew, made = Crew(len(SIZES), 1), worlds()
+    given = commands(0)
+    given[3, 1] = np.nan
+    with pytest.raises(CommandError, match=r"commands\[1, 1\] = nan"):
+        step(crew, made, given)
+    assert [world.state.step for world in made] == [1, 0, 1, 1]
+
+    unused = Warehouse(Scenario(n_robots=2, **SMALL))
+    with pytest.raises(SetupError, match="reset"):
+        step(crew, [unused, *made[1:]], commands(1))
+    assert [world.state.step for world in made] == [1, 0, 1, 1]
+    crew.close()
