@@ -35,9 +35,6 @@ def expect(plan: Plan) -> Expectation:
 
     Raises:
         StudyError: a policy fails in its first seconds.
-
-    Raises:
-        StudyError: a policy fails in its first seconds.
     """
     shortened = {_kind(condition): condition for condition in plan.conditions}
     pace = {kind: _pace(plan, condition) for kind, condition in shortened.items()}
