@@ -129,6 +129,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 SHORT_PAPER = """
+import signal
 import sys
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.studies import paper
@@ -138,6 +139,8 @@ def shorter(factor):
     return factor.replace(scenario={**factor.scenario, "duration": DURATION})
 
 if __name__ == "__main__":
+    # Also where the gate itself was started to ignore it, as by nohup.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     old = paper.SPECIFICATION
     paper.SPECIFICATION = old.replace(
         scenario=Scenario(duration=DURATION),

@@ -63,6 +63,8 @@ def test_window_opens_plays_and_closes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_web_view_serves_until_ctrl_c_without_pygame() -> None:
     script = (
+        # Also where the gate itself was started to ignore it, as by nohup.
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "import sys; sys.modules['pygame'] = None\n"
         "from swarm_logistics_env.cli import app\n"
         "sys.exit(app.run(['watch', '--web', '--port', '0', '--set', 'n_robots=5']))"
