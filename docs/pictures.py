@@ -14,6 +14,7 @@ from PIL import Image
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.rendering import Renderer
+from swarm_logistics_env.rendering.palette import film_colours
 from swarm_logistics_env.studies import Study
 
 MEDIA = Path(__file__).parent / "media"
@@ -58,8 +59,12 @@ def window() -> NDArray[np.uint8]:
 
 
 def save(picture: NDArray[np.uint8], name: str) -> None:
-    """Write a picture with a palette: a quarter of the size, and the colours are few."""
-    Image.fromarray(picture).quantize(128).save(MEDIA / name, optimize=True)
+    """Write a picture in the colours that films have: a third of the size, and none shifts."""
+    colours = film_colours()
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for colour in colours for part in colour])
+    exact = Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+    exact.save(MEDIA / name, optimize=True)
 
 
 def figures() -> None:

@@ -33,6 +33,7 @@ from swarm_logistics_env.rendering.shapes import (
 
 HEADINGS = 120  # headings that are told apart
 HALOS = 12  # ages of a timer that are told apart
+_LETTERS = 4  # times as large as they are shown
 
 P = ParamSpec("P")
 
@@ -163,7 +164,11 @@ def words(text: str, height: int, colour: RGB) -> pygame.Surface:
     """Return a line of text of that height [px], in the font that pygame brings along."""
     # A font is not kept: it would die with a pygame.quit() of somebody else's.
     pygame.font.init()
-    return _fast(pygame.font.Font(None, height).render(text, True, colour))
+    # Drawn larger and shrunk: small letters are hinted until an i has no dot and words fall apart.
+    large = pygame.font.Font(None, _LETTERS * height).render(text, True, colour)
+    width, tall = large.get_size()
+    size = max(1, round(width / _LETTERS)), max(1, round(tall / _LETTERS))
+    return _fast(pygame.transform.smoothscale(large, size))
 
 
 @lru_cache(maxsize=256)
