@@ -10,7 +10,14 @@ import numpy as np
 
 from .errors import IndicatorError
 from .inputs import between_0_and_1, performance
-from .scaling_laws import CURVES, peak_of, power_exponential_start, shapes_with_peak_at, usl_start
+from .scaling_laws import (
+    CURVES,
+    peak_of,
+    power_exponential_start,
+    shapes_with_peak_at,
+    sharpness_of,
+    usl_start,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -21,6 +28,7 @@ if TYPE_CHECKING:
 Weighting = Literal["1/P", "none"]
 
 _FARTHEST = 1e6  # an upper limit of N* this many times the estimate is none
+_SHARPNESS = 15.0  # the search for the best sharpness goes so far to either side of 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +100,9 @@ def fit_scaling(
     peak = peak_of(law, fitted)
     low, high = None, None
     if peak is not None:
-        low, high = _peak_limits(law, peak, residual_sum, n, observed, weights, level)
+        # From below that of the fit, which may be nearly flat.
+        bluntest = min(-_SHARPNESS, sharpness_of(law, fitted, peak) - _SHARPNESS)
+        low, high = _peak_limits(law, peak, bluntest, residual_sum, n, observed, weights, level)
     names = ("g", "a", "b") if law == "usl" else ("k", "p", "q")
     return ScalingFit(
         law=law,
@@ -165,6 +175,7 @@ def _least_squares(
 def _peak_limits(
     law: Law,
     peak: float,
+    bluntest: float,
     residual_sum: float,
     n: NDArray[np.float64],
     observed: NDArray[np.float64],
@@ -181,17 +192,20 @@ def _peak_limits(
     allowed = residual_sum * (1.0 + float(stdtrit(df, 0.5 + level / 2)) ** 2 / df)
 
     def excess(log_peak: float) -> float:
-        return _residual_sum_at(law, math.exp(log_peak), n, observed, weights) - allowed
+        return _residual_sum_at(law, math.exp(log_peak), bluntest, n, observed, weights) - allowed
 
     def limit(side: int, farthest: float) -> float | None:
         inner, step = math.log(peak), 0.05
-        while abs(farthest - inner) > 1e-9:
+        # Nothing to look at where the peak itself lies beyond the farthest.
+        while side * (farthest - inner) > 1e-9:
             outer = math.log(peak) + side * min(step, abs(farthest - math.log(peak)))
             if excess(outer) > 0.0:
                 return math.exp(float(brentq(excess, inner, outer, xtol=1e-6)))
             inner, step = outer, 2.0 * step
         return None
 
+    if excess(math.log(peak)) > 0.0:  # the fit has a pole (or all but): it is none of those
+        return 0.0, math.inf
     low, high = limit(-1, math.log1p(1e-3)), limit(1, math.log(peak * _FARTHEST))
     return 0.0 if low is None else low, math.inf if high is None else high
 
@@ -199,12 +213,13 @@ def _peak_limits(
 def _residual_sum_at(
     law: Law,
     peak: float,
+    bluntest: float,
     n: NDArray[np.float64],
     observed: NDArray[np.float64],
     weights: NDArray[np.float64],
 ) -> float:
     """Least weighted sum of squares with N* held: the factor in closed form, the rest searched."""
-    low, high = -15.0, 15.0
+    low, high = bluntest, _SHARPNESS
     for _ in range(4):  # each grid spans two steps of the one before
         sharpness = np.linspace(low, high, 121)
         shapes = shapes_with_peak_at(law, peak, sharpness, n) * weights

@@ -73,6 +73,18 @@ def peak_of(law: Law, parameters: NDArray[np.float64]) -> float | None:
     return peak if peak > 1.0 else None
 
 
+def sharpness_of(law: Law, parameters: NDArray[np.float64], peak: float) -> float:
+    """Sharpness at which `shapes_with_peak_at` gives the fitted curve, whose N* is `peak` > 1.
+
+    inf where the fitted law has a pole.
+    """
+    _, second, third = (float(value) for value in parameters)
+    if law == "power_exponential":
+        return math.log(second)
+    share = third * (peak - 1.0) ** 2
+    return math.log(share / (1.0 - share)) if share < 1.0 else math.inf
+
+
 def shapes_with_peak_at(
     law: Law, peak: float, sharpness: NDArray[np.float64], n: NDArray[np.float64]
 ) -> NDArray[np.float64]:

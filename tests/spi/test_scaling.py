@@ -115,6 +115,26 @@ def test_where_no_size_is_excluded_the_limits_are_0_and_infinity() -> None:
 
 
 @pytest.mark.parametrize(
+    ("sizes", "p"),
+    [
+        # N* a hair above one robot, P nearly the same at every size, and a fit that has a pole
+        ([1, 2, 4, 8, 16], [9.999964, 9.091765, 6.897275, 4.49474, 2.623088]),
+        (
+            SIZES.tolist(),
+            [40.0008, 40.0006, 39.9999, 40.001, 40.0012, 39.9997, 40.0001, 39.9985, 39.9993],
+        ),
+        ([1, 2, 4, 8, 16], [7.0, 98.0, 6.0, 4.0, 47.0]),
+    ],
+)
+def test_the_interval_of_an_odd_peak_holds_it(sizes: list[int], p: list[float]) -> None:
+    fit = spi.fit_scaling(sizes, p, law="usl")
+    assert fit.peak is not None
+    assert fit.peak_low is not None
+    assert fit.peak_high is not None
+    assert 0.0 <= fit.peak_low <= fit.peak <= fit.peak_high
+
+
+@pytest.mark.parametrize(
     ("law", "p"),
     [
         ("usl", 2 * SIZES / (1 + 0.05 * (SIZES - 1) - 1e-4 * SIZES * (SIZES - 1))),
