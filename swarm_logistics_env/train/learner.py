@@ -15,8 +15,14 @@ from swarm_logistics_env.train.specification import Training
 ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 
 
-def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
-    """Return PPO as the training asks for it; seeds the generators of torch and numpy."""
+def make_learner(
+    training: Training, view: NetworkView, device: str, *, goes_on: bool = False
+) -> PPO:
+    """Return PPO as the training asks for it; seeds the worlds and global generators.
+
+    Args:
+        goes_on: whether the worlds are in mid-training: nothing is seeded then.
+    """
     ppo, network = training.ppo, training.network
     first, last = ppo.learning_rate, ppo.final_learning_rate
     learner = PPO(
@@ -37,7 +43,7 @@ def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
             "net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)},
             "activation_fn": ACTIVATIONS[network.activation],
         },
-        seed=training.seed,
+        seed=None if goes_on else training.seed,
         device=device,
     )
     with torch.no_grad():

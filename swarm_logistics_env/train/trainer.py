@@ -88,7 +88,7 @@ def train(
     state = read_checkpoint(out)
     view = _new_view(training) if state is None else view_of(state)
     notes = Notes() if state is None else state["notes"]
-    learner = make_learner(training, view, device_of(device))
+    learner = make_learner(training, view, device_of(device), goes_on=state is not None)
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
         restore(learner, state)
