@@ -7,16 +7,20 @@ closely; every thread takes the next world that nobody has taken, from a board t
 
 from __future__ import annotations
 
+import contextlib
+import os
 import threading
 import time
 import weakref
 from collections.abc import Callable, Sequence
+from queue import SimpleQueue
 from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.errors import CommandError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.warehouse import stepping
 from swarm_logistics_env.warehouse.atomic import add, exchange, load, replace
@@ -30,7 +34,7 @@ carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]
 TAKEN, GIVEN, ASLEEP, IS_CLOSED, COMMANDS, COMMAND_COLUMNS, ROWS, ROW_COLUMNS, N_ORDERS = range(9)
 _FIRST_ORDER = 9
 # Places of an order, one per world, behind them.
-TABLES, N_TABLES, FIRST, N_ROBOTS, STEP, REQUESTED, PAUSES, OUTCOME, N_PLACES = range(9)
+FIRST, TABLES, N_TABLES, N_ROBOTS, STEP, REQUESTED, PAUSES, OUTCOME, N_PLACES = range(9)
 UNDER_WAY = -3  # an outcome that is none of `stepping`'s
 # How often a helper looks for work before it goes to sleep: 0.3 ms, what ten wakings take.
 _PATIENCE = 400_000
@@ -39,24 +43,41 @@ _PATIENCE = 400_000
 class Crew:
     """Threads that step warehouses together; whoever asks for a step works as well.
 
+    A process that was forked has a crew of its own, from its first step on.
+
     Args:
         n_worlds: how many warehouses a step has.
         n_helpers: how many threads there are beside the caller's.
+
+    Attributes:
+        close: ends the helpers; harmless when called twice. What a crew is asked for afterwards
+            the caller does alone.
     """
 
+    close: Callable[[], object]
+
     def __init__(self, n_worlds: int, n_helpers: int) -> None:
-        self._board = np.zeros(_FIRST_ORDER + n_worlds * N_PLACES, np.int64)
-        self._board[N_ORDERS] = n_worlds
-        self._at = self._board.ctypes.data
-        self._bell = threading.Semaphore(0)
-        # Compiled before helpers are many and in the way of the caller.
+        self._n_worlds, self._n_helpers = n_worlds, n_helpers
+        self._gather()
+
+    def _gather(self) -> None:
+        self._process = os.getpid()
+        self._board = board = np.zeros(_FIRST_ORDER + self._n_worlds * N_PLACES, np.int64)
+        board[N_ORDERS] = self._n_worlds
+        self._at: int = board.ctypes.data
+        # Not a semaphore, whose lock another thread may hold at a fork or when a finalizer comes.
+        self._bell: SimpleQueue[None] = SimpleQueue()
+        # Compiled before helpers are many and in the way of the caller, and so that no Ctrl-C
+        # finds them half compiled.
+        give(self._at, np.zeros((0, 7), np.int64), np.zeros((0, 0)), np.zeros((0, 0), np.float32))
         help_out(self._at, 0)
         exchange_sleepers(self._at)
-        for _ in range(n_helpers):
+        finish(self._at)
+        self.close = weakref.finalize(self, _close, board, self._bell, self._n_helpers)
+        for _ in range(self._n_helpers):
             threading.Thread(
-                target=_help, args=(self._board, self._bell), name="swarm-crew", daemon=True
+                target=_help, args=(board, self._bell), name="swarm-crew", daemon=True
             ).start()
-        self.close = weakref.finalize(self, _close, self._board, self._bell, n_helpers)
 
     def step(
         self,
@@ -80,17 +101,17 @@ class Crew:
             CommandError: a robot's command is not finite; its world is as it was.
             SetupError: a world was never reset.
         """
-        orders = [(first, *world.order()) for world, first in zip(worlds, firsts)]
-        # If an earlier step was interrupted, what it gave out may still be under way.
-        for place in range(len(worlds)):
-            self._wait_for(place)
-        begin(self._at, commands, rows)
-        for order in orders:
-            give(self._at, *order)
-        for _ in range(exchange_sleepers(self._at)):
-            self._bell.release()
+        orders = np.array(
+            [(first, *world.order()) for world, first in zip(worlds, firsts)], np.int64
+        )
+        if self._process != os.getpid():
+            self._gather()
         place = 0
         try:
+            # One call for all, and one that ends what is left: Ctrl-C comes between calls.
+            give(self._at, orders, commands, rows)
+            for _ in range(exchange_sleepers(self._at)):
+                self._bell.put(None)
             while place < len(worlds):
                 # Not more than one at a time: what helpers have done meanwhile can be seen to
                 # while they go on.
@@ -100,10 +121,11 @@ class Crew:
                     place += 1
                     arrived(place - 1, self._arrive(place - 1, worlds, firsts, commands, rows))
         finally:
+            if place < len(worlds):
+                finish(self._at)
             for left in range(place, len(worlds)):
-                work(self._at)
-                self._wait_for(left)
-                self._arrive(left, worlds, firsts, commands, rows)
+                with contextlib.suppress(CommandError):  # one is raised already
+                    self._arrive(left, worlds, firsts, commands, rows)
 
     def _arrive(
         self,
@@ -122,24 +144,15 @@ class Crew:
             time.sleep(0)  # its thread may be waiting for this one's core
 
 
-def _help(board: NDArray[np.int64], bell: threading.Semaphore) -> None:
+def _help(board: NDArray[np.int64], bell: SimpleQueue[None]) -> None:
     while not help_out(board.ctypes.data, _PATIENCE):
-        bell.acquire()
+        bell.get()
 
 
-def _close(board: NDArray[np.int64], bell: threading.Semaphore, n_helpers: int) -> None:
+def _close(board: NDArray[np.int64], bell: SimpleQueue[None], n_helpers: int) -> None:
     board[IS_CLOSED] = 1
     for _ in range(n_helpers):
-        bell.release()
-
-
-@kernel
-def begin(board: int, commands: NDArray[np.float64], rows: NDArray[np.float32]) -> None:
-    """Say where the commands and the observation rows of the next worlds are."""
-    exchange(board + 8 * COMMANDS, commands.ctypes.data)
-    exchange(board + 8 * COMMAND_COLUMNS, commands.shape[1])
-    exchange(board + 8 * ROWS, rows.ctypes.data)
-    exchange(board + 8 * ROW_COLUMNS, rows.shape[1])
+        bell.put(None)
 
 
 @kernel
@@ -151,26 +164,29 @@ def order_at(board: int, place: int) -> int:
 @kernel
 def give(
     board: int,
-    first: int,
-    tables: int,
-    n_tables: int,
-    n_robots: int,
-    step: int,
-    requested: int,
-    pauses: bool,
+    orders: NDArray[np.int64],
+    commands: NDArray[np.float64],
+    rows: NDArray[np.float32],
 ) -> None:
-    """Give out the next world; see `stepping.step`."""
+    """Give out the next worlds, all of a step.
+
+    Args:
+        board: its address.
+        orders: (n, 7): each world's first row, and what `Warehouse.order` says.
+        commands: (R, C) of all.
+        rows: (R, D) for the observations of all.
+    """
+    exchange(board + 8 * COMMANDS, commands.ctypes.data)
+    exchange(board + 8 * COMMAND_COLUMNS, commands.shape[1])
+    exchange(board + 8 * ROWS, rows.ctypes.data)
+    exchange(board + 8 * ROW_COLUMNS, rows.shape[1])
     given = load(board + 8 * GIVEN)
-    order = order_at(board, given % load(board + 8 * N_ORDERS))
-    exchange(order + 8 * TABLES, tables)
-    exchange(order + 8 * N_TABLES, n_tables)
-    exchange(order + 8 * FIRST, first)
-    exchange(order + 8 * N_ROBOTS, n_robots)
-    exchange(order + 8 * STEP, step)
-    exchange(order + 8 * REQUESTED, requested)
-    exchange(order + 8 * PAUSES, 1 if pauses else 0)
-    exchange(order + 8 * OUTCOME, UNDER_WAY)
-    exchange(board + 8 * GIVEN, given + 1)
+    for world in range(len(orders)):
+        order = order_at(board, (given + world) % load(board + 8 * N_ORDERS))
+        for place in range(OUTCOME):
+            exchange(order + 8 * place, orders[world, place])
+        exchange(order + 8 * OUTCOME, UNDER_WAY)
+        exchange(board + 8 * GIVEN, given + world + 1)
 
 
 @kernel
@@ -210,6 +226,15 @@ def work_once(board: int) -> bool:
     )
     exchange(order + 8 * OUTCOME, outcome)
     return True
+
+
+@kernel
+def finish(board: int) -> None:
+    """Step all worlds that are left and wait for those that others step."""
+    work(board)
+    for place in range(load(board + 8 * N_ORDERS)):
+        while load(order_at(board, place) + 8 * OUTCOME) == UNDER_WAY:
+            pass
 
 
 @kernel

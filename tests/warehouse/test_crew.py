@@ -1,5 +1,10 @@
 from __future__ import annotations
 
+import contextlib
+import gc
+import multiprocessing
+import subprocess
+import sys
 import threading
 from typing import Any
 
@@ -9,6 +14,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.warehouse import crew as crews
 from swarm_logistics_env.warehouse.crew import Crew
 
 SMALL: dict[str, Any] = {
@@ -66,13 +72,19 @@ def test_a_crew_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
     crew.close()
 
 
-def test_helpers_end_with_the_crew() -> None:
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_helpers_end_with_the_crew(is_closed: bool) -> None:
     before = set(threading.enumerate())
     crew, made = Crew(len(SIZES), 2), worlds()
     step(crew, made, commands(0))
     helpers = [t for t in set(threading.enumerate()) - before if t.name == "swarm-crew"]
     assert len(helpers) == 2
-    crew.close()
+    if is_closed:
+        crew.close()
+        crew.close()
+        step(crew, made, commands(1))  # the caller does it alone
+    del crew
+    gc.collect()
     for helper in helpers:
         helper.join(10.0)
     assert not any(helper.is_alive() for helper in helpers)
@@ -106,3 +118,97 @@ def test_what_a_world_refuses_is_raised() -> None:
         step(crew, [unused, *made[1:]], commands(1))
     assert [world.state.step for world in made] == [1, 0, 1, 1]
     crew.close()
+
+
+def test_a_world_that_refuses_keeps_none_of_those_behind_it() -> None:
+    crew, made = Crew(len(SIZES), 1), worlds()
+    given = commands(0)
+    given[0, 0] = given[7, 2] = np.inf
+    with pytest.raises(CommandError, match=r"commands\[0, 0\] = inf"):
+        step(crew, made, given)
+    assert [world.state.step for world in made] == [0, 1, 0, 1]
+    crew.close()
+
+
+@pytest.mark.parametrize("n_helpers", [0, 2])
+@pytest.mark.parametrize("kernel", ["give", "exchange_sleepers", "work_once", "result"])
+def test_a_crew_goes_on_after_ctrl_c(
+    n_helpers: int, kernel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = getattr(crews, kernel)
+    crew, made = Crew(len(SIZES), n_helpers), worlds()
+    step(crew, made, commands(0))
+    for interrupted in range(3):
+        left = [interrupted]
+
+        def interrupting(*arguments: Any, left: list[int] = left) -> Any:
+            # The interpreter looks for signals when a call has returned.
+            answer = original(*arguments)
+            left[0] -= 1
+            if left[0] == -1:
+                raise KeyboardInterrupt
+            return answer
+
+        monkeypatch.setattr(crews, kernel, interrupting)
+        # What calls it, and how often, depends on how fast helpers are.
+        while left[0] >= 0:
+            with contextlib.suppress(KeyboardInterrupt):
+                step(crew, made, commands(1))
+        monkeypatch.setattr(crews, kernel, original)
+        for seed, world in enumerate(made):
+            world.reset(seed)
+        alone = worlds()
+        for seed, world in enumerate(alone):
+            world.reset(seed)
+        for number in range(10):
+            given = commands(number)
+            rows = step(crew, made, given)
+            for world, first in zip(alone, FIRSTS):
+                own = slice(first, first + world.state.n_robots)
+                np.testing.assert_array_equal(rows[own], world.step(given[own]))
+    crew.close()
+
+
+def play_on(crew: Crew, made: list[Warehouse], expected: NDArray[np.float32]) -> None:
+    """In a process that was forked: the crew's threads stayed behind."""
+    np.testing.assert_array_equal(step(crew, made, commands(1)), expected)
+    assert sum(thread.name == "swarm-crew" for thread in threading.enumerate()) == 2
+    crew.close()
+
+
+@pytest.mark.skipif(
+    "fork" not in multiprocessing.get_all_start_methods(), reason="the system does not fork"
+)
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+def test_a_process_that_was_forked_has_a_crew_of_its_own() -> None:
+    crew, made, alone = Crew(len(SIZES), 2), worlds(), Crew(len(SIZES), 0)
+    step(crew, made, commands(0))
+    ahead = worlds()
+    step(alone, ahead, commands(0))
+    expected = step(alone, ahead, commands(1))
+    forked = multiprocessing.get_context("fork").Process(
+        target=play_on, args=(crew, made, expected)
+    )
+    forked.start()
+    forked.join(60.0)
+    assert forked.exitcode == 0
+    np.testing.assert_array_equal(step(crew, made, commands(1)), expected)
+    crew.close()
+
+
+def test_a_program_ends_while_its_crew_is_at_work() -> None:
+    program = (
+        "import numpy as np\n"
+        "from swarm_logistics_env import Scenario, Warehouse\n"
+        "from swarm_logistics_env.warehouse.crew import Crew\n"
+        "worlds = [Warehouse(Scenario(n_robots=2)) for _ in range(4)]\n"
+        "for world in worlds: world.reset(0)\n"
+        "crew, rows = Crew(4, 3), np.zeros((8, worlds[0].observe().shape[1]), np.float32)\n"
+        "for _ in range(20):\n"
+        "    crew.step(worlds, [0, 2, 4, 6], np.zeros((8, 4)), rows, lambda *_: None)\n"
+        "print(rows.any())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
