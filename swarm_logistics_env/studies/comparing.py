@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from swarm_logistics_env import spi
@@ -36,54 +38,60 @@ def answers(gate: Gate, old: Findings, new: Findings) -> tuple[Answer, ...]:
     Raises:
         StudyError: it is about nothing that the studies hold.
     """
-    asked = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
-    asked = {name: answer for name, answer in asked.items() if gate.at in name}
+    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
+    asked = [(name, answer) for name, answer in found if gate.at in name]
     if not asked:
         where = f" at {gate.at!r}" if gate.at else ""
         raise StudyError(
             f"gate {gate.text!r}: the studies hold no {gate.subject}{where}, so it tests nothing"
         )
-    judged = [estimate for estimate in asked.values() if isinstance(estimate, Estimate)]
+    judged = [estimate for _, estimate in asked if isinstance(estimate, Estimate)]
     verdicts = iter(spi.adjust(judged))
     return tuple(
         Answer(name, None, None, estimate, fails=True)
         if isinstance(estimate, str)
         else Answer(name, estimate, verdict := next(verdicts), None, gate.fails_on(verdict))
-        for name, estimate in asked.items()
+        for name, estimate in asked
     )
 
 
-def _indicators(gate: Gate, new: Findings) -> dict[str, Estimate | str]:
+def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, Estimate | str]]:
     performance = {(cell.policy, cell.table, cell.arm): cell for cell in new.cells}
-    asked: dict[str, Estimate | str] = {}
-    for comparison in (judgement.comparison for judgement in new.judgements):
-        if comparison.indicator != gate.subject:
-            continue
+    # Once each, however many thresholds it was asked against.
+    comparisons = dict.fromkeys(
+        replace(judgement.comparison, threshold=gate.number)
+        for judgement in new.judgements
+        if judgement.comparison.indicator == gate.subject
+    )
+    labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
+    for comparison in comparisons:
         name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
+        if labels[comparison.policy, comparison.label] > 1:
+            name += f" ({comparison.table})"
         used = {
             arm: performance[comparison.policy, comparison.table, arm] for arm in comparison.arms
         }
         problems = [f"{arm.level}: {cell.problem}" for arm, cell in used.items() if cell.problem]
         if problems:
-            asked[name] = "; ".join(problems)
+            yield name, "; ".join(problems)
             continue
         try:
-            asked[name] = replace(comparison, threshold=gate.number).estimate(
+            estimate = comparison.estimate(
                 # No type can be given to a lambda's default.
                 lambda arm, used=used: used[arm].performance,  # type: ignore[misc]
                 paired=new.plan.paired,
             )
         except spi.IndicatorError as error:
-            asked[name] = str(error)
-    return asked
+            yield name, str(error)
+        else:
+            yield name, estimate
 
 
-def _changes(gate: Gate, old: Findings, new: Findings) -> dict[str, Estimate | str]:
+def _changes(gate: Gate, old: Findings, new: Findings) -> Iterator[tuple[str, Estimate | str]]:
     before, after = _by_content(old), _by_content(new)
     # One policy in each: they are compared whatever they are called.
     (theirs, *more), ours = {policy for policy, _ in before}, {policy for policy, _ in after}
     renamed = not more and len(ours) == 1
-    asked: dict[str, Estimate | str] = {}
     for (policy, content), cell in after.items():
         label = theirs if renamed else policy
         match = before.get((label, content))
@@ -92,8 +100,7 @@ def _changes(gate: Gate, old: Findings, new: Findings) -> dict[str, Estimate | s
         named = policy if label == policy else f"{label} -> {policy}"
         name = f"{named}: change, {cell.arm.level} ({cell.table})"
         paired = old.plan.paired and new.plan.paired
-        asked[name] = match.problem or cell.problem or _change(gate, match, cell, paired=paired)
-    return asked
+        yield name, match.problem or cell.problem or _change(gate, match, cell, paired=paired)
 
 
 def _change(gate: Gate, before: Cell, after: Cell, *, paired: bool) -> Estimate | str:

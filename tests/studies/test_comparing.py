@@ -73,6 +73,25 @@ def test_every_shared_condition_is_compared_once() -> None:
     assert len(names) == 4
 
 
+def test_comparisons_of_one_label_in_two_tables_are_all_judged() -> None:
+    faults = [
+        {"title": title, "modes": ["FM1"], "robots": [1], "scenario": {"n_robots": n}}
+        for title, n in (("few", 10), ("many", 20))
+    ]
+    performance = {**WORSE, (20, 1): 69, (20, -1): 68}
+    new = findings(performance, faults=faults)
+    names = [answer.name for answer in answers(Gate.parse("R < 0"), new, new)]
+    assert names == [f"swarm-dt: R, FM1, m = 1 ({table})" for table in ("few", "many")]
+    assert fails("R < 0", new, new)
+    assert not fails("R < 0 at many", new, new)
+
+
+def test_an_indicator_asked_against_two_thresholds_is_judged_once() -> None:
+    asked = findings(WELL, sizes=[{"values": [10, 20], "superlinear": [[10, 20]]}])
+    (answer,) = answers(Gate.parse("S < 0.5"), asked, asked)
+    assert answer.name == "swarm-dt: S, N 10 -> 20"
+
+
 def test_other_seeds_and_another_policy_are_compared_where_they_can_be() -> None:
     old = findings(WELL, seeds=4)
     new = findings(WORSE, policies=["random-walk"])
