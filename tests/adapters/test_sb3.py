@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import doctest
+import pickle
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -130,6 +131,16 @@ def test_threads_and_the_number_of_worlds_change_nothing() -> None:
     fewer = SwarmVecEnv(make_env=wrapped, n_worlds=2, seed=3).reset()
     np.testing.assert_array_equal(fewer, alone[0][: len(fewer)])
     assert not np.array_equal(alone[0][:6], alone[0][12:18])
+
+
+def test_many_threads_and_worlds_of_very_different_sizes_change_nothing() -> None:
+    sizes = [1, 60, 2, 1, 20, 1]
+    alone, many = (
+        SwarmVecEnv(n_worlds=6, n_robots=sizes, threads=threads, seed=3, **SMALL)
+        for threads in (1, 8)
+    )
+    assert_same(played(many, 25), played(alone, 25))
+    many.close()
 
 
 def test_a_seed_fixes_all_episodes_and_no_seed_none() -> None:
@@ -261,12 +272,13 @@ def test_options_are_for_the_next_reset_only() -> None:
         env.reset()
 
 
-def test_a_copy_goes_on_as_the_original() -> None:
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_goes_on_as_the_original(copied: Callable[[SwarmVecEnv], SwarmVecEnv]) -> None:
     env = SwarmVecEnv(make_env=wrapped, n_worlds=2, threads=2, seed=0)
     env.reset()
     for _ in range(13):
         env.step(np.full((12, 4), 0.7))
-    other = copy.deepcopy(env)
+    other = copied(env)
     for _ in range(30):
         mine, theirs = (each.step(np.full((12, 4), -0.4)) for each in (env, other))
         assert_same(list(mine[:3]), list(theirs[:3]))
@@ -330,6 +342,25 @@ def test_what_a_world_raises_is_raised() -> None:
         env.reset()
         with pytest.raises(RuntimeError, match="broken"):
             env.step(np.zeros((8, 4)))
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+@pytest.mark.parametrize("method", ["before_step", "after_step"])
+def test_worlds_go_on_after_an_error_in_a_wrapper(
+    method: str, error: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: Any) -> Any:
+        raise error("broken")
+
+    env = SwarmVecEnv(make_env=wrapped, n_worlds=4, threads=3, seed=3)
+    trace = played(env, 25)
+    monkeypatch.setattr(ParameterChange, method, failing)
+    with pytest.raises(error, match="broken"):
+        env.step(np.zeros((24, 4)))
+    monkeypatch.undo()
+    env.seed(3)
+    assert_same(played(env, 25), trace)
+    env.close()
 
 
 class Halved(Wrapper):
