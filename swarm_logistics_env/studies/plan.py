@@ -129,13 +129,11 @@ def make_plan(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
-    return Plan(
-        specification,
-        comparisons,
-        code or code_version(),
-        known,
-        tuple(item for item in found if isinstance(item, Twins)),
-    )
+    # Self-repair is told of FT's comparisons alone: without them nobody looks at the twins.
+    twins = [item for item in found if isinstance(item, Twins)]
+    if "FT" not in specification.indicators:
+        twins = []
+    return Plan(specification, comparisons, code or code_version(), known, tuple(twins))
 
 
 def _asked(

@@ -44,6 +44,15 @@ def test_removed_robots_are_those_that_fail(small: dict[str, Any]) -> None:
             assert comparison.removed.condition.scenario == comparison.original.condition.scenario
 
 
+def test_only_what_the_indicators_need_is_run(small: dict[str, Any]) -> None:
+    late = {**small, "faults": [{"modes": ["FM1"], "robots": [1], "onsets": [10.0]}]}
+    plans = {asked: Study(**late, indicators=[asked]).plan() for asked in ("FT", "R")}
+    # No fault, its twin with other behaviour, the robot failed, the robot removed.
+    assert len(plans["FT"].conditions) == 4
+    # Nobody looks at a twin without FT.
+    assert len(plans["R"].conditions) == 2
+
+
 def test_conditions_are_known_by_content() -> None:
     one = StudiedPolicy("one", "same", "swarm-dt")
     other_name = StudiedPolicy("other", "same", "swarm-dt")
