@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -141,6 +142,16 @@ def test_self_repair_without_its_null_says_so(repaired: Findings) -> None:
     found = judge(repaired.plan, outcomes, declared_seeds=SEEDS)
     assert only(found).repair is None
     assert "the runs of the no-fault null are missing" in markdown(document(found))
+
+
+def test_null_that_ran_out_of_items_is_none(repaired: Findings) -> None:
+    (twins,) = repaired.plan.twins
+    key = twins.other.condition.run(repaired.plan.code, 0).key
+    emptied = replace(repaired.outcomes[key], all_delivered=True)
+    outcomes = {**repaired.outcomes, key: emptied}
+    one = only(judge(repaired.plan, outcomes, declared_seeds=SEEDS))
+    assert one.repair is None
+    assert "the items ran out" in str(one.problem)
 
 
 def test_deliveries_over_time_are_rates_of_the_window(repaired: Findings) -> None:

@@ -127,11 +127,13 @@ def _null(findings: Findings, comparison: Comparison) -> Pair:
         ),
         None,
     )
-    original = None if twins is None else times_of(findings, twins.original)
-    other = None if twins is None else times_of(findings, twins.other)
+    missing = StudyError("the runs of the no-fault null are missing")
+    if twins is None:
+        raise missing
+    original, other = times_of(findings, twins.original), times_of(findings, twins.other)
     if original is None or other is None:
-        raise StudyError("the runs of the no-fault null are missing")
-    arms = comparison.arms
+        raise missing
+    arms = (*comparison.arms, twins.other)
     if any(outcome.all_delivered for arm in arms for outcome in outcomes_of(findings, arm) or ()):
         raise StudyError("the items ran out, and the rate with them: use restock")
     return original, other
