@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 _MOST_KEPT = 4
-# Of an array that only the list holds: the list, the loop's name and the argument of the count.
-_HELD_BY_NOBODY = 3
+
+
+def _references(arrays: Sequence[NDArray[np.float32]], place: int) -> int:
+    return sys.getrefcount(arrays[place])
+
+
+# Of an array that only a list holds. Counted, not written down: a call's own references are not
+# the same number in every Python.
+_HELD_BY_NOBODY = _references([np.empty(0, np.float32)], 0)
 
 
 class Buffers:
@@ -28,8 +36,9 @@ class Buffers:
 
     def zeros(self) -> NDArray[np.float32]:
         """Return an array of the caller's own."""
-        for array in self._kept:
-            if sys.getrefcount(array) == _HELD_BY_NOBODY:
+        for place in range(len(self._kept)):
+            if _references(self._kept, place) == _HELD_BY_NOBODY:
+                array = self._kept[place]
                 array.fill(0.0)
                 return array
         new = np.zeros(self._shape, np.float32)
