@@ -2,18 +2,20 @@
 
     NUMBA_DISABLE_JIT=1 python -m pytest -p trust.interpreted tests/warehouse
 
-What only compiled code can do, calling C by address, is done by ctypes meanwhile.
+What only compiled code can do, calling C by address and changing integers that threads share, is
+done by ctypes meanwhile.
 """
 
 from __future__ import annotations
 
 import ctypes
 import os
+import threading
 from typing import Any
 
 import pytest
 
-from swarm_logistics_env.warehouse import building, engine, tables
+from swarm_logistics_env.warehouse import building, crew, engine, tables
 
 
 class _Words(ctypes.Structure):
@@ -47,13 +49,48 @@ def _store_at(address: int, value: int) -> None:
     ctypes.c_int32.from_address(int(address)).value = int(value)
 
 
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def _word_at(address: int) -> ctypes.c_int64:
+    return ctypes.c_int64.from_address(int(address))
+
+
+def _load(address: int) -> int:
+    return _word_at(address).value
+
+
+def _exchange(address: int, value: int) -> int:
+    with _ONE_AT_A_TIME:
+        before, _word_at(address).value = _load(address), int(value)
+    return before
+
+
+def _add(address: int, value: int) -> int:
+    with _ONE_AT_A_TIME:
+        before = _load(address)
+        _word_at(address).value = before + int(value)
+    return before
+
+
+def _replace(address: int, old: int, new: int) -> bool:
+    with _ONE_AT_A_TIME:
+        is_there = _load(address) == int(old)
+        if is_there:
+            _word_at(address).value = int(new)
+    return is_there
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Put the interpreter's own in the place of what is compiled."""
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
     for module in (building, engine):
         vars(module).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
-    vars(tables).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
+    for module in (crew, tables):
+        vars(module).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
+    # A look takes a thousand times as long.
+    vars(crew).update(load=_load, exchange=_exchange, add=_add, replace=_replace, _PATIENCE=40)
     # Streams count modulo 2**64, and kernels divide as IEEE 754 says.
     for what in ("overflow", "divide by zero"):
         config.addinivalue_line("filterwarnings", f"ignore:{what} encountered:RuntimeWarning")
