@@ -30,6 +30,7 @@ class Picture:
     Attributes:
         show_beams_of, all_links: as the arguments; may change between two pictures.
         selected: a robot that is ringed, or None.
+        trails: where robots were, to which each state that is noted or drawn is added, or None.
         projection: where the warehouse lies on the picture.
     """
 
@@ -43,7 +44,7 @@ class Picture:
     ) -> None:
         self._size, self.show_beams_of, self.all_links = size, show_beams_of, all_links
         self.selected: int | None = None
-        self._trails = Trails() if trails else None
+        self.trails = Trails() if trails else None
         self._lay_out(scenario)
 
     @classmethod
@@ -67,19 +68,10 @@ class Picture:
         """Height of the picture [px], caption included."""
         return self._canvas.get_height()
 
-    @property
-    def trails(self) -> bool:
-        """Whether robots leave their paths; may change between two pictures."""
-        return self._trails is not None
-
-    @trails.setter
-    def trails(self, wanted: bool) -> None:
-        self._trails = Trails() if wanted else None
-
     def note(self, state: WarehouseState) -> None:
         """Let trails lead through a state that is not drawn."""
-        if self._trails is not None:
-            self._trails.note(state)
+        if self.trails is not None:
+            self.trails.note(state)
 
     def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
         """Return the picture of `state`, which stays as it is until the next call."""
@@ -91,9 +83,9 @@ class Picture:
         items = projection.points(state.item_position)
         # Glow and beams stop at the walls.
         canvas.set_clip(self._floor)
-        if self._trails is not None:
-            self._trails.note(state)
-            draw_trails(canvas, projection, self._trails)
+        if self.trails is not None:
+            self.trails.note(state)
+            draw_trails(canvas, projection, self.trails)
         self._draw_obstacles(state)
         self._draw_halos(state, scenario, robots)
         self._draw_stored_items(state, items)

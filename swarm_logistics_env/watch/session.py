@@ -11,6 +11,7 @@ import numpy as np
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, suggest
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.curves import Curve, Event
+from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
@@ -38,6 +39,7 @@ class Session:
         selected: the robot that is inspected, or None.
         events: what was done to robots in this episode.
         note: the last thing that happened, a sentence.
+        trails: where the run's robots were in every step of late, however few are shown.
 
     Raises:
         FaultError, ScenarioError: as `Warehouse.reset`.
@@ -240,6 +242,8 @@ class Session:
         self.run = Play(scenario, self._make_policy(), seed, faults)
         self.twin = Play(scenario, self._make_policy(), seed)
         self.seed, self._due = seed, 0.0
+        self.trails = Trails()
+        self.trails.note(self.run.world.state)
         self.events: list[Event] = [
             Event(fault.onset, robot, fault.mode)
             for fault in faults
@@ -251,6 +255,7 @@ class Session:
     def _advance(self) -> None:
         self.run.step()
         self.twin.step()
+        self.trails.note(self.run.world.state)
         self._look_after_selection()
 
     def _look_after_selection(self) -> None:

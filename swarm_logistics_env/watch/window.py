@@ -90,8 +90,7 @@ class WatchWindow:
         picture = self._picture
         picture.selected = picture.show_beams_of = session.selected
         picture.all_links = self._links
-        if picture.trails != self._trails:
-            picture.trails = self._trails
+        picture.trails = session.trails if self._trails else None
         drawn = picture.draw(session.run.world.state, scenario)
         screen.fill(SURROUNDINGS)
         self._picture_place = drawn.get_rect(center=self._room.center)

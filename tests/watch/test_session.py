@@ -6,6 +6,7 @@ import pytest
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
 from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
 from swarm_logistics_env.policies import Policy
+from swarm_logistics_env.rendering.trails import TRAIL_SECONDS
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.inspection import observation_words
 from swarm_logistics_env.watch.keys import KEYS, press
@@ -45,6 +46,19 @@ def test_without_faults_run_and_twin_are_the_same() -> None:
     session.play(3.0)
     assert run.failed.tolist() == [True] + [False] * 7
     assert not twin.failed.any()
+
+
+def test_trails_lead_through_every_step_at_any_speed() -> None:
+    session = Session(SMALL, swarm_dt, speed=64.0)
+    session.play(0.1)
+    assert session.run.world.state.time == pytest.approx(6.4, abs=0.11)
+    past = session.trails.positions()
+    assert past.shape == (1 + round(TRAIL_SECONDS / SMALL.control_period), 8, 2)
+    longest = SMALL.max_speed * SMALL.control_period
+    assert np.hypot(*np.moveaxis(np.diff(past, axis=0), 2, 0)).max() < 1.5 * longest
+    session.restart()
+    session.next_seed()
+    assert np.array_equal(session.trails.positions()[0], session.run.world.state.robot_position)
 
 
 def test_speed_is_how_much_time_passes_in_a_second() -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
@@ -95,6 +96,11 @@ def test_what_the_page_draws_is_the_session(server: WatchServer) -> None:
     ]
     assert len(moving["items"]) == 8
     assert len(moving["obstacles"]) == 1
+    assert moving["trails"] == []
+    server.session.play(1.0)
+    trails = json.loads(ask(server, "moving?after=0&trails=1")[1])["trails"]
+    past = server.session.trails.positions()
+    assert np.allclose(np.array(trails).swapaxes(0, 1), past, atol=1e-3)
 
 
 def test_orders(server: WatchServer) -> None:
@@ -302,5 +308,5 @@ def test_views_are_json_whatever_happened() -> None:
         if session.selected is not None:
             session.choose_mode(mode)
             session.break_robot()
-            json.dumps(moving_view(session), allow_nan=False)
+            json.dumps(moving_view(session, trails=True), allow_nan=False)
     assert session.selected is None

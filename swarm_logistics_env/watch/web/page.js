@@ -4,7 +4,7 @@ const ACTIVITIES = { searching: "SEARCHING", shuffling: "SHUFFLING", delivering:
 const [STORED, NOBODY] = [0, -1];
 const element = (id) => document.getElementById(id);
 const options = { trails: false, links: false };
-let fixed = null, view = null, place = null, trail = [], isLost = false, problem = { text: "", until: 0 };
+let fixed = null, view = null, place = null, isLost = false, problem = { text: "", until: 0 };
 
 // Talking to the command
 
@@ -27,13 +27,12 @@ async function order(what) {
 async function follow() {
   for (let version = 0; ;) {
     try {
-      const answer = await fetch(`moving?after=${version}`);
+      const answer = await fetch(`moving?after=${version}${options.trails ? "&trails=1" : ""}`);
       if (!answer.ok) throw new Error(answer.statusText);
       const next = await answer.json();
       isLost = false;
-      if (next.version === version) continue;
+      if (next.version === version && !(options.trails && !view.trails.length)) continue;
       version = next.version;
-      remember(next);
       view = next;
       requestAnimationFrame(show);
     } catch {
@@ -43,13 +42,6 @@ async function follow() {
       version = 0;
     }
   }
-}
-
-function remember(next) {
-  const last = trail[trail.length - 1];
-  if (last && (next.time < last.time || next.robots.length !== last.robots.length)) trail = [];
-  if (!last || next.time !== last.time) trail.push({ time: next.time, robots: next.robots });
-  while (trail.length && trail[0].time < next.time - fixed.trail_seconds) trail.shift();
 }
 
 // Drawing
@@ -190,9 +182,9 @@ function showWarehouse() {
   for (let metre = 1; metre < scenario.warehouse_height; metre++) line(pen, [at([0, metre]), at([scenario.warehouse_width, metre])], 1, colours.FLOOR_LINE);
   showDeliveryArea(pen, left + scale * (scenario.warehouse_width - scenario.delivery_width), top, left + across, bottom);
   if (options.trails) {
-    for (let robot = 0; robot < robots.length; robot++) {
+    for (const trail of view.trails) {
       for (let nth = 1; nth < trail.length; nth++) {
-        const [before, after] = [trail[nth - 1].robots[robot], trail[nth].robots[robot]];
+        const [before, after] = [trail[nth - 1], trail[nth]];
         pen.globalAlpha = nth / trail.length;
         if (before && after) line(pen, [at(before), at(after)], 1, colours.TRAIL);
       }

@@ -109,12 +109,12 @@ class WatchServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
             obey(self.session, text)
             self._tell()
 
-    def view(self, after: int) -> bytes:
+    def view(self, after: int, *, trails: bool = False) -> bytes:
         """Return the first view later than version `after`, or, if none comes, the same again."""
         self._last_look = time.monotonic()
         with self.changed:
             self.changed.wait_for(lambda: self.version != after, _PATIENCE)
-            moving = {"version": self.version, **moving_view(self.session)}
+            moving = {"version": self.version, **moving_view(self.session, trails=trails)}
         return json.dumps(moving, separators=(",", ":")).encode()
 
     def _tell(self) -> None:
@@ -154,9 +154,10 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         elif name == "fixed":
             self._answer_json(json.dumps(fixed_view(self.server.title)).encode())
         elif name == "moving":
-            after = parse_qs(query).get("after", ["0"])[0]
+            asked = parse_qs(query)
+            after = asked.get("after", ["0"])[0]
             version = int(after) if re.fullmatch(r"[0-9]{1,15}", after) else 0
-            self._answer_json(self.server.view(version))
+            self._answer_json(self.server.view(version, trails="trails" in asked))
         elif name is not None:
             self.send_error(HTTPStatus.NOT_FOUND)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.rendering.beams import ranges
 from swarm_logistics_env.rendering.links import followed
-from swarm_logistics_env.rendering.trails import TRAIL_SECONDS
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 from swarm_logistics_env.watch.inspection import activity, observation_words
@@ -44,16 +44,16 @@ def fixed_view(title: str) -> dict[str, Any]:
         ],
         "mouse": MOUSE,
         "view_keys": {"trails": TRAILS, "links": LINKS, "help": HELP},
-        "trail_seconds": TRAIL_SECONDS,
         "width_step": WIDTH_STEP,
     }
 
 
-def moving_view(session: Session) -> dict[str, Any]:
+def moving_view(session: Session, *, trails: bool = False) -> dict[str, Any]:
     """Return what is true now. Lengths in m, times in s, angles in rad; x right, y up.
 
     A robot is [x, y, heading, activity, age of its timer in timer limits or None, mark,
-    robot it follows], or None where it is absent; an item [x, y, status].
+    robot it follows], or None where it is absent; an item [x, y, status]. A trail is
+    where a robot was in every step of late, oldest first, [x, y] or None.
     """
     world = session.run.world
     state, scenario = world.state, world.scenario
@@ -87,7 +87,13 @@ def moving_view(session: Session) -> dict[str, Any]:
         ],
         "events": [[_short(event.time), event.robot, event.label] for event in session.events],
         "selected": _selected(session),
+        "trails": _trails(session) if trails else [],
     }
+
+
+def _trails(session: Session) -> list[list[list[float] | None]]:
+    past = np.round(session.trails.positions(), 3).swapaxes(0, 1).tolist()
+    return [[None if math.isnan(place[0]) else place for place in trail] for trail in past]
 
 
 def _robot(session: Session, robot: int) -> list[Any] | None:
