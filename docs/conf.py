@@ -61,7 +61,7 @@ def inline(translator: Any, node: Any) -> None:
     """Write a formula within a line."""
     from docutils.nodes import SkipNode
 
-    translator.body.append(convert(node.astext()))
+    translator.body.append(_mathml(node, "inline"))
     raise SkipNode
 
 
@@ -69,6 +69,11 @@ def block(translator: Any, node: Any) -> None:
     """Write a formula on a line of its own."""
     from docutils.nodes import SkipNode
 
-    formula = convert(node.astext(), display="block")
-    translator.body.append(f'<div class="math">{formula}</div>\n')
+    translator.body.append(f'<div class="math">{_mathml(node, "block")}</div>\n')
     raise SkipNode
+
+
+def _mathml(node: Any, display: str) -> str:
+    # Without these, browsers set the bars of an absolute value apart as they do a relation.
+    formula: str = convert(node.astext(), display=display)
+    return formula.replace("<mo>&#x0007C;</mo>", '<mo lspace="0" rspace="0">&#x0007C;</mo>')

@@ -147,6 +147,12 @@ class PPOSettings(_Part):
         n_minibatches: the batch is cut into.
         epochs: over a batch.
         learning_rate: at the start; it falls linearly to `final_learning_rate`.
+        final_learning_rate: at the end.
+        gamma: discount of a control step.
+        gae_lambda: of generalised advantage estimation (Schulman et al. 2016).
+        clip: how far from 1 the ratio of an action's probabilities pays.
+        entropy, value_weight: weights of these losses beside the policy's.
+        max_grad_norm: gradients longer than that are shortened to it.
         target_kl: an update stops early beyond 1.5 times that divergence; None: never.
         deviations: of the outputs' exploration noise at the start, one for each.
         value_warmup: updates at the start in which the value network alone learns, so that a start
