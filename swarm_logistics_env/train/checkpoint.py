@@ -22,7 +22,8 @@ FILE_NAME = "checkpoint.pt"
 def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, notes: Any) -> None:
     """Write a checkpoint, whole or not at all; the one before stands until then.
 
-    To be called between updates: after learning from a batch, before collecting the next.
+    To be called between updates: after learning from a batch, before collecting the next; or
+    before the first.
 
     Args:
         notes: whatever else is to be found again; picklable.

@@ -96,6 +96,7 @@ def train(
         imitate(learner.policy, training, training.imitation)
         # Its seeds, so that what follows does not depend on how long it took.
         learner.set_random_seed(training.seed)
+        save_checkpoint(out, learner, view, notes)
     if learner.num_timesteps < training.agent_steps:
         with Report(training.name, training.agent_steps, learner.num_timesteps) as report:
             watch = _Watch(training, view, notes, out, report)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from safetensors.numpy import load_file
@@ -14,17 +15,26 @@ from safetensors.numpy import load_file
 pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
+from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.request import train_as_asked
+from swarm_logistics_env.train.specification import Evaluation, Imitation
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 
 TRAINING = """\
 name = "tiny"
-scenario = { warehouse_width = 4.0, warehouse_height = 3.0, delivery_width = 2.0, n_items = 6, duration = 6.0, restock = true }
 sizes = [3, 5]
 worlds = 2
 threads = 1
-agent_steps = 6400
+agent_steps = 3200
+
+[scenario]
+warehouse_width = 4.0
+warehouse_height = 3.0
+delivery_width = 2.0
+n_items = 6
+duration = 6.0
+restock = true
 
 [[conditions]]
 
@@ -45,8 +55,8 @@ epochs = 2
 value_hidden = [8]
 
 [evaluation]
-every = 1600
-seeds = 8
+every = 800
+seeds = 4
 n_robots = 5
 faults = { FM4 = 1 }
 
@@ -78,25 +88,49 @@ def wait_for_checkpoints(process: subprocess.Popen[str], path: Path, number: int
         time.sleep(0.002)
 
 
-def test_a_training_that_was_killed_twice_ends_as_one_that_was_not(tmp_path: Path) -> None:
+def test_a_training_that_was_killed_ends_as_one_that_was_not(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TRAINING)
     whole = train_as_asked(str(tmp_path / "tiny.toml"), tmp_path / "whole", device="cpu")
     cut = tmp_path / "cut"
-    for _ in range(2):
-        process = started(tmp_path)
-        wait_for_checkpoints(process, cut / "checkpoint.pt", 12)
+    with started(tmp_path) as process:
+        wait_for_checkpoints(process, cut / "checkpoint.pt", 10)
         process.send_signal(signal.SIGKILL)
-        assert process.wait() == -signal.SIGKILL
-        process.stderr.close()  # type: ignore[union-attr]
-        assert not (cut / "tiny.safetensors").exists()
-    process = started(tmp_path)
-    assert process.communicate()[1].count("P =") < 5, "began anew"
-    assert process.returncode == 0
-    ours, other = load_file(cut / "tiny.safetensors"), load_file(whole)
-    assert {name: tensor.tobytes() for name, tensor in ours.items()} == {
-        name: tensor.tobytes() for name, tensor in other.items()
-    }
+    assert process.returncode == -signal.SIGKILL
+    assert not (cut / "tiny.safetensors").exists()
+    with started(tmp_path) as process:
+        told = process.communicate()[1]
+    assert process.returncode == 0, told
+    assert "tiny: 0 of" not in told
+    assert_same_weights(cut / "tiny.safetensors", whole)
     assert curve(cut) == curve(whole.parent)
+
+
+class Killed(BaseException):
+    """Stands for kill -9: nothing of ours catches it."""
+
+
+def test_a_training_that_was_killed_does_not_imitate_again(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    imitation = Imitation(rounds=1, seconds=2.0, sizes=(4,), fit=5, last_fit=5)
+    training = small(imitation=imitation, evaluation=Evaluation(seeds=1, n_robots=3))
+    whole = trainer.train(training, tmp_path / "whole")
+
+    def dies(*_: Any) -> None:
+        raise Killed
+
+    with monkeypatch.context() as changed:
+        changed.setattr(trainer, "_Watch", dies)
+        with pytest.raises(Killed):
+            trainer.train(training, tmp_path / "cut")
+    monkeypatch.setattr(trainer, "imitate", dies)
+    assert_same_weights(trainer.train(training, tmp_path / "cut"), whole)
+
+
+def assert_same_weights(one: Path, other: Path) -> None:
+    first, second = load_file(one), load_file(other)
+    assert first.keys() == second.keys()
+    assert all(first[name].tobytes() == second[name].tobytes() for name in first)
 
 
 def curve(directory: Path) -> list[list[str]]:

@@ -19,9 +19,8 @@ from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.policies.motion_frame import INPUTS
 from swarm_logistics_env.train import Training, trainer
-from swarm_logistics_env.train.checkpoint import save_checkpoint
 from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
-from swarm_logistics_env.train.specification import Conditions, Imitation, Indicators, Scores
+from swarm_logistics_env.train.specification import Imitation, Scores
 from swarm_logistics_env.train.trainer import train
 
 
@@ -110,37 +109,6 @@ def test_the_same_seed_gives_the_same_policy(small: Any, tmp_path: Path) -> None
     ]
     assert same(paths[0], paths[1])
     assert not same(paths[0], paths[2])
-
-
-class Killed(BaseException):
-    """Stands for kill -9: nothing of ours catches it."""
-
-
-def test_a_training_that_was_killed_goes_on_bit_by_bit(
-    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    training = small(
-        conditions=(Conditions(), Conditions(modes=("FM1", "removed"), robots=(1,))),
-        indicators=Indicators(weights={"R": 1.0, "P": 0.1}),
-    )
-    whole = train(training, tmp_path / "whole")
-    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
-    real, saved = save_checkpoint, []
-
-    def saves_and_dies(*arguments: Any) -> None:
-        real(*arguments)
-        saved.append(1)
-        if len(saved) == 2:
-            raise Killed
-
-    monkeypatch.setattr(trainer, "save_checkpoint", saves_and_dies)
-    with pytest.raises(Killed):
-        train(training, tmp_path / "cut")
-    assert not (tmp_path / "cut" / "small.safetensors").exists()
-    monkeypatch.setattr(trainer, "save_checkpoint", real)
-    assert same(train(training, tmp_path / "cut"), whole)
-    steps = [line.split(",")[0] for line in (tmp_path / "cut/curve.csv").read_text().splitlines()]
-    assert steps == ["agent_steps", "0", "320", "640"]
 
 
 def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> None:
