@@ -8,9 +8,12 @@ it shifts nobody's stream.
 from __future__ import annotations
 
 import hashlib
+import operator
 
 import numpy as np
 from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import SetupError
 
 _MASK = (1 << 64) - 1
 
@@ -22,8 +25,15 @@ def key(seed: int, purpose: str, *entity: int) -> int:
         seed: any integer; 0 is a seed like every other.
         purpose: what the numbers are for, e.g. "item places".
         entity: whom they are for, e.g. the robot's number.
+
+    Raises:
+        SetupError: the seed is no integer.
     """
-    text = "/".join([str(int(seed)), purpose, *(str(int(part)) for part in entity)])
+    try:
+        number = operator.index(seed)
+    except TypeError:
+        raise SetupError(f"seed = {seed!r}: should be an integer") from None
+    text = "/".join([str(number), purpose, *(str(int(part)) for part in entity)])
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")
 
 

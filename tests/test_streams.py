@@ -2,12 +2,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.kernels import uniform
 from swarm_logistics_env.streams import generator, key, row_keys
 
@@ -28,6 +30,12 @@ def test_streams_of_different_keys_differ(other: tuple[int, str]) -> None:
 def test_zero_and_negative_and_huge_seeds_are_seeds() -> None:
     seeds = (0, 1, -1, 2**63, 2**64, 2**200)
     assert len({key(seed, "a") for seed in seeds}) == len(seeds)
+
+
+@pytest.mark.parametrize("seed", [1.5, 1.0, "1", None])
+def test_what_is_no_integer_is_no_seed(seed: Any) -> None:
+    with pytest.raises(SetupError, match=f"seed = {seed!r}: should be an integer"):
+        key(seed, "places")
 
 
 def test_a_seed_of_numpys_kind_is_the_same_seed() -> None:

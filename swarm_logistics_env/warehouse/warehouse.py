@@ -50,6 +50,9 @@ class Warehouse:
         self.scenario = scenario or Scenario()
         self.state = WarehouseState(self.scenario)
         self.faults: tuple[Fault, ...] = ()
+        self._struck: list[NDArray[np.int64]] = []
+        self.n_removed = 0
+        self._n_steps = self.scenario.n_steps
         self._seed: int | None = None
         self._log: list[NDArray[np.float64]] = []
 
@@ -126,7 +129,7 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         if self._seed is None:
-            raise SetupError("step before reset: call reset(seed) first")
+            raise _not_begun("step")
         state, tables = self.state, self._tables
         return (
             tables.where, len(tables.addresses), len(state.robot_position), state.step + 1,
@@ -169,7 +172,10 @@ class Warehouse:
 
         Raises:
             ScenarioError: a field is unknown, cannot change during a run, or its value cannot be.
+            SetupError: the world was never reset.
         """
+        if self._seed is None:
+            raise _not_begun("change")
         for name in fields:
             if name not in CHANGES_DURING_RUN and name in Scenario.model_fields:
                 raise ScenarioError(
@@ -186,14 +192,23 @@ class Warehouse:
 
         Raises:
             FaultError: a fault names robots that are not there.
+            SetupError: the world was never reset.
         """
-        struck = [failed_robots(fault, self._seed or 0, self.state.n_robots) for fault in faults]
+        if self._seed is None:
+            raise _not_begun("set_faults")
+        struck = [failed_robots(fault, self._seed, self.state.n_robots) for fault in faults]
         self.faults, self._struck = tuple(faults), struck
         self._apply_faults()
         self._remember()
 
     def observe(self) -> NDArray[np.float32]:
-        """Return what every robot senses now: (N, D) float32, absent robots zeros."""
+        """Return what every robot senses now: (N, D) float32, absent robots zeros.
+
+        Raises:
+            SetupError: the world was never reset.
+        """
+        if self._seed is None:
+            raise _not_begun("observe")
         return self._rows
 
     @property
@@ -213,7 +228,7 @@ class Warehouse:
 
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
         if self._seed is None:
-            raise SetupError("step before reset: call reset(seed) first")
+            raise _not_begun("step")
         if isinstance(commands, np.ndarray) and commands.dtype == np.float64:
             plain_numbers: NDArray[np.float64] = commands.copy()
             if plain_numbers.shape == self._command_shape:
@@ -374,3 +389,7 @@ class Warehouse:
             robots.places, items.size, items.start, items.members, items.places,
             self._sensor_keys, state.robot_message,
         ])  # fmt: skip
+
+
+def _not_begun(asked: str) -> SetupError:
+    return SetupError(f"{asked} before reset: call reset(seed) first")

@@ -62,9 +62,10 @@ def test_named_robots_fail_and_no_others() -> None:
     [
         (Fault("FM1", 9), "robots = 9: should be at most n_robots = 8"),
         (Fault("FM1", (0, 8)), r"\(0, 8\): robots are numbered 0 to 7"),
+        ("FM1", "faults hold 'FM1': should be a list of faults"),
     ],
 )
-def test_robots_that_are_not_there_cannot_fail(fault: Fault, complaint: str) -> None:
+def test_faults_that_cannot_be_are_refused_at_the_reset(fault: Any, complaint: str) -> None:
     with pytest.raises(FaultError, match=complaint):
         Warehouse(SMALL).reset(0, [fault])
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -269,9 +270,22 @@ def deepest_overlap(position: NDArray[np.float64], radius: float) -> float:
 # -- reset, step, observe -----------------------------------------------------------------------
 
 
-def test_a_step_before_the_first_reset_is_refused() -> None:
-    with pytest.raises(SetupError, match="reset"):
-        Warehouse(Scenario(n_robots=2)).step(np.zeros((2, 4)))
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda world: world.step(np.zeros((2, 4))),
+        lambda world: world.observe(),
+        lambda world: world.change(view_range=0.5),
+        lambda world: world.set_faults([Fault("FM1")]),
+    ],
+)
+def test_what_needs_an_episode_is_refused_before_the_first_reset(
+    ask: Callable[[Warehouse], object],
+) -> None:
+    world = Warehouse(Scenario(n_robots=2))
+    with pytest.raises(SetupError, match=r"before reset: call reset\(seed\) first"):
+        ask(world)
+    assert (world.struck_robots, world.n_removed, world.is_over_time) == ((), 0, False)
 
 
 @pytest.mark.parametrize(
