@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from swarm_logistics_env.studies.code_version import SOURCES, without_prose
+from swarm_logistics_env.studies.code_version import LEFT_OUT, SOURCES, without_prose
 
 
 def test_prose_does_not_count() -> None:
@@ -34,4 +34,5 @@ def test_covers_all_that_an_episode_loads() -> None:
     others = {name for name in loaded - covered if not name.startswith("policies/")}
     assert others <= {"errors.py", "records.py", "registration.py"}
     assert "warehouse/physics.py" in covered
-    assert all((package / name).exists() for name in SOURCES)
+    assert not loaded & set(LEFT_OUT)
+    assert all((package / name).exists() for name in (*SOURCES, *LEFT_OUT))
