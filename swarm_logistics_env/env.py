@@ -16,6 +16,7 @@ from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.reset_options import (
     OPTIONS,
+    checked_faults,
     checked_options,
     checked_seed,
     faults_among,
@@ -75,7 +76,7 @@ class SwarmLogisticsEnv(DictView):
         **fields: Any,
     ) -> None:
         self.scenario = (scenario or Scenario()).replace(**fields)
-        self.faults = tuple(faults)
+        self.faults = checked_faults("faults", faults)
         if max_cycles is not None and max_cycles < 1:
             raise SetupError(f"max_cycles = {max_cycles}: should be None or at least 1")
         self.max_cycles = max_cycles

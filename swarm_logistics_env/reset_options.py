@@ -57,9 +57,15 @@ def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[
     Raises:
         SetupError: they are not a sequence of faults.
     """
-    faults = options.get("faults", default)
+    return checked_faults('options["faults"]', options.get("faults", default))
+
+
+def checked_faults(name: str, faults: Any) -> tuple[Fault, ...]:
+    """Return faults as a tuple.
+
+    Raises:
+        SetupError: they are not a sequence of faults.
+    """
     if not isinstance(faults, Sequence) or not all(isinstance(fault, Fault) for fault in faults):
-        raise SetupError(
-            f'options["faults"] = {faults!r}: should be a list of faults, as [Fault("FM1", 2)]'
-        )
+        raise SetupError(f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)]')
     return tuple(faults)

@@ -29,8 +29,7 @@ class RewardTerms:
         for name, weight in self.weights.items():
             if name not in REWARD_TERMS:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
-            if isinstance(weight, str) or not np.isfinite(weight):
-                raise SetupError(f"rewards[{name!r}] = {weight!r}: should be a finite number")
+            finite_number(f"rewards[{name!r}]", weight)
         self._terms = [(REWARD_TERMS[name], weight) for name, weight in self.weights.items()]
         self._follows_carrier = not _OF_CARRIER.isdisjoint(self.weights)
 
@@ -124,6 +123,17 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "contact": contact,
 }
 _OF_CARRIER = {"lift_requested", "approach"}
+
+
+def finite_number(name: str, value: float) -> float:
+    """Return the value as a float.
+
+    Raises:
+        SetupError: it is not a number, or not finite.
+    """
+    if not isinstance(value, int | float | np.number) or not np.isfinite(value):
+        raise SetupError(f"{name} = {value!r}: should be a finite number")
+    return float(value)
 
 
 def carrier_of_requested(world: Warehouse) -> int:

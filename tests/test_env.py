@@ -189,6 +189,7 @@ def test_commands_beyond_their_bounds_are_cut() -> None:
         ({"n_robots": 0}, ScenarioError, "n_robots = 0: should be greater than 0"),
         ({"rewards": {"delivry": 1.0}}, SetupError, "did you mean 'delivery'"),
         ({"render_mode": "hologram"}, SetupError, "render_mode = 'hologram': should be"),
+        ({"faults": Fault("FM1")}, SetupError, "faults = .*: should be a list of faults"),
     ],
 )
 def test_wrong_arguments_are_refused(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.adapters.worlds import RowsStep, World, Worlds, checked_count, maker
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.reset_options import checked_seed
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 
@@ -122,10 +122,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         """
         if seed is None:
             seed = int(np.random.default_rng().integers(2**63))
-        try:
-            seed = operator.index(seed)
-        except TypeError:
-            raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
+        seed = checked_seed(seed)
         self._seeds = [key(seed, "world", world) >> 1 for world in self._worlds.world_of.tolist()]
         return list(self._seeds)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.dict_view import ArrayStep
 from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.rewards import carrier_of_requested
+from swarm_logistics_env.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.wrappers.conditions import Condition, changes_of, condition_of
 from swarm_logistics_env.wrappers.indicator_payments import (
@@ -125,7 +125,7 @@ class IndicatorReward(Wrapper):
         if credit not in CREDITS:
             raise SetupError(f"credit = {credit!r}{suggest(str(credit), CREDITS)}")
         self.credit, self.constant = credit, constant
-        self.own_reward = _finite("own_reward", own_reward)
+        self.own_reward = finite_number("own_reward", own_reward)
         self._own = self.unwrapped.scenario
         self.condition = Condition(self._own.n_robots)
         self._references: GivenPerformances | RunningMeans
@@ -262,11 +262,5 @@ def _checked_weights(weights: str | Mapping[str, float]) -> dict[str, float]:
     for name, weight in checked.items():
         if name not in known:
             raise SetupError(f"no indicator {name!r}{suggest(str(name), known)}")
-        _finite(f"weights[{name!r}]", weight)
+        finite_number(f"weights[{name!r}]", weight)
     return checked
-
-
-def _finite(name: str, value: float) -> float:
-    if not isinstance(value, int | float | np.number) or not np.isfinite(value):
-        raise SetupError(f"{name} = {value!r}: should be a finite number")
-    return float(value)
