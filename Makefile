@@ -18,7 +18,7 @@ SUPERSUIT := .venvs/supersuit
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper test check soak mutants test-lowest test-newest benchmark interop docs format clean
+.PHONY: help paper test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -28,6 +28,7 @@ help:
 	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
+	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
 	@echo "make interop         TorchRL, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make format          sort imports and format"
@@ -66,6 +67,9 @@ test-lowest test-newest: test-%: .venvs/%/wheel
 benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 	$(BENCHMARK)/bin/python -m benchmarks --peers $(PEERS)/bin/python --out results/benchmark
 
+benchmark-learning: $(SUPERSUIT)/installed
+	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
+
 interop: $(TORCHRL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
 	$(TORCHRL)/bin/python -m interop.torchrl_specs
 	$(TORCHRL)/bin/python -m interop.plain_ppo
@@ -92,6 +96,7 @@ $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
+$(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.

@@ -1,7 +1,8 @@
 """Print what SwarmVecEnv costs inside `PPO.learn`, beside SuperSuit's on the same world.
 
 Needs the extra `train`, and SuperSuit for its rows. Both learn with stable-baselines3's defaults
-but for the length of a rollout; times are of the processor, medians of interleaved repeats.
+but for the length of a rollout; times are of the processor, medians of interleaved repeats. Before
+that: whether what a seed learns is the same a second time, and with two threads.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import torch
 from rich.console import Console
 from rich.table import Table
@@ -87,8 +89,27 @@ def learned(make: Callable[[], Any], rollouts: int) -> dict[str, float]:
     }
 
 
+def parameters(scenario: Scenario, n_worlds: int, threads: int) -> list[Any]:
+    """Return all parameters after some 20,000 agent-steps with seed 0."""
+    env = SwarmVecEnv(scenario, n_worlds=n_worlds, threads=threads)
+    model = PPO("MlpPolicy", env, n_steps=_ROLLOUT, batch_size=1600, seed=0, device="cpu")
+    tensors = model.learn(20_000).policy.state_dict().values()
+    env.close()
+    return [tensor.numpy() for tensor in tensors]
+
+
+def say_whether_equal(scenario: Scenario, n_worlds: int) -> None:
+    """Print whether learning gives the same again, whatever the threads."""
+    first = parameters(scenario, n_worlds, 1)
+    for threads in (1, 2):
+        other = parameters(scenario, n_worlds, threads)
+        equal = all(np.array_equal(one, two) for one, two in zip(first, other, strict=True))
+        told = "equal" if equal else "DIFFERENT"
+        print(f"PPO(seed=0), 20,000 steps, 1 thread and again with {threads}: {told} parameters")
+
+
 def main() -> None:
-    """Print the table."""
+    """Print all of it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robots", type=int, default=25)
     parser.add_argument("--worlds", type=int, default=8)
@@ -106,6 +127,7 @@ def main() -> None:
         makers["SuperSuit"] = supersuits(scenario, given.worlds)
     except ModuleNotFoundError:
         print("SuperSuit is not installed: no row of it")
+    say_whether_equal(scenario, given.worlds)
     for make in makers.values():
         learned(make, 1)  # kernels are compiled, pages touched
     runs: dict[str, list[dict[str, float]]] = {name: [] for name in makers}
