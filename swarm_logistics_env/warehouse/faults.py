@@ -47,11 +47,13 @@ FAILURE_MODES: dict[str, FailureMode] = {
     "FM3_hear": FailureMode("does not hear", hears=False),
     "FM4": FailureMode("its entering the delivery area delivers nothing", delivers=False),
     "motor_slow": FailureMode(
-        "drives and turns at `factor` (default half) of its speed", speed=0.5, factor="speed"
+        "drives and turns at half its speed, or at the fault's factor of it",
+        speed=0.5,
+        factor="speed",
     ),
     "motor_dead": FailureMode("stands still", speed=0.0),
     "view_reduced": FailureMode(
-        "sees `factor` (default half) as far with its cameras", view=0.5, factor="view"
+        "sees half as far with its cameras, or the fault's factor of it", view=0.5, factor="view"
     ),
     "rangers_blind": FailureMode("its rangers report nothing near", rangers=False),
     "dead": FailureMode(

@@ -258,7 +258,9 @@ function showBeams(pen, selected, robot, at) {
 
 function showStrip() {
   const { pen, width, height } = prepared(element("strip")), colours = fixed.colours;
-  const [left, top, right, bottom] = [34, 26, width - 24, height - 22];
+  pen.font = "13px system-ui, sans-serif";
+  const names = curveNames(pen, width), [left, right, bottom] = [34, width - 24, height - 22];
+  const top = names[names.length - 1].y + 14;
   const most = view.curves.reduce((least, curve) => {
     let limit = least;
     for (let nth = 0; limit < curve.times.length; nth++) limit *= [2, 2, 2.5][nth % 3];
@@ -267,7 +269,6 @@ function showStrip() {
   const at = (time, count) => [left + (right - left) * Math.min(1, time / view.scenario.duration), bottom - ((bottom - top) * count) / most];
   pen.fillStyle = colours.FLOOR;
   pen.fillRect(left, top, right - left, bottom - top);
-  pen.font = "13px system-ui, sans-serif";
   pen.textBaseline = "middle";
   for (let nth = 0; nth <= 4; nth++) {
     const time = (nth / 4) * view.scenario.duration;
@@ -279,13 +280,11 @@ function showStrip() {
   pen.textAlign = "right";
   for (const count of [0, most]) pen.fillText(count, left - 5, at(0, count)[1]);
   pen.textAlign = "left";
-  let x = left;
-  for (const curve of view.curves) {
-    const [colour, thickness] = fixed.curves[curve.style], text = `${curve.name}: ${curve.times.length} delivered`;
-    line(pen, [[x, 12], [x + 26, 12]], thickness + 1, colour);
+  for (const { text, style, x, y } of names) {
+    const [colour, thickness] = fixed.curves[style];
+    line(pen, [[x, y], [x + 26, y]], thickness + 1, colour);
     pen.fillStyle = colours.INK;
-    pen.fillText(text, x + 32, 12);
-    x += 32 + pen.measureText(text).width + 28;
+    pen.fillText(text, x + 32, y);
   }
   // Thin over thick: where two runs are the same, both are seen.
   for (const curve of [...view.curves].sort((a, b) => fixed.curves[b.style][1] - fixed.curves[a.style][1])) {
@@ -298,6 +297,17 @@ function showStrip() {
   pen.strokeStyle = colours.INK;
   pen.lineWidth = 1;
   pen.strokeRect(left, top, right - left, bottom - top);
+}
+
+function curveNames(pen, width) {
+  let x = 34, y = 12;
+  return view.curves.map(({ name, times, style }, nth) => {
+    const text = `${name}: ${times.length} delivered`, end = x + 32 + pen.measureText(text).width;
+    if (nth && end > width) [x, y] = [34, y + 17];
+    const place = { text, style, x, y };
+    x += 32 + pen.measureText(text).width + 28;
+    return place;
+  });
 }
 
 function showEvents(pen, at, most, top) {
