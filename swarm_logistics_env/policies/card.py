@@ -85,7 +85,9 @@ class PolicyCard(_Part):
         about: what it is, in a sentence or two.
         network: how it decides.
         command: the command line that made it.
-        versions: of the packages that made it.
+        versions: of the packages that trained it, and as "simulation" the digest of the world's
+            code (`studies.code_version`) that it was trained in.
+        scored_with: the version of this package and the digest that its scores are of.
         scenario: what it was trained in, fields that differ from the defaults.
         training: the specification of the training.
         seed: of the training.
@@ -104,3 +106,4 @@ class PolicyCard(_Part):
     seed: int = 0
     agent_steps: NonNegativeInt = 0
     scores: tuple[Score, ...] = ()
+    scored_with: dict[str, str] = Field(default_factory=dict)

@@ -33,6 +33,12 @@ def versions() -> dict[str, str]:
     return found
 
 
+def simulation() -> dict[str, str]:
+    """Return those of the versions that say which world was played in."""
+    found = versions()
+    return {name: found[name] for name in ("swarm-logistics-env", "simulation") if name in found}
+
+
 def enter(directory: Path, training: Record, command: str) -> bool:
     """Make the directory of a training or search, or enter it to go on; note when and by what.
 

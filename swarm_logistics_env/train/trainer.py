@@ -37,7 +37,7 @@ from swarm_logistics_env.train.learner import (
 )
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.reporting import Report
-from swarm_logistics_env.train.run_record import enter, versions
+from swarm_logistics_env.train.run_record import enter, simulation, versions
 from swarm_logistics_env.train.scoring import score
 from swarm_logistics_env.train.specification import Training
 from swarm_logistics_env.train.worlds import make_worlds
@@ -54,11 +54,13 @@ class Notes:
         curve: (agent-steps, seconds of training, what was measured) of each evaluation.
         best: score and tensors of the best policy so far.
         seconds: trained before this session.
+        versions: that it learned with last.
     """
 
     curve: list[tuple[int, float, Evaluated]] = field(default_factory=list)
     best: tuple[float, dict[str, NDArray[np.float32]]] | None = None
     seconds: float = 0.0
+    versions: dict[str, str] | None = None
 
 
 def train(
@@ -98,6 +100,7 @@ def train(
         learner.set_random_seed(training.seed)
         save_checkpoint(out, learner, view, notes)
     if learner.num_timesteps < training.agent_steps:
+        notes.versions = versions()
         with Report(training.name, training.agent_steps, learner.num_timesteps) as report:
             watch = _Watch(training, view, notes, out, report)
             learner.learn(
@@ -108,7 +111,7 @@ def train(
     tensors = tensors_of(learner.policy)
     if training.evaluation.keep == "best" and notes.best is not None:
         tensors = notes.best[1]
-    return _write(training, out, command, learner.num_timesteps, tensors)
+    return _write(training, out, command, learner.num_timesteps, tensors, notes.versions)
 
 
 def _new_view(training: Training) -> NetworkView:
@@ -121,6 +124,7 @@ def _write(
     command: str,
     agent_steps: int,
     tensors: Mapping[str, NDArray[np.float32]],
+    learned_with: dict[str, str] | None,
 ) -> Path:
     path = out / f"{training.name}.safetensors"
     card = PolicyCard(
@@ -128,7 +132,7 @@ def _write(
         about=training.about,
         network=training.network,
         command=command,
-        versions=versions(),
+        versions=learned_with or versions(),
         scenario=_changed(training.scenario),
         training=training.model_dump(mode="json", exclude_defaults=True),
         seed=training.seed,
@@ -137,7 +141,8 @@ def _write(
     # Before the scores, which take minutes.
     write_policy(path, card, tensors)
     scores = score(LearnedPolicy(card, tensors), training, out / "scores")
-    write_policy(path, card.replace(scores=scores), tensors)
+    if scores:
+        write_policy(path, card.replace(scores=scores, scored_with=simulation()), tensors)
     return path
 
 

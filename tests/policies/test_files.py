@@ -30,6 +30,15 @@ def test_what_is_written_is_read_back(
     assert [path.name for path in file.parent.iterdir()] == [file.name]
 
 
+def test_a_card_without_the_latest_fields_is_read(
+    card: PolicyCard, tensors: Tensors, file: Path
+) -> None:
+    earlier = card.to_json().replace(',"scored_with":{}', "")
+    assert "scored_with" not in earlier
+    rewrite(file, earlier, tensors)
+    assert read_card(file) == card
+
+
 def test_a_file_that_is_cut_short_is_refused(file: Path) -> None:
     whole = file.read_bytes()
     for length in (0, 5, 100, len(whole) // 2, len(whole) - 1):

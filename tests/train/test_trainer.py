@@ -18,8 +18,10 @@ from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.policies.motion_frame import INPUTS
-from swarm_logistics_env.train import Training, trainer
+from swarm_logistics_env.studies.code_version import code_version
+from swarm_logistics_env.train import Training, run_record, trainer
 from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
+from swarm_logistics_env.train.run_record import simulation
 from swarm_logistics_env.train.specification import Imitation, Scores
 from swarm_logistics_env.train.trainer import train
 
@@ -39,6 +41,8 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
     assert card.agent_steps == 640
     assert card.scenario["warehouse_width"] == 5.0
     assert {"torch", "swarm-logistics-env", "simulation"} <= card.versions.keys()
+    assert card.scored_with == simulation()
+    assert card.scored_with["simulation"] == code_version()
     measured = {(score.measure, score.condition) for score in card.scores}
     assert measured >= {("P", "N = 2"), ("P", "N = 3"), ("P", "N = 3, FM4, m = 1")}
     curve = (tmp_path / "curve.csv").read_text().splitlines()
@@ -59,8 +63,13 @@ def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_cal
         changed.setattr(execution, "code_version", lambda: "another")
         with pytest.raises(TrainingError, match=r"runs of the scores failed .*the package changed"):
             train(training, tmp_path)
-    assert policies.read_card(tmp_path / "small.safetensors").scores == ()
-    assert policies.read_card(train(training, tmp_path)).scores
+    card = policies.read_card(tmp_path / "small.safetensors")
+    assert (card.scores, card.scored_with) == ((), {})
+    monkeypatch.setattr(run_record, "code_version", lambda: "a later one")
+    later = policies.read_card(train(training, tmp_path))
+    assert later.scores
+    assert later.scored_with["simulation"] == "a later one"
+    assert later.versions["simulation"] == code_version()
 
 
 def test_torch_and_the_policy_file_agree(small: Any) -> None:
