@@ -32,6 +32,8 @@ SMALL = [
     [
         (["run", "--sead", "3"], "--sead"),
         (["run", "--seed", "x"], "valid integer"),
+        (["run", "\n"], "extra argument"),
+        (["run", "--policy", "a\x1b[31m\udc80"], r"'a\x1b[31m\udc80'"),
         (["run", "--set", "n_robot=40"], "did you mean 'n_robots'?"),
         (["run", "--set", "n_robots"], "FIELD=VALUE"),
         (["run", "--set", "n_robots=-3"], "n_robots = -3"),

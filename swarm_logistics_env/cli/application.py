@@ -48,5 +48,7 @@ def _sentence(error: Exception) -> str | None:
 
 
 def _complain(sentence: str, code: int) -> int:
-    sys.stderr.write(f"swarm-logistics: {sentence}\n")
+    # It may repeat what was typed, which neither breaks the line nor steers the terminal.
+    shown = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)
+    sys.stderr.write(f"swarm-logistics: {shown}\n")
     return code
