@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
 def performance(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Performances as a float array (n,): not empty, finite, not negative."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise IndicatorError(f"{name} = {values!r}: should be an array of numbers") from None
+    array = numbers(name, values)
     if array.ndim != 1:
         raise IndicatorError(
             f"{name} has shape {array.shape}: should be one number per seed (or size), shape (n,)"
@@ -34,6 +31,14 @@ def performance(name: str, values: ArrayLike) -> NDArray[np.float64]:
         if value < 0:
             raise IndicatorError(f"{name}[{seed}] = {value:g}: should not be negative")
     return array
+
+
+def numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """A float array of any shape."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise IndicatorError(f"{name} = {values!r}: should be an array of numbers") from None
 
 
 def same_seeds(**samples: NDArray[np.float64]) -> None:
@@ -68,16 +73,18 @@ def count(name: str, value: SupportsIndex) -> int:
 
 def finite(name: str, value: float) -> float:
     """A finite number."""
-    if not math.isfinite(value):
+    number = _number(name, value)
+    if not math.isfinite(number):
         raise IndicatorError(f"{name} = {value}: should be finite")
-    return float(value)
+    return number
 
 
 def between_0_and_1(name: str, value: float) -> float:
     """A number strictly between 0 and 1."""
-    if not 0.0 < value < 1.0:
+    number = _number(name, value)
+    if not 0.0 < number < 1.0:
         raise IndicatorError(f"{name} = {value}: should lie between 0 and 1, both excluded")
-    return float(value)
+    return number
 
 
 def delivery_times(name: str, runs: Sequence[ArrayLike]) -> list[NDArray[np.float64]]:
@@ -86,10 +93,18 @@ def delivery_times(name: str, runs: Sequence[ArrayLike]) -> list[NDArray[np.floa
         raise IndicatorError(f"{name} is empty: should hold the delivery times of each seed")
     checked = []
     for seed, run in enumerate(runs):
-        times = np.asarray(run, dtype=np.float64)
+        times = numbers(f"{name}[{seed}]", run)
         if times.ndim != 1 or not np.isfinite(times).all() or (times < 0.0).any():
             raise IndicatorError(
                 f"{name}[{seed}] = {run!r}: should be delivery times in s, finite, not negative"
             )
         checked.append(np.sort(times))
     return checked
+
+
+def _number(name: str, value: float) -> float:
+    try:
+        math.isfinite(value)  # takes whatever turns into a float, unlike float() no text
+    except (TypeError, OverflowError):
+        raise IndicatorError(f"{name} = {value!r}: should be a number") from None
+    return float(value)

@@ -8,6 +8,7 @@ import numpy as np
 
 from .errors import IndicatorError
 from .estimate import verdict_at
+from .inputs import numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,7 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     Raises:
         IndicatorError: Not one-dimensional, or a p outside [0, 1].
     """
-    p = np.asarray(p_values, dtype=np.float64)
+    p = numbers("p_values", p_values)
     if p.ndim != 1:
         raise IndicatorError(f"p_values has shape {p.shape}: should be one p per hypothesis")
     for value in p.tolist():

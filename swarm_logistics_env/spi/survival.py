@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .errors import IndicatorError
-from .inputs import between_0_and_1
+from .inputs import between_0_and_1, numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -44,7 +44,7 @@ def kaplan_meier(seconds: ArrayLike, happened: ArrayLike, level: float = 0.95) -
     from scipy.special import ndtri
 
     between_0_and_1("level", level)
-    time = np.asarray(seconds, dtype=np.float64)
+    time = numbers("seconds", seconds)
     event = np.asarray(happened, dtype=bool)
     if time.ndim != 1 or time.shape != event.shape or time.size == 0:
         raise IndicatorError(

@@ -173,9 +173,10 @@ def test_fault_tolerance_leaves_a_robot() -> None:
         (2.0, 2.0, "x_new = 2 = x_o"),
         (float("nan"), 1.0, "x_o = nan: should be finite"),
         (1.0, float("inf"), "x_new = inf: should be finite"),
+        ("1", 2.0, "x_o = '1': should be a number"),
     ],
 )
-def test_an_undefined_change_of_x_is_an_error(x_o: float, x_new: float, message: str) -> None:
+def test_an_undefined_change_of_x_is_an_error(x_o: Any, x_new: float, message: str) -> None:
     with pytest.raises(IndicatorError, match=message):
         spi.adaptability(P, P, x_o=x_o, x_new=x_new)
 
@@ -183,7 +184,8 @@ def test_an_undefined_change_of_x_is_an_error(x_o: float, x_new: float, message:
 def test_threshold_and_level_are_checked() -> None:
     with pytest.raises(IndicatorError, match="threshold = nan"):
         spi.relative_change(P, P, threshold=float("nan"))
-    for level in (0.0, 1.0, 95.0):
+    levels: tuple[Any, ...] = (0.0, 1.0, 95.0, "0.95", None)
+    for level in levels:
         with pytest.raises(IndicatorError, match="level"):
             spi.relative_change(P, P, level=level)
 

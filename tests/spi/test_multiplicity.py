@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,8 +27,8 @@ def test_holm_never_helps_and_is_never_worse_than_bonferroni(p: list[float]) -> 
     assert (adjusted <= np.minimum(1.0, np.array(p) * len(p) + 1e-15)).all()
 
 
-@pytest.mark.parametrize("p", [[0.5, 1.1], [-0.1], [float("nan")], [[0.1, 0.2]]])
-def test_holm_names_what_is_no_p(p: list[float]) -> None:
+@pytest.mark.parametrize("p", [[0.5, 1.1], [-0.1], [float("nan")], [[0.1, 0.2]], ["small"]])
+def test_holm_names_what_is_no_p(p: Any) -> None:
     with pytest.raises(IndicatorError, match="p_values"):
         spi.holm(p)
 

@@ -37,6 +37,7 @@ BAD: list[tuple[Any, Any, str]] = [
     ([[-1.0]], [[1.0]], r"faulty\[0\]"),
     ([[1.0]], [[float("nan")]], r"reference\[0\]"),
     ([[1.0]], [[[1.0]]], r"reference\[0\]"),
+    ([["late"]], [[1.0]], r"faulty\[0\] = \['late'\]: should be an array of numbers"),
     ([[900.0]], [[10.0]], "mean of reference = 0"),
 ]
 

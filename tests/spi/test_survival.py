@@ -45,7 +45,8 @@ def test_level_widens() -> None:
 
 
 BAD: list[tuple[Any, Any]] = [([], []), ([1.0], [True, False]), ([-1.0], [True]),
-                              ([float("nan")], [True]), ([float("inf")], [False])]  # fmt: skip
+                              ([float("nan")], [True]), ([float("inf")], [False]),
+                              (["late"], [True])]  # fmt: skip
 
 
 @pytest.mark.parametrize(("seconds", "happened"), BAD)
