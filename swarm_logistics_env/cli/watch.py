@@ -53,7 +53,7 @@ def watch_command(
         return
     from swarm_logistics_env.rendering.renderer import load_pygame
 
-    load_pygame()
+    load_pygame(instead=", or use --web")
     from swarm_logistics_env.watch.window import WatchWindow
 
     WatchWindow(session, policy).run()

@@ -133,7 +133,7 @@ def _ffmpeg() -> str:
         import imageio_ffmpeg
     except ImportError as error:
         raise SetupError(
-            f"a film needs imageio-ffmpeg ({error}): pip install swarm-logistics-env[render]"
+            f"a film needs imageio-ffmpeg ({error}): pip install 'swarm-logistics-env[render]'"
         ) from error
     try:
         program: str = imageio_ffmpeg.get_ffmpeg_exe()

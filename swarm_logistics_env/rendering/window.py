@@ -9,6 +9,7 @@ import pygame
 from swarm_logistics_env.errors import SetupError
 
 _TITLE = "swarm-logistics"
+_UNSEEN = "use render_mode = 'rgb_array', or set SDL_VIDEODRIVER=dummy to go without"
 
 
 class Window:
@@ -19,7 +20,7 @@ class Window:
     """
 
     def __init__(self) -> None:
-        open_display(_TITLE, instead="use render_mode = 'rgb_array'")
+        open_display(_TITLE, instead=_UNSEEN)
         self._clock = pygame.time.Clock()
 
     def show(self, picture: pygame.Surface, rate: float) -> bool:
@@ -55,7 +56,4 @@ def open_display(title: str, instead: str) -> None:
 
 
 def _no_display(reason: str, instead: str) -> SetupError:
-    return SetupError(
-        f"a window needs a display ({reason}): {instead}, or set SDL_VIDEODRIVER=dummy to go "
-        "without"
-    )
+    return SetupError(f"a window needs a display ({reason}): {instead}")

@@ -39,6 +39,14 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
     assert len(printed.err.splitlines()) == 1
 
 
+def test_without_pygame_the_browser_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    assert app.run(["watch"]) == 2
+    assert capsys.readouterr().err.endswith("[render]', or use --web\n")
+
+
 def test_port_in_use_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -440,7 +440,7 @@ def test_show_needs_the_human_mode(situation: Callable[..., Situation]) -> None:
 
 def test_missing_pygame_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(SetupError, match=r"pip install swarm-logistics-env\[render\]"):
+    with pytest.raises(SetupError, match=r"pip install 'swarm-logistics-env\[render\]'"):
         Renderer(Scenario(), "rgb_array")
 
 

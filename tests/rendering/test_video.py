@@ -97,7 +97,7 @@ def test_what_cannot_be_written_is_refused_first(
         with pytest.raises(SetupError, match=words):
             video.check_film(tmp_path / name)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(SetupError, match=r"pip install swarm-logistics-env\[render\]"):
+    with pytest.raises(SetupError, match=r"pip install 'swarm-logistics-env\[render\]'"):
         video.check_film(tmp_path / "film.mp4")
 
 

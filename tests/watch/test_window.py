@@ -160,5 +160,5 @@ def test_closing_the_window_ends_it(hands: Hands) -> None:
 def test_no_display_names_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
     session = Session(Scenario(n_robots=1), lambda: policies.load("swarm-dt"))
-    with pytest.raises(SetupError, match=r"needs a display .* use --web"):
+    with pytest.raises(SetupError, match=r"needs a display .* use --web$"):
         WatchWindow(session, "swarm-dt")
