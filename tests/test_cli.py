@@ -89,6 +89,52 @@ def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> N
         app.run(["scenario"])
 
 
+def test_no_command_prints_the_help_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run([]) == 2
+    printed = capsys.readouterr()
+    assert "Commands" in printed.out
+    assert printed.err == ""
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        ("Torn", ("ZeroDivisionError: the motor is gone", "own_faulty.py, line 6")),
+        ("Short", ("TypeError: Short.reset() takes 2 positional arguments but 3 were given",)),
+        ("Unmade", ("'own_faulty:Unmade' cannot be made: KeyError: 'gain'",)),
+        ("./own_faulty.py", ("should be MODULE:CLASS, as 'own_faulty:Torn'",)),
+        ("unread", ("'unread:Torn' cannot be imported: SyntaxError", "line 1")),
+    ],
+)
+def test_what_a_policy_of_ones_own_raises_is_one_sentence(
+    policy: str,
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "own_faulty.py").write_text(
+        "import math\n"
+        "class Torn:\n"
+        "    def reset(self, n_robots, seed): ...\n"
+        "    def act(self, observations): return self.move()\n"
+        "    def move(self):\n"
+        "        raise ZeroDivisionError('the motor\\nis gone')\n"
+        "class Short(Torn):\n"
+        "    def reset(self, n_robots): ...\n"
+        "class Unmade(Torn):\n"
+        "    def __init__(self): {}['gain']\n"
+    )
+    (tmp_path / "unread.py").write_text("class Torn(:\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    name = f"own_faulty:{policy}" if policy.isalpha() and policy != "unread" else f"{policy}:Torn"
+    assert app.run(["run", "--policy", name, *SMALL]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    for part in words:
+        assert part in said
+
+
 def test_scenario_sheet_and_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["scenario", "--set", "n_robots=40"]) == 0
     assert "| n_robots | 40 (default 25) |" in capsys.readouterr().out
@@ -309,6 +355,11 @@ def test_power_of_a_stored_study_and_of_a_pilot(
     arguments = ["--pilot-seeds", "3", "--processes", "1", "--effect", "1"]
     assert app.run(["study", "power", str(path), *arguments]) == 0
     assert "Seeds needed, from 3 seeds" in capsys.readouterr().out
+    capsys.readouterr()
+    assert app.run(["study", "power", str(path), *arguments, "--indicator", "R"]) == 2
+    assert "--indicator R: the study makes no such comparison; it asks about S" in (
+        capsys.readouterr().err
+    )
     assert app.run(["study", "power", str(path), *arguments, "--at", "FM9"]) == 2
     assert app.run(["study", "power", stored_study, "--power", "2"]) == 2
 

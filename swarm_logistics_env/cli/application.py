@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import traceback
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -31,6 +33,8 @@ class Application(typer.Typer):
             sentence = _sentence(error)
             if sentence is None:
                 raise
+            if not sentence:  # no command was named: the help has been printed
+                return 2
             return _complain(sentence, 2)
         return code if isinstance(code, int) else 0
 
@@ -44,7 +48,29 @@ def _sentence(error: Exception) -> str | None:
     from swarm_logistics_env.errors import SwarmLogisticsError
     from swarm_logistics_env.spi import IndicatorError
 
-    return str(error) if isinstance(error, SwarmLogisticsError | IndicatorError) else None
+    if isinstance(error, SwarmLogisticsError | IndicatorError):
+        return str(error)
+    return _of_a_policy(error)
+
+
+def _of_a_policy(error: Exception) -> str | None:
+    """Return what a policy from outside the package raised, and where; None: it was no such one."""
+    from swarm_logistics_env.policies import policy
+
+    frames = traceback.extract_tb(error.__traceback__)
+    calls = [number for number, frame in enumerate(frames) if frame.filename == policy.__file__]
+    if not calls:
+        return None
+    beyond = frames[calls[-1] + 1 :]
+    where = ""
+    if beyond:
+        its_file = beyond[0].filename
+        if Path(its_file).is_relative_to(Path(policy.__file__).parents[1]):
+            return None
+        line = [frame.lineno for frame in beyond if frame.filename == its_file][-1]
+        where = f" ({its_file}, line {line})"
+    said = " ".join(str(error).split())
+    return f"the policy raised {type(error).__name__}: {said}{where}"
 
 
 def _complain(sentence: str, code: int) -> int:

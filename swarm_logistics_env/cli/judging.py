@@ -68,7 +68,13 @@ def power_command(
             )
         )
     if not rows:
-        raise StudyError("the study makes no such comparison: leave out --indicator and --at")
+        asked_for = [] if indicator is None else [f"--indicator {indicator}"]
+        asked_for += [f"--at {at!r}"] if at else []
+        made = dict.fromkeys(j.comparison.indicator for j in findings.judgements)
+        raise StudyError(
+            f"{' '.join(asked_for) or asked}: the study makes no such comparison; "
+            f"it asks about {', '.join(made) or 'nothing'}"
+        )
     n_seeds = len(findings.plan.seeds)
     columns = (
         "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power",

@@ -116,7 +116,9 @@ def report_command(
     """Print and write the report of a study again, from its store alone."""
     from swarm_logistics_env.studies import Study
 
-    _show(Study.stored(directory))
+    stored = Study.stored(directory)
+    typer.echo(f"{stored.plan()}\n")
+    _show(stored)
 
 
 @study.command("export")

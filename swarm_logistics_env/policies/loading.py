@@ -12,7 +12,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from swarm_logistics_env.errors import PolicyError, suggest
+from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.executable import SUFFIX as EXECUTABLE
 from swarm_logistics_env.policies.executable import StableBaselinesPolicy
@@ -85,8 +85,13 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         )
     try:
         policy = make(**parameters)
+    except SwarmLogisticsError:
+        raise
     except TypeError as error:
         raise PolicyError(f"policy {name!r} cannot be made: {error}") from None
+    except Exception as error:  # of code that is not ours
+        kind = type(error).__name__
+        raise PolicyError(f"policy {name!r} cannot be made: {kind}: {error}") from error
     if not isinstance(policy, Policy):
         raise PolicyError(f"{name!r} is no policy: it should have the methods reset and act")
     return policy
@@ -142,12 +147,20 @@ def _imported(name: str) -> Callable[..., Policy] | None:
     module, colon, attribute = name.partition(":")
     if not colon:
         return None
+    if "/" in module or module.endswith(".py"):
+        raise PolicyError(
+            f"policy {name!r}: should be MODULE:CLASS, as '{Path(module).stem}:{attribute}', with "
+            "the module's folder as the current one or on PYTHONPATH"
+        )
     try:
         found: Any = importlib.import_module(module)
         for part in attribute.split("."):
             found = getattr(found, part)
     except (ImportError, AttributeError, ValueError) as error:
         raise PolicyError(f"policy {name!r} cannot be imported: {error}") from None
+    except Exception as error:  # of code that is not ours
+        kind = type(error).__name__
+        raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
     if not callable(found):
         raise PolicyError(f"policy {name!r} is a {type(found).__name__}: should be a class")
     made: Callable[..., Policy] = found

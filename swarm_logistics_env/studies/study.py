@@ -151,7 +151,7 @@ class Study:
             shard: which part to play, the others being left to other machines; None: all.
 
         Raises:
-            StudyError: the store or the engine cannot be used.
+            StudyError: the store or the engine cannot be used, or the store is another study's.
         """
         plan = self.plan()
         if plan.code != code_version():
@@ -167,6 +167,7 @@ class Study:
         with self._store() as store:
             if store.note(notes.IMPORTED) is not None:
                 raise StudyError(f"the study in {self.out} was imported: run into a new directory")
+            self._refuse_another(store)
             if store.note(notes.DECLARED_SEEDS) is None:
                 store.set_note(notes.DECLARED_SEEDS, str(len(plan.seeds)))
                 store.set_note(notes.DECLARED_LOOKS, json.dumps(self.specification.looks))
@@ -246,6 +247,16 @@ class Study:
         if directory is None:
             raise StudyError("report needs a path: the study is kept in memory")
         return write_report(self.findings(), directory)
+
+    def _refuse_another(self, store: Store) -> None:
+        # The report and the declared number of seeds are one study's.
+        noted = store.note(notes.SPECIFICATION)
+        name = self.specification.name
+        if noted is not None and (there := Specification.from_json(noted).name) != name:
+            raise StudyError(
+                f"{self.out} holds the study {there!r}: should be another directory for the study "
+                f"{name!r}, or, if it is the same under a new name, name = {there!r}"
+            )
 
     @contextmanager
     def _store(self, *, existing: bool = False) -> Iterator[Store]:

@@ -217,6 +217,17 @@ def test_finished_runs_are_kept_and_seeds_can_be_added(tmp_path: Path) -> None:
     assert len(more.results()) == 9
 
 
+def test_another_study_does_not_enter_the_directory_of_this_one(tmp_path: Path) -> None:
+    fields = {**SMALL, "faults": [], "parameters": [], "ablations": [], "seeds": 1}
+    Study(out=tmp_path, **{**fields, "name": "first"}).run()
+    report = Study.stored(tmp_path).report()[0].read_bytes()
+    other = Study(out=tmp_path, **{**fields, "name": "second", "seeds": 2})
+    with pytest.raises(StudyError, match="holds the study 'first': should be another directory"):
+        other.run()
+    assert Study.stored(tmp_path).specification.name == "first"
+    assert Study.stored(tmp_path).report()[0].read_bytes() == report
+
+
 def test_stored_study_is_judged_without_its_policies(tmp_path: Path) -> None:
     study = Study(out=tmp_path, policies=[Steady()], seeds=2, scenario=SMALL["scenario"], **ONE)
     study.run()
