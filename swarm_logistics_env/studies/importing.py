@@ -15,9 +15,9 @@ from swarm_logistics_env.studies import notes
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Comparison, Level
 from swarm_logistics_env.studies.conditions import StudiedPolicy
 from swarm_logistics_env.studies.execution import Outcome
+from swarm_logistics_env.studies.new_store import new_store, refuse_study_in
 from swarm_logistics_env.studies.plan import Plan, adaptability, robustness, scalability
 from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 CODE = "imported"
 _NEEDED = ("kind", "name", "value", "delivered")
@@ -68,8 +68,7 @@ def import_results(file: Path, out: Path) -> int:
     Raises:
         StudyError: the file cannot be read, or a row of it cannot be.
     """
-    if (out / FILE_NAME).exists():
-        raise StudyError(f"{out} holds a study already: import into a new directory")
+    refuse_study_in(out, "import")
     try:
         content = file.read_bytes()
         text = content.decode("utf-8-sig")
@@ -88,13 +87,7 @@ def import_results(file: Path, out: Path) -> int:
     specification = _specification(file, rows, max(map(len, cells.values())))
     origin = Origin(file.name, hashlib.sha256(content).hexdigest()[:16], paired)
     plan = imported_plan(specification, origin)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StudyError(f"cannot write to {out}: {error.strerror}") from error
-    unfinished = out / f"{FILE_NAME}.unfinished"
-    unfinished.unlink(missing_ok=True)
-    with Store(unfinished) as store:
+    with new_store(out) as store:
         for policy, title, arm in plan.cells:
             found = cells.get((policy, title, arm.level), [])
             for seed, row in enumerate(sorted(found, key=lambda row: row.seed or 0)):
@@ -105,7 +98,6 @@ def import_results(file: Path, out: Path) -> int:
         store.set_note(notes.IDENTITIES, "{}")
         store.set_note(notes.DECLARED_SEEDS, str(specification.seeds))
         store.set_note(notes.IMPORTED, json.dumps(asdict(origin)))
-    unfinished.rename(out / FILE_NAME)
     return len(rows)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import notes
+from swarm_logistics_env.studies.new_store import new_store, refuse_study_in
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
@@ -28,29 +29,15 @@ def merge(directories: Sequence[Path], out: Path) -> int:
         StudyError: a store cannot be read, the studies differ, two stores have different results
             of one run, or `out` holds a study.
     """
-    if (out / FILE_NAME).exists():
-        raise StudyError(f"{out} holds a study already: merge into a new directory")
+    refuse_study_in(out, "merge")
     planned = {directory: _notes(directory) for directory in directories}
     merged = _united(planned)
-    # Renamed when it is whole: a merge that is killed leaves nothing that looks like a store.
-    unfinished = out / f"{FILE_NAME}.unfinished"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        unfinished.unlink(missing_ok=True)
-    except OSError as error:
-        raise StudyError(f"cannot write to {out}: {error.strerror}") from error
-    try:
-        with Store(unfinished) as store:
-            for directory in directories:
-                store.absorb(directory / FILE_NAME)
-            for name, value in merged.items():
-                store.set_note(name, value)
-            held = len(store)
-        unfinished.rename(out / FILE_NAME)
-    finally:
-        for left in out.glob(f"{unfinished.name}*"):
-            left.unlink()
-    return held
+    with new_store(out) as store:
+        for directory in directories:
+            store.absorb(directory / FILE_NAME)
+        for name, value in merged.items():
+            store.set_note(name, value)
+        return len(store)
 
 
 def _notes(directory: Path) -> dict[str, str]:
