@@ -21,9 +21,13 @@ def test_store_is_there_once_it_is_whole(tmp_path: Path) -> None:
 
 
 def test_failure_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), new_store(tmp_path) as store:
-        store.set_note("name", "value")
-        raise KeyboardInterrupt
+    def stopped() -> None:
+        with new_store(tmp_path) as store:
+            store.set_note("name", "value")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
     assert list(tmp_path.iterdir()) == []
 
 
