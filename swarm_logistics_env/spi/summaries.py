@@ -10,7 +10,7 @@ import numpy as np
 from .inputs import between_0_and_1, performance, same_seeds
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 
 class Interval(NamedTuple):
@@ -27,7 +27,7 @@ def mean_interval(p: ArrayLike, level: float = 0.95) -> Interval:
     Raises:
         IndicatorError: p empty, negative or not finite; level outside (0, 1).
     """
-    return _t_interval(p, level, of_one_run=False)
+    return t_interval(performance("p", p), level)
 
 
 def prediction_interval(p: ArrayLike, level: float = 0.95) -> Interval:
@@ -38,7 +38,7 @@ def prediction_interval(p: ArrayLike, level: float = 0.95) -> Interval:
     Raises:
         IndicatorError: p empty, negative or not finite; level outside (0, 1).
     """
-    return _t_interval(p, level, of_one_run=True)
+    return t_interval(performance("p", p), level, of_one_run=True)
 
 
 def interquartile_mean(p: ArrayLike) -> float:
@@ -100,11 +100,17 @@ def pairing_correlation(p_a: ArrayLike, p_b: ArrayLike) -> float | None:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def _t_interval(p: ArrayLike, level: float, *, of_one_run: bool) -> Interval:
+def t_interval(
+    sample: NDArray[np.float64], level: float = 0.95, *, of_one_run: bool = False
+) -> Interval:
+    """Mean of a sample (n,) of any sign with its t-interval, or with that of one further value.
+
+    Raises:
+        IndicatorError: level outside (0, 1).
+    """
     from scipy.special import stdtrit
 
     between_0_and_1("level", level)
-    sample = performance("p", p)
     n, mean = sample.size, float(sample.mean())
     if n == 1:
         return Interval(mean, None, None)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.spi.summaries import Interval, t_interval
 
 
 def difference_interval(before: NDArray[np.float64], after: NDArray[np.float64]) -> Interval:
     """Return mean(after - before) with its 95 % t-interval, paired by seed; shapes (n,)."""
-    return _t_interval(after - before)
+    return t_interval(after - before)
 
 
 def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], float]) -> Interval:
@@ -30,17 +29,7 @@ def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], flo
     if n_seeds == 1:
         return Interval(value, None, None)
     left_out = np.array([statistic(np.delete(seeds, seed)) for seed in seeds])
-    pseudo = _t_interval(n_seeds * value - (n_seeds - 1) * left_out)
+    pseudo = t_interval(n_seeds * value - (n_seeds - 1) * left_out)
     if pseudo.low is None or pseudo.high is None:
         return Interval(value, None, None)
     return Interval(value, pseudo.low - pseudo.value + value, pseudo.high - pseudo.value + value)
-
-
-def _t_interval(sample: NDArray[np.float64]) -> Interval:
-    from scipy.special import stdtrit
-
-    n, mean = sample.size, float(sample.mean())
-    if n == 1:
-        return Interval(mean, None, None)
-    half = float(stdtrit(n - 1, 0.975)) * float(sample.std(ddof=1)) / math.sqrt(n)
-    return Interval(mean, mean - half, mean + half)
