@@ -57,8 +57,8 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
                 are not there are ignored, as trainers of fixed size send them.
 
         Raises:
-            CommandError: an agent's command is missing, for an unknown agent, of the wrong shape
-                or not finite.
+            CommandError: no dict; an agent's command is missing, for an unknown agent, of the
+                wrong shape or not finite.
         """
         agents = self.agents
         if not agents:
@@ -115,6 +115,11 @@ def _gathered(
     possible_agents: Sequence[str],
     wanted: tuple[int, ...],
 ) -> NDArray[np.float64]:
+    if not isinstance(actions, Mapping):
+        raise CommandError(
+            f"actions of type {type(actions).__name__}: should be a dict of one command for every "
+            "agent; step_arrays takes an array"
+        )
     if actions.keys() != set(agents):
         for agent in actions:
             if agent not in possible_agents:

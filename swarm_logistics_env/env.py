@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.central_state import global_state, global_state_bounds
 from swarm_logistics_env.dict_view import ArrayStep, DictView, agent_names
-from swarm_logistics_env.errors import SetupError, suggest
+from swarm_logistics_env.errors import ScenarioError, SetupError, suggest
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.reset_options import (
     OPTIONS,
@@ -75,10 +75,13 @@ class SwarmLogisticsEnv(DictView):
         max_cycles: int | None = None,
         **fields: Any,
     ) -> None:
-        self.scenario = (scenario or Scenario()).replace(**fields)
+        self.scenario = _scenario_of(scenario, fields)
         self.faults = checked_faults("faults", faults)
-        if max_cycles is not None and max_cycles < 1:
-            raise SetupError(f"max_cycles = {max_cycles}: should be None or at least 1")
+        is_count = isinstance(max_cycles, int | np.integer) and max_cycles >= 1
+        if max_cycles is not None and not is_count:
+            raise SetupError(
+                f"max_cycles = {max_cycles!r}: should be None or a whole number of at least 1"
+            )
         self.max_cycles = max_cycles
         modes = self.metadata["render_modes"]
         if render_mode is not None and render_mode not in modes:
@@ -270,3 +273,17 @@ class SwarmLogisticsEnv(DictView):
             f"{', '.join(changed)}: observations could leave the observation space; should be "
             "within what the environment was built for, or announced by env.cover(scenario)"
         )
+
+
+def _scenario_of(scenario: Scenario | None, fields: Mapping[str, Any]) -> Scenario:
+    if scenario is not None and not isinstance(scenario, Scenario):
+        raise SetupError(
+            f"scenario = {scenario!r}: should be a Scenario; its fields are arguments of their "
+            "own, as n_robots=40"
+        )
+    own = ("scenario", "faults", "rewards", "render_mode", "max_cycles")
+    for name in fields:
+        if name not in Scenario.model_fields:
+            known = (*Scenario.model_fields, *own)
+            raise ScenarioError(f"the environment has no argument {name!r}{suggest(name, known)}")
+    return (scenario or Scenario()).replace(**fields)

@@ -53,7 +53,11 @@ class Record(BaseModel):
 
     @classmethod
     def _sentence(cls, error: ValidationError) -> str:
-        problems = (cls._problem(dict(problem)) for problem in error.errors())
+        found: list[dict[str, Any]] = [dict(problem) for problem in error.errors()]
+        # Of a list that lost its bad items: that it is too short is no news.
+        deeper = {problem["loc"][:-1] for problem in found}
+        found = [p for p in found if p["type"] != "too_short" or p["loc"] not in deeper]
+        problems = (cls._problem(problem) for problem in found)
         return "; ".join(dict.fromkeys(problems))
 
     @classmethod
@@ -64,13 +68,24 @@ class Record(BaseModel):
         field = f"{cls.__name__}.{place}" if place else cls.__name__
         if problem["type"] == "extra_forbidden" and len(problem["loc"]) == 1:
             return f"{cls.__name__} has no field {place!r}{suggest(place, cls.model_fields)}"
-        message = str(problem["msg"]).removeprefix("Value error, ")
+        message = _in_plain_words(problem)
         if message.startswith(f"{cls.__name__}"):
             return message
-        if not place or problem["type"] == "missing":
+        if not place:
             return f"{field}: {message}"
-        message = message.replace("Input should", "should")
+        if problem["type"] == "missing":
+            return f"{field} is missing"
         return f"{field} = {_short(problem['input'])}: {message}"
+
+
+def _in_plain_words(problem: dict[str, Any]) -> str:
+    if problem["type"] == "tuple_type":
+        return "should be a list"
+    if problem["type"] == "too_short":
+        least = problem["ctx"]["min_length"]
+        return f"should have at least {least} item{'' if least == 1 else 's'}"
+    message = str(problem["msg"]).removeprefix("Value error, ")
+    return message.replace("Input should", "should")
 
 
 def _short(value: object, limit: int = 80) -> str:

@@ -21,10 +21,14 @@ class RewardTerms:
         weights: term -> weight; see `REWARD_TERMS` for the terms.
 
     Raises:
-        SetupError: a term is unknown or its weight is not a finite number.
+        SetupError: no dict; a term is unknown or its weight is not a finite number.
     """
 
     def __init__(self, weights: Mapping[str, float] | None = None) -> None:
+        if weights is not None and not isinstance(weights, Mapping):
+            raise SetupError(
+                f'rewards = {weights!r}: should be None or a dict, as {{"delivery": 1.0}}'
+            )
         self.weights = dict(DEFAULT_WEIGHTS if weights is None else weights)
         for name, weight in self.weights.items():
             if name not in REWARD_TERMS:

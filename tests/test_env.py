@@ -173,6 +173,15 @@ def test_wrong_commands_are_refused_and_nothing_has_happened(
     assert data_equivalence(env.step(still(env)), undisturbed.step(still(undisturbed)))
 
 
+@pytest.mark.parametrize("actions", [None, [np.zeros(4)] * 2, np.zeros((2, 4))])
+def test_what_is_no_dict_of_commands_is_refused(actions: Any) -> None:
+    env = parallel_env(n_robots=2)
+    env.reset(seed=0)
+    with pytest.raises(CommandError, match=r"actions of type .*: should be a dict"):
+        env.step(actions)
+    assert env.warehouse.state.step == 0
+
+
 def test_commands_beyond_their_bounds_are_cut() -> None:
     env, cut = parallel_env(n_robots=1), parallel_env(n_robots=1)
     env.reset(seed=0)
@@ -190,6 +199,17 @@ def test_commands_beyond_their_bounds_are_cut() -> None:
         ({"rewards": {"delivry": 1.0}}, SetupError, "did you mean 'delivery'"),
         ({"render_mode": "hologram"}, SetupError, "render_mode = 'hologram': should be"),
         ({"faults": Fault("FM1")}, SetupError, "faults = .*: should be a list of faults"),
+        ({"scenario": 25}, SetupError, "scenario = 25: should be a Scenario"),
+        ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
+        ({"reward": {}}, ScenarioError, "no argument 'reward'; did you mean 'rewards'"),
+        ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be None or a whole number"),
+        ({"max_cycles": "9"}, SetupError, "max_cycles = '9': should be"),
+        ({"max_cycles": 9.5}, SetupError, "max_cycles = 9.5: should be"),
+        (
+            {"rewards": ["delivery"]},
+            SetupError,
+            r"rewards = \['delivery'\]: should be None or a dict",
+        ),
     ],
 )
 def test_wrong_arguments_are_refused(

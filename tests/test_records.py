@@ -1,9 +1,9 @@
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import pytest
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
 from swarm_logistics_env.errors import (
     PolicyError,
@@ -21,6 +21,7 @@ class Lamp(Record):
     power: float = Field(5.0, gt=0)
     colours: tuple[str, ...] = ("red",)
     name: str | None = None
+    sizes: Annotated[tuple[PositiveFloat, ...], Field(min_length=2)] = (1.0, 2.0)
 
 
 class Switch(Record):
@@ -41,18 +42,30 @@ def test_errors_are_of_the_records_own_type_and_of_one_family() -> None:
 def test_an_unknown_field_suggests_the_nearest() -> None:
     with pytest.raises(PolicyError, match=r"Lamp has no field 'powr'; did you mean 'power'?"):
         Lamp(powr=3)  # type: ignore[call-arg]
-    with pytest.raises(PolicyError, match="Lamp has no field 'xyz'; known: colours, name, power"):
+    with pytest.raises(
+        PolicyError, match="Lamp has no field 'xyz'; known: colours, name, power, sizes"
+    ):
         Lamp(xyz=3)  # type: ignore[call-arg]
 
 
 def test_a_missing_field_is_named() -> None:
-    with pytest.raises(SwarmLogisticsError, match=r"Switch\.number"):
+    with pytest.raises(SwarmLogisticsError, match=r"^Switch\.number is missing$"):
         Switch()  # type: ignore[call-arg]
 
 
 def test_a_place_within_a_field_is_named() -> None:
     with pytest.raises(PolicyError, match=r"Lamp.colours.1 = 7: "):
         Lamp(colours=("red", 7))  # type: ignore[arg-type]
+
+
+def test_a_list_is_asked_for_in_plain_words() -> None:
+    with pytest.raises(PolicyError, match=r"^Lamp.colours = 'red': should be a list$"):
+        Lamp(colours="red")  # type: ignore[arg-type]
+    with pytest.raises(PolicyError, match=r"^Lamp.sizes = \[1.0\]: should have at least 2 items$"):
+        Lamp(sizes=[1.0])  # type: ignore[arg-type]
+    # The item that is wrong, and not that without it the list is too short.
+    with pytest.raises(PolicyError, match=r"^Lamp.sizes.1 = -1.0: should be greater than 0$"):
+        Lamp(sizes=[1.0, -1.0])  # type: ignore[arg-type]
 
 
 def test_a_long_value_is_cut_short() -> None:
