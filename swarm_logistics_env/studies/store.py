@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
@@ -80,17 +81,24 @@ class Store:
 
     Args:
         path: the file, made where it is missing; None: kept in memory only.
+        read_only: write nothing, neither into the file nor beside it.
 
     Raises:
         StudyError: the file is not a store, or its schema is not this version's.
     """
 
-    def __init__(self, path: Path | None) -> None:
+    def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
         self.path = path
+        self._read_only = read_only
+        place = str(path or ":memory:")
+        if path is not None and read_only:
+            _refuse_unmerged(path)
+            # Without it SQLite makes two files beside one that is in WAL mode, even to read it.
+            place = f"{path.absolute().as_uri()}?immutable=1"
         with self._explained():
             # Autocommit: transactions are opened by hand, one per run.
             self._database = sqlite3.connect(
-                path or ":memory:", timeout=TIMEOUT, isolation_level=None
+                place, timeout=TIMEOUT, isolation_level=None, uri=read_only
             )
             try:
                 self._prepare()
@@ -100,7 +108,7 @@ class Store:
 
     @classmethod
     def existing(cls, directory: Path) -> Self:
-        """Open the store of a study that was run before.
+        """Open the store of a study that was run before; to read, where it may not be written.
 
         Raises:
             StudyError: there is none.
@@ -108,7 +116,8 @@ class Store:
         path = directory / FILE_NAME
         if not path.is_file():
             raise StudyError(f"no study in {directory}: there is no file {path}")
-        return cls(path)
+        may_write = os.access(path, os.W_OK) and os.access(directory, os.W_OK)
+        return cls(path, read_only=not may_write)
 
     def __enter__(self) -> Self:
         return self
@@ -276,6 +285,13 @@ class Store:
                 f"{self.path} has store schema {version}, this version of the package reads "
                 f"schemas 1 to {SCHEMA_VERSION}: export it with the version that wrote it"
             )
+        if self._read_only:
+            if (application, version) != (APPLICATION_ID, SCHEMA_VERSION):
+                raise StudyError(
+                    f"{self.path} may not be written: should be a store of schema "
+                    f"{SCHEMA_VERSION} to be read there; copy it to where it may"
+                )
+            return
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._change_to_wal()
         self._database.execute("PRAGMA synchronous = NORMAL")
@@ -341,6 +357,15 @@ class Store:
             yield
         except sqlite3.Error as error:
             raise StudyError(f"cannot use the store {self.path}: {error}") from error
+
+
+def _refuse_unmerged(path: Path) -> None:
+    log = path.with_name(f"{path.name}-wal")
+    if log.is_file() and log.stat().st_size:
+        raise StudyError(
+            f"{path} may not be written, and its latest runs are still in {log.name}: copy both "
+            "to where they may"
+        )
 
 
 def _whole(number: object) -> int:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import sqlite3
 import subprocess
 import sys
@@ -157,6 +158,37 @@ def test_what_is_no_store_is_refused_with_the_reason(
     with pytest.raises(StudyError, match=words), Store(path) as store:
         list(store.rows())
     assert path.read_bytes() == before
+
+
+def test_store_that_may_not_be_written_is_read_and_left_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A space and the signs that a URI gives a meaning.
+    directory = tmp_path / "a study? 100% #1"
+    directory.mkdir()
+    path = directory / FILE_NAME
+    with Store(path) as store:
+        store.add(run(0), outcome(run(0), [1.0]))
+    before = path.read_bytes()
+    # Root may write everywhere, whatever the mode says.
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with Store.existing(directory) as store:
+        assert store.succeeded() == {run(0).key}
+        assert store.note("specification") is None
+        with pytest.raises(StudyError, match="readonly database"):
+            store.add(run(1), outcome(run(1), [1.0]))
+        assert list(directory.iterdir()) == [path]
+    assert path.read_bytes() == before
+
+    log = directory / f"{FILE_NAME}-wal"
+    log.write_bytes(b"runs")
+    with pytest.raises(StudyError, match=f"latest runs are still in {FILE_NAME}-wal: copy both"):
+        Store.existing(directory)
+    log.unlink()
+
+    path.write_bytes(b"")
+    with pytest.raises(StudyError, match="should be a store of schema"):
+        Store.existing(directory)
 
 
 def test_no_study_there(tmp_path: Path) -> None:
