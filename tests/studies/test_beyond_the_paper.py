@@ -183,6 +183,33 @@ def test_fault_budget_stops_at_what_was_not_tested(repaired: Findings) -> None:
     assert answer == "0 shown; m = 1 was not tested"
 
 
+@pytest.mark.parametrize(
+    ("delivered", "answer"),
+    [
+        # One robot of ten may be lost, and R = 0 lies at a tenth of the deliveries.
+        ([10, 10, 10, 10], "at least 2"),
+        ([5, 6, 5, 6], "0; m = 1 refuted"),
+        ([2, 14, 2, 14], "0; m = 1 inconclusive"),
+        ([9], "0; m = 1 inconclusive"),
+    ],
+)
+def test_fault_budget_says_whether_more_is_refuted_or_unknown(
+    delivered: list[int], answer: str
+) -> None:
+    study = Study(
+        seeds=len(delivered),
+        scenario={"n_robots": 10, "duration": END},
+        faults=[{"modes": ["FM4"], "robots": [1, 2]}],
+    )
+
+    def play(_: str, level: Level, seed: int) -> Outcome:
+        number = delivered[seed] if level.name == "FM4" else 10
+        return Outcome("", np.arange(1.0, number + 1.0), END)
+
+    ((*_, said),) = table(judged(study, play), "Fault budget")
+    assert said == answer
+
+
 def two_policies(seeds: int, factor: float) -> Findings:
     """Random walk delivers `factor` times what Swarm D-T does, in every run."""
     study = Study(

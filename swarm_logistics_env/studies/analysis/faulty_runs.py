@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.spi import Verdict
 from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.analysis.runs import outcomes_of
@@ -18,11 +19,15 @@ from swarm_logistics_env.studies.judgement import Findings, Judgement
 
 @dataclass(frozen=True)
 class ModeBudget:
-    """How many robots may fail by one mode; `budget` None: blocked."""
+    """How many robots may fail by one mode; `budget` None: blocked.
+
+    `verdict` is that on the m which ended the search; None: none did, or it was not tested.
+    """
 
     comparison: Comparison
     tested: tuple[int, ...]
     budget: FaultBudget | None
+    verdict: Verdict | None
 
 
 @dataclass(frozen=True)
@@ -59,9 +64,9 @@ def fault_budgets(findings: Findings) -> Iterator[ModeBudget]:
             if judgement.estimate is not None
         }
         complete = len(estimates) == len(judgements)
-        yield ModeBudget(
-            judgements[0].comparison, tested, spi.fault_budget(estimates) if complete else None
-        )
+        budget = spi.fault_budget(estimates) if complete else None
+        last = estimates.get(budget.limit) if budget and budget.limit else None
+        yield ModeBudget(judgements[0].comparison, tested, budget, last.verdict if last else None)
 
 
 def anchoring_loads(findings: Findings) -> Iterator[AnchoringLoad]:

@@ -65,7 +65,8 @@ def _budget(budget: ModeBudget) -> tuple[str, ...]:
     elif budget.budget.limit not in budget.tested:
         answer = f"{budget.budget.robots} shown; m = {budget.budget.limit} was not tested"
     else:
-        answer = str(budget.budget.robots)
+        # That more may fail is either refuted, or not known: not the same to who has to decide.
+        answer = f"{budget.budget.robots}; m = {budget.budget.limit} {budget.verdict}"
     return (
         budget.comparison.policy,
         level.name + (f" from {level.onset:g} s" if level.onset else ""),
