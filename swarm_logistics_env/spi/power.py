@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from .estimate import Estimate
 
 MAX_SEEDS = 1_000_000
+# Beyond this critical t, as of two seeds at an early look, the statistic's normal part is lost
+# beside its chi-squared one, and the noncentral t would be summed over so many terms.
+_FAR_OUT = 1e3
 
 
 def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float | None:
@@ -100,14 +103,19 @@ def _check_power(estimate: Estimate, power: float) -> None:
 
 def _power(df: float, noncentrality: float, level: float) -> float:
     """Chance of a verdict on the right side by the one-sided t-test of (1 - level)/2."""
-    from scipy.special import nctdtr, stdtrit
+    from scipy.special import chdtr, nctdtr, stdtrit
 
-    return 1.0 - float(nctdtr(df, noncentrality, float(stdtrit(df, 0.5 + level / 2))))
+    critical = float(stdtrit(df, 0.5 + level / 2))
+    if critical > _FAR_OUT:
+        return float(chdtr(df, df * (noncentrality / critical) ** 2))
+    return 1.0 - float(nctdtr(df, noncentrality, critical))
 
 
 def _noncentrality(df: float, level: float, power: float) -> float:
     """Noncentrality at which the one-sided test of (1 - level)/2 has the wanted power."""
-    from scipy.special import nctdtrinc, stdtrit
+    from scipy.special import chdtri, nctdtrinc, stdtrit
 
     critical = float(stdtrit(df, 0.5 + level / 2))
+    if critical > _FAR_OUT:
+        return critical * math.sqrt(float(chdtri(df, 1.0 - power)) / df)
     return float(nctdtrinc(df, 1.0 - power, critical))

@@ -20,6 +20,7 @@ from swarm_logistics_env.studies.reference import Reference, load_reference
 
 POWER = 0.8
 LEVEL = 0.95
+_LEAST_ALPHA = 1e-12  # of a look: a level is no nearer to 1 than this, whose numbers end at 1e-16
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ def _level(plan: Plan, declared_seeds: int, declared_looks: tuple[int, ...]) -> 
     if n_seeds not in declared_looks or plan.specification.looks != declared_looks:
         return LEVEL, True
     alphas = spi.look_levels(declared_looks, 1 - LEVEL)
-    return 1 - alphas[declared_looks.index(n_seeds)], False
+    return 1 - max(alphas[declared_looks.index(n_seeds)], _LEAST_ALPHA), False
 
 
 @dataclass(frozen=True)

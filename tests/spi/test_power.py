@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -40,6 +41,19 @@ def test_minimum_detectable_effect_is_found_in_80_percent() -> None:
     assert share_supported(PILOT, effect, 10) == pytest.approx(0.8, abs=0.01)
     assert spi.seeds_for_power(PILOT, effect * 1.001) == 10
     assert spi.seeds_for_power(PILOT, -effect * 1.001) == 10
+
+
+def test_levels_of_early_looks_have_a_minimum_detectable_effect() -> None:
+    few = spi.robustness(P_O[:5], P_O[:5] - [3, 5, 2, 8, 4], n=25, m=2, level=1 - 1e-12)
+    effect = spi.minimum_detectable_effect(few)
+    assert effect is not None
+    assert few.difference_sd is not None
+    # By the noncentral t itself, of 4 degrees of freedom, at its critical value 1565.05.
+    noncentrality = effect * few.mean_denominator / few.difference_sd * math.sqrt(5)
+    assert noncentrality == pytest.approx(1915.05, rel=1e-3)
+    two = dataclasses.replace(few, n_seeds=2, degrees_of_freedom=1.0)
+    assert (spi.minimum_detectable_effect(two) or 0.0) > effect
+    assert spi.seeds_for_power(two, 0.5) == spi.seeds_for_power(few, 0.5)
 
 
 def test_effects_are_counted_from_the_threshold() -> None:

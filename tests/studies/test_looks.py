@@ -46,6 +46,19 @@ def test_each_declared_look_is_taken_at_its_level(tmp_path: Path) -> None:
     assert findings.level < 0.96
 
 
+def test_first_look_of_very_many_has_a_level_below_1() -> None:
+    # Its own share of the error is about 1e-56.
+    study = Study(seeds=2, looks=(2, 100), **FIELDS)
+    study.run()
+    findings = study.findings()
+    assert not findings.exploratory
+    assert 0.9999 < findings.level < 1.0
+    (judgement,) = findings.judgements
+    assert judgement.estimate is not None
+    assert judgement.estimate.verdict == "inconclusive"
+    assert "> 99.99 % interval" in markdown(document(findings))
+
+
 def test_look_that_was_not_declared_is_exploratory(tmp_path: Path) -> None:
     Study(out=tmp_path, seeds=2, looks=(2, 4), **FIELDS).run()
     undeclared: list[dict[str, Any]] = [{"seeds": 3}, {"seeds": 3, "looks": (2, 3)}]
