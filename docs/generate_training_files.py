@@ -10,15 +10,15 @@ from record_tables import fields, summary
 
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.train.preset_files import load_training, preset_names
-from swarm_logistics_env.train.specification import (
+from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
     Imitation,
     Indicators,
     PPOSettings,
     Scores,
-    Training,
 )
+from swarm_logistics_env.train.specification import Training
 
 PAGE = Path(__file__).parent / "training_files.md"
 TABLES = {

@@ -14,7 +14,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.train.specification import Evaluation
+from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.warehouse import Fault
 
 # Far from those that scores are measured on, which are 0, 1, ..; a training's are 63 bits long.

@@ -19,7 +19,8 @@ from swarm_logistics_env.streams import generator, key
 from swarm_logistics_env.train.learner import actor_parameters, outputs_of
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.reporting import Report
-from swarm_logistics_env.train.specification import Imitation, Training
+from swarm_logistics_env.train.settings import Imitation
+from swarm_logistics_env.train.specification import Training
 from swarm_logistics_env.train.teacher import taught
 from swarm_logistics_env.train.worlds import make_worlds
 

@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 
+from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.specification import Training
 
@@ -52,8 +53,19 @@ def make_learner(
 
 
 def device_of(asked: str | None) -> str:
-    """Return the device to learn on: as asked, else the GPU where there is one."""
-    return asked or ("cuda" if torch.cuda.is_available() else "cpu")
+    """Return the device to learn on: as asked, else the GPU where there is one.
+
+    Raises:
+        TrainingError: there is no such device.
+    """
+    has_gpu = torch.cuda.is_available()
+    if asked not in (None, "cpu", "cuda"):
+        raise TrainingError(f"device = {asked!r}: should be 'cpu' or 'cuda'")
+    if asked == "cuda" and not has_gpu:
+        raise TrainingError(
+            "device = 'cuda': torch finds no GPU here; should be 'cpu', or left out"
+        )
+    return asked or ("cuda" if has_gpu else "cpu")
 
 
 def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:

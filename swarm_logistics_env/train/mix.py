@@ -9,7 +9,7 @@ import numpy as np
 
 from swarm_logistics_env.reset_options import faults_among, scenario_fields
 from swarm_logistics_env.streams import generator
-from swarm_logistics_env.train.specification import Conditions
+from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.wrappers import Wrapper
 

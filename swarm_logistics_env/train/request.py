@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,8 @@ def train_as_asked(
         if value is not None:
             words += [option, str(value)]
     with _explained():
+        import_module("tensorboard")  # missed before anything is written
+
         from swarm_logistics_env.train.trainer import train
     return train(training, out, command=shlex.join(words), device=device)
 
@@ -65,7 +68,7 @@ def tune_as_asked(
         for each in value if isinstance(value, tuple) else (value,):
             words += [f"--{name.removesuffix('s') if name == 'objectives' else name}", str(each)]
     with _explained():
-        import optuna  # noqa: F401 - missed before anything is written
+        import_module("optuna")  # as above
     return asked, tune(asked, out, command=shlex.join(words)), out / RESULT
 
 

@@ -66,7 +66,9 @@ def enter(directory: Path, training: Record, command: str) -> bool:
         part.replace(path)
     except OSError as error:
         raise TrainingError(f"cannot write to {directory}: {error.strerror}") from error
-    except (ValueError, KeyError) as error:
+    except KeyError as error:
+        raise TrainingError(f"{path} is no record of a training: it lacks {error}") from error
+    except ValueError as error:
         if isinstance(error, TrainingError):
             raise
         raise TrainingError(f"{path} is no record of a training: {error}") from error
@@ -78,5 +80,5 @@ def _check_same(directory: Path, there: dict[str, Any], asked: dict[str, Any]) -
     if differing:
         raise TrainingError(
             f"{directory} holds a training with another {', '.join(differing)}: should be the same "
-            "to go on, or a new directory"
+            "to go on, or --out another directory"
         )

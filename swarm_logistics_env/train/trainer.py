@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import math
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from swarm_logistics_env.policies.card import PolicyCard
@@ -27,40 +21,19 @@ from swarm_logistics_env.train.checkpoint import (
     save_checkpoint,
     view_of,
 )
-from swarm_logistics_env.train.evaluation import Evaluated, evaluate
 from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import (
-    actor_parameters,
     device_of,
     make_learner,
     tensors_of,
 )
 from swarm_logistics_env.train.network_view import NetworkView
+from swarm_logistics_env.train.progress import Notes, Progress
 from swarm_logistics_env.train.reporting import Report
 from swarm_logistics_env.train.run_record import enter, simulation, versions
 from swarm_logistics_env.train.scoring import score
 from swarm_logistics_env.train.specification import Training
 from swarm_logistics_env.train.worlds import make_worlds
-
-CHECKPOINT_EVERY = 20.0  # seconds
-CURVE = "curve.csv"
-
-
-@dataclass
-class Notes:
-    """What a training remembers beside the learner.
-
-    Attributes:
-        curve: (agent-steps, seconds of training, what was measured) of each evaluation.
-        best: score and tensors of the best policy so far.
-        seconds: trained before this session.
-        versions: that it learned with last.
-    """
-
-    curve: list[tuple[int, float, Evaluated]] = field(default_factory=list)
-    best: tuple[float, dict[str, NDArray[np.float32]]] | None = None
-    seconds: float = 0.0
-    versions: dict[str, str] | None = None
 
 
 def train(
@@ -79,18 +52,23 @@ def train(
         device: "cpu" or "cuda"; None: the GPU where there is one.
 
     Raises:
-        TrainingError: the directory holds another training or cannot be used.
+        TrainingError: the directory holds another training or cannot be used, or there is no such
+            device.
         SetupError, ScenarioError, FaultError: worlds that cannot be.
     """
     out = Path(out)
+    # First what may be refused, so that nothing is begun that cannot be.
+    device, begun = device_of(device), _new_view(training)
     enter(out, training, command)
     # Such small networks gain little from more, lose much where cores are shared, and sums would
     # depend on their number.
     torch.set_num_threads(1)
     state = read_checkpoint(out)
-    view = _new_view(training) if state is None else view_of(state)
-    notes = Notes() if state is None else state["notes"]
-    learner = make_learner(training, view, device_of(device), goes_on=state is not None)
+    view, notes = begun, Notes()
+    if state is not None:
+        begun.close()
+        view, notes = view_of(state), state["notes"]
+    learner = make_learner(training, view, device, goes_on=state is not None)
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
         restore(learner, state)
@@ -102,7 +80,7 @@ def train(
     if learner.num_timesteps < training.agent_steps:
         notes.versions = versions()
         with Report(training.name, training.agent_steps, learner.num_timesteps) as report:
-            watch = _Watch(training, view, notes, out, report)
+            watch = Progress(training, view, notes, out, report)
             learner.learn(
                 training.agent_steps - learner.num_timesteps, watch, reset_num_timesteps=False
             )
@@ -148,80 +126,3 @@ def _write(
 
 def _changed(scenario: Scenario) -> dict[str, Any]:
     return scenario.model_dump(mode="json", exclude_defaults=True)
-
-
-class _Watch(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
-    """Between updates: evaluates, keeps the best, writes checkpoints, shows how far it is."""
-
-    def __init__(
-        self, training: Training, view: NetworkView, notes: Notes, out: Path, report: Report
-    ) -> None:
-        super().__init__()
-        self._training, self._view, self._notes = training, view, notes
-        self._out, self._report = out, report
-        self._start, self._saved_at = time.monotonic(), -math.inf
-        self._before = notes.seconds
-
-    def _on_step(self) -> bool:
-        self._report.reach(self.num_timesteps)
-        return True
-
-    def _on_rollout_start(self) -> None:
-        is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
-        for parameter in (*actor_parameters(self.model.policy), self.model.policy.log_std):
-            parameter.requires_grad_(is_free)
-        curve = self._notes.curve
-        if not curve or self.num_timesteps >= curve[-1][0] + self._training.evaluation.every:
-            self._evaluate()
-        if time.monotonic() - self._saved_at >= CHECKPOINT_EVERY:
-            self._save()
-
-    def end(self) -> None:
-        """Judge and keep what the training came to."""
-        if self._notes.curve[-1][0] < self.num_timesteps:
-            self._evaluate()
-        self._save()
-
-    def _save(self) -> None:
-        learner: PPO = self.model
-        self._notes.seconds = self._before + time.monotonic() - self._start
-        save_checkpoint(self._out, learner, self._view, self._notes)
-        self._saved_at = time.monotonic()
-
-    def _evaluate(self) -> None:
-        training, notes = self._training, self._notes
-        tensors = tensors_of(self.model.policy)
-        card = PolicyCard(name=training.name, network=training.network)
-        found = evaluate(
-            LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads
-        )
-        seconds = self._before + time.monotonic() - self._start
-        notes.curve.append((self.num_timesteps, seconds, found))
-        value = _score(found, notes.curve[0][2])
-        if notes.best is None or value > notes.best[0]:
-            notes.best = (value, tensors)
-        self.logger.record("evaluation/P", found.performance)
-        for mode, robustness in found.robustness.items():
-            self.logger.record(f"evaluation/R_{mode}", robustness)
-            self.logger.record(f"evaluation/P_{mode}", found.under_faults[mode])
-        self._report.say(str(found))
-        _write_curve(self._out / CURVE, notes)
-
-
-def _score(found: Evaluated, first: Evaluated) -> float:
-    pairs = [(found.performance, first.performance)]
-    pairs += [(p, first.under_faults[mode]) for mode, p in found.under_faults.items()]
-    return math.fsum(p / max(p_first, 1.0) for p, p_first in pairs) / len(pairs)
-
-
-def _write_curve(path: Path, notes: Notes) -> None:
-    modes = list(notes.curve[0][2].robustness)
-    part = path.with_name(f"{path.name}.part")
-    with part.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        names = [name for mode in modes for name in (f"P_{mode}", f"R_{mode}")]
-        writer.writerow(["agent_steps", "seconds", "P", *names])
-        for steps, seconds, found in notes.curve:
-            values = [v for m in modes for v in (found.under_faults[m], found.robustness[m])]
-            writer.writerow([steps, f"{seconds:.1f}", found.performance, *values])
-    part.replace(path)

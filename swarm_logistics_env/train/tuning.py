@@ -21,7 +21,8 @@ from swarm_logistics_env.train.confirmation import confirm
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate
 from swarm_logistics_env.train.reporting import Report
 from swarm_logistics_env.train.run_record import enter, versions
-from swarm_logistics_env.train.specification import Evaluation, as_scenario
+from swarm_logistics_env.train.settings import Evaluation
+from swarm_logistics_env.train.specification import Seed, as_scenario
 from swarm_logistics_env.warehouse.faults import Fault
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ class Tuning(Record):
     scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
     modes: Annotated[tuple[str, ...], Field(min_length=1)] = ("FM1", "FM2", "FM3", "FM4")
     robots: PositiveInt = 2
-    seed: int = 0
+    seed: Seed = 0
     threads: PositiveInt = 2
     confirm: NonNegativeInt = 30
 
@@ -165,7 +166,7 @@ def _try(study: optuna.Study, asked: Tuning, done: int) -> tuple[float, ...]:
     import optuna
 
     # A sampler for each trial: a search that was cut short goes on as it would have.
-    study.sampler = optuna.samplers.TPESampler(seed=asked.seed * 100_003 + done)
+    study.sampler = optuna.samplers.TPESampler(seed=(asked.seed * 100_003 + done) % 2**32)
     trial = study.ask()
     parameters: dict[str, Any] = {name: trial.suggest_float(name, *RANGES[name]) for name in RANGES}
     needs_faults = asked.objectives != ("P",)

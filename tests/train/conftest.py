@@ -9,7 +9,7 @@ import pytest
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.train import Training
-from swarm_logistics_env.train.specification import Evaluation, PPOSettings, Scores
+from swarm_logistics_env.train.settings import Evaluation, PPOSettings, Scores
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ pytest.importorskip("stable_baselines3")
 
 from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.request import train_as_asked
-from swarm_logistics_env.train.specification import Evaluation, Imitation
+from swarm_logistics_env.train.settings import Evaluation, Imitation
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 
@@ -66,8 +66,8 @@ seeds = 0
 # The command line, but for checkpoints at every update instead of every 20 s.
 SCRIPT = """\
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.train import trainer
-trainer.CHECKPOINT_EVERY = 0.0
+from swarm_logistics_env.train import progress
+progress.CHECKPOINT_EVERY = 0.0
 app()
 """
 
@@ -120,7 +120,7 @@ def test_a_training_that_was_killed_does_not_imitate_again(
         raise Killed
 
     with monkeypatch.context() as changed:
-        changed.setattr(trainer, "_Watch", dies)
+        changed.setattr(trainer, "Progress", dies)
         with pytest.raises(Killed):
             trainer.train(training, tmp_path / "cut")
     monkeypatch.setattr(trainer, "imitate", dies)

@@ -4,7 +4,7 @@ from collections import Counter
 
 from swarm_logistics_env.env import SwarmLogisticsEnv
 from swarm_logistics_env.train.mix import EpisodeMix
-from swarm_logistics_env.train.specification import Conditions
+from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.warehouse import Fault
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.specification import Conditions
+from swarm_logistics_env.train.settings import Conditions
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -45,6 +45,13 @@ def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone(
         ("sizes = [2]\n[[conditions]]\nmodes = ['FM1']", "at most the smallest swarm, 2 robots"),
         ("name = '../x'", "should be of letters, digits"),
         ("[evaluation.faults]\nFM9 = 1", "FM9"),
+        ("[evaluation]\nn_robots = 2\nfaults = { FM1 = 3 }", "FM1 = 3: .* at most n_robots = 2"),
+        ("[evaluation]\nn_robots = 9999", "n_robots = 9999 .* do not fit"),
+        ("[scores]\nmodes = ['FM9']", "no failure mode 'FM9'; did you mean"),
+        ("[scores]\nn_robots = 2\nmodes = ['FM1']", "robots = 3: should be less than n_robots"),
+        ("[imitation]\nseconds = 0.01", "imitation.seconds = 0.01: .* the control period, 0.1 s"),
+        ("[[conditions]]\nonset = [9, 1]", "should be the earliest time, then the latest"),
+        ("seed = -1", "Training.seed = -1: should be greater than or equal to 0"),
         ("[network]\nhidden = [0]", "hidden"),
         ("seed =", "is not TOML"),
     ],

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,15 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.policies.motion_frame import INPUTS
 from swarm_logistics_env.studies.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
 from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
+from swarm_logistics_env.train.request import train_as_asked
 from swarm_logistics_env.train.run_record import simulation
-from swarm_logistics_env.train.specification import Imitation, Scores
+from swarm_logistics_env.train.settings import Imitation, Indicators, Scores
 from swarm_logistics_env.train.trainer import train
 
 
@@ -124,6 +126,47 @@ def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> Non
     train(small(), tmp_path)
     with pytest.raises(TrainingError, match="holds a training with another seed, sizes"):
         train(small(seed=1, sizes=(5, 3)), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("fields", "device", "sentence"),
+    [
+        ({}, "gpu", "device = 'gpu': should be 'cpu' or 'cuda'"),
+        ({}, "cuda", "device = 'cuda': torch finds no GPU here"),
+        ({"indicators": Indicators(weights={"Q": 1.0})}, "cpu", "no indicator 'Q'"),
+        ({"sizes": (3, 900)}, "cpu", "n_robots = 900 .* do not fit"),
+    ],
+)
+def test_nothing_is_begun_that_cannot_be(
+    small: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    fields: dict[str, Any],
+    device: str,
+    sentence: str,
+) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(SwarmLogisticsError, match=sentence):
+        train(small(**fields), tmp_path / "out", device=device)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_no_record_of_a_training_is_refused(small: Any, tmp_path: Path) -> None:
+    for text, reason in (("{}", "it lacks 'training'"), ("", "Expecting value")):
+        (tmp_path / "training.json").write_text(text)
+        with pytest.raises(TrainingError, match=f"is no record of a training: {reason}"):
+            train(small(), tmp_path)
+
+
+@pytest.mark.parametrize("package", ["torch", "tensorboard"])
+def test_a_missing_library_is_told_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, "swarm_logistics_env.train.trainer")
+    with pytest.raises(TrainingError, match=f"{package}.*pip install 'swarm-logistics-env.train.'"):
+        train_as_asked("delivery", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_checkpoint_that_is_cut_short_is_refused(small: Any, tmp_path: Path) -> None:

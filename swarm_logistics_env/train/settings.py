@@ -1,0 +1,223 @@
+"""The tables of a training file: what it mixes, imitates, learns by and measures."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    field_validator,
+    model_validator,
+)
+
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
+from swarm_logistics_env.records import Record
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
+
+Share = Annotated[float, Field(ge=0, le=1)]
+Fraction = Annotated[float, Field(gt=0, le=1)]
+
+
+def _known(modes: tuple[str, ...]) -> tuple[str, ...]:
+    for mode in modes:
+        if mode not in FAILURE_MODES:
+            raise ValueError(f"no failure mode {mode!r}{suggest(mode, FAILURE_MODES)}")
+    return modes
+
+
+Modes = Annotated[tuple[str, ...], AfterValidator(_known)]
+
+
+class Part(Record):
+    """A table of a training, or all of it."""
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
+
+
+class Conditions(Part):
+    """Episodes of one kind, among those that a training mixes.
+
+    Args:
+        weight: how often, relative to the others.
+        modes: failure modes, one of them drawn for each episode; "removed" is the reference P_S.
+        robots: numbers m of faulty robots, one of them drawn.
+        onset: (earliest, latest) time at which they fail [s], drawn evenly.
+        scenario: fields of the scenario with the values that are drawn from.
+    """
+
+    weight: PositiveFloat = 1.0
+    modes: Modes = ()
+    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
+    onset: tuple[NonNegativeFloat, NonNegativeFloat] = (0.0, 0.0)
+    scenario: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
+
+    @field_validator("onset")
+    @classmethod
+    def _ordered(cls, onset: tuple[float, float]) -> tuple[float, float]:
+        if onset[0] > onset[1]:
+            raise ValueError("should be the earliest time, then the latest")
+        return onset
+
+    @field_validator("scenario")
+    @classmethod
+    def _possible(cls, fields: dict[str, list[Any]]) -> dict[str, list[Any]]:
+        for name, values in fields.items():
+            if name == "n_robots":
+                raise ValueError("swarm sizes belong in `sizes` of the training")
+            for value in values:
+                Scenario(**{name: value})
+        return fields
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Every fault of these episodes, at the earliest onset."""
+        return tuple(
+            Fault(mode, m, onset=self.onset[0]) for mode in self.modes for m in self.robots
+        )
+
+
+class Indicators(Part):
+    """Indicators as the reward, see `wrappers.IndicatorReward`.
+
+    Args:
+        weights: "R", "FT", "S", "A" and "P" with their weights.
+        references: "running": means of the episodes played under each condition; P_o [items]; or
+            the directory of a study that holds the performances.
+        window: over how many episodes the means run.
+        initial: P_o before any was measured [items].
+        credit: who is paid for a delivery.
+        constant: whether to pay an indicator's constant.
+    """
+
+    weights: Annotated[dict[str, float], Field(min_length=1)]
+    references: PositiveFloat | str = "running"
+    window: PositiveInt = 50
+    initial: PositiveFloat = 30.0
+    credit: Literal["team", "deliverer", "carriers"] = "team"
+    constant: bool = True
+
+
+class Imitation(Part):
+    """A start from imitating the scripted teacher (`teacher.py`), by DAgger.
+
+    Args:
+        rounds: of play and fit.
+        seconds: of play in a round [s].
+        sizes: swarm sizes that play side by side.
+        teacher_share: of decisions that the teacher takes in the first rounds; later ones 0.
+        noise: standard deviation of what is added to the outputs played, one for each.
+        common_share: of the moments kept in which nothing rare happens.
+        fit, last_fit: gradient steps after a round, and after the last.
+        batch: samples in each.
+        learning_rate: of Adam; a fifth of it in the last 30 % of the steps.
+    """
+
+    rounds: PositiveInt = 6
+    seconds: PositiveFloat = 60.0
+    sizes: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (25, 10, 50, 5, 25, 15, 40)
+    teacher_share: tuple[Share, ...] = (1.0, 0.3)
+    noise: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat] = (0.15, 0.15, 0.05)
+    common_share: Share = 0.12
+    fit: PositiveInt = 1200
+    last_fit: PositiveInt = 3000
+    batch: PositiveInt = 1024
+    learning_rate: PositiveFloat = 2e-3
+
+
+class PPOSettings(Part):
+    """Proximal Policy Optimization (Schulman et al. 2017), as stable-baselines3 has it.
+
+    Args:
+        n_steps: control steps between updates; times the rows of all worlds they make a batch.
+        n_minibatches: the batch is cut into.
+        epochs: over a batch.
+        learning_rate: at the start; it falls linearly to `final_learning_rate`.
+        final_learning_rate: at the end.
+        gamma: discount of a control step.
+        gae_lambda: of generalised advantage estimation (Schulman et al. 2016).
+        clip: how far from 1 the ratio of an action's probabilities pays.
+        entropy, value_weight: weights of these losses beside the policy's.
+        max_grad_norm: gradients longer than that are shortened to it.
+        target_kl: an update stops early beyond 1.5 times that divergence; None: never.
+        deviations: of the outputs' exploration noise at the start, one for each.
+        value_warmup: updates at the start in which the value network alone learns, so that a start
+            from imitation is not spoilt by values that mean nothing yet.
+        value_hidden: widths of the value network, which is not shipped.
+    """
+
+    n_steps: PositiveInt = 128
+    n_minibatches: PositiveInt = 8
+    epochs: PositiveInt = 4
+    learning_rate: PositiveFloat = 3e-4
+    final_learning_rate: NonNegativeFloat = 0.0
+    gamma: Fraction = 0.995
+    gae_lambda: Fraction = 0.95
+    clip: PositiveFloat = 0.2
+    entropy: NonNegativeFloat = 0.0
+    value_weight: NonNegativeFloat = 0.5
+    max_grad_norm: PositiveFloat = 0.5
+    target_kl: PositiveFloat | None = None
+    deviations: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (0.5, 0.5, 0.5)
+    value_warmup: NonNegativeInt = 0
+    value_hidden: tuple[PositiveInt, ...] = (128, 128)
+
+
+class Evaluation(Part):
+    """What is measured on the way, on seeds of its own.
+
+    Args:
+        every: agent-steps between two evaluations.
+        seeds: how many.
+        n_robots: the swarm size.
+        faults: mode -> m, each giving R.
+        keep: which policy the training ends with: the "last", or the "best" seen, by the mean
+            over conditions of P relative to that of the first evaluation.
+    """
+
+    every: PositiveInt = 1_000_000
+    seeds: PositiveInt = 4
+    n_robots: PositiveInt = 25
+    faults: dict[str, PositiveInt] = Field(default_factory=dict)
+    keep: Literal["last", "best"] = "last"
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        for mode, robots in self.faults.items():
+            Fault(mode, robots)
+            if robots > self.n_robots:
+                raise ValueError(
+                    f"faults.{mode} = {robots}: should be at most n_robots = {self.n_robots}"
+                )
+        return self
+
+
+class Scores(Part):
+    """What is measured at the end and written on the card: a study, on seeds 0, 1, ...
+
+    Args:
+        seeds: how many; 0: nothing is measured.
+        sizes: swarm sizes N of which P is measured.
+        modes, robots: failure modes and numbers m of which R and FT are measured, at `n_robots`.
+        n_robots: of the faults.
+    """
+
+    seeds: NonNegativeInt = 30
+    sizes: tuple[PositiveInt, ...] = (5, 10, 25, 50, 100)
+    modes: Modes = ()
+    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
+    n_robots: PositiveInt = 25
+
+    @model_validator(mode="after")
+    def _some_work(self) -> Self:
+        if self.seeds and self.modes and max(self.robots) >= self.n_robots:
+            raise ValueError(
+                f"robots = {max(self.robots)}: should be less than n_robots = {self.n_robots}, "
+                "or no working robot is left"
+            )
+        return self
