@@ -234,6 +234,15 @@ def test_letting_go_of_another_item_in_the_delivery_area_is_ignored(build: Build
     assert world.state.robot_item[0] == NOBODY
 
 
+def test_who_cannot_let_go_keeps_nobody_behind_from_it(build: Build) -> None:
+    robots = [(2.0, 2.0), (4.0, 2.0), (INSIDE, 5.0), (6.0, 2.0)]
+    world = build(robots, [FAR, (4.0, 2.1), (INSIDE, 5.1), (6.0, 2.1)])
+    world.step([STAY, HOLD, HOLD, HOLD])
+    # One has nothing, one holds on, one is in the delivery area, and the last lets go.
+    world.step([OPEN, HOLD, OPEN, OPEN])
+    assert world.state.robot_item.tolist() == [NOBODY, 1, 2, NOBODY]
+
+
 # -- delivering ---------------------------------------------------------------------------------
 
 
