@@ -235,6 +235,7 @@ def _show(asked: Study) -> None:
 
     from swarm_logistics_env.cli.tables import show
     from swarm_logistics_env.studies.reporting.beyond_faults import beyond_faults
+    from swarm_logistics_env.studies.reporting.files import write_report
     from swarm_logistics_env.studies.reporting.images import how_to_get_figures, missing_packages
     from swarm_logistics_env.studies.reporting.sections import sections
 
@@ -242,6 +243,9 @@ def _show(asked: Study) -> None:
     for section in (*sections(findings), *beyond_faults(findings)):
         if section.columns or section.lines:  # else it is a figure
             show(replace(section, figures=()))
-    typer.echo(f"Written: {', '.join(str(path) for path in asked.report())}")
+    assert asked.out is not None
+    # Of the findings that were shown: nothing is read and judged twice.
+    written = write_report(findings, asked.out)
+    typer.echo(f"Written: {', '.join(str(path) for path in written)}")
     if missing := missing_packages():
         typer.echo(how_to_get_figures(missing))
