@@ -101,7 +101,7 @@ def fit_scaling(
     low, high = None, None
     if peak is not None:
         # From below that of the fit, which may be nearly flat.
-        bluntest = min(-_SHARPNESS, sharpness_of(law, fitted, peak) - _SHARPNESS)
+        bluntest = min(-_SHARPNESS, sharpness_of(law, fitted, peak) - 5.0)
         low, high = _peak_limits(law, peak, bluntest, residual_sum, n, observed, weights, level)
     names = ("g", "a", "b") if law == "usl" else ("k", "p", "q")
     return ScalingFit(
