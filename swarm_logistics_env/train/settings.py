@@ -74,13 +74,6 @@ class Conditions(Part):
                 Scenario(**{name: value})
         return fields
 
-    @property
-    def faults(self) -> tuple[Fault, ...]:
-        """Every fault of these episodes, at the earliest onset."""
-        return tuple(
-            Fault(mode, m, onset=self.onset[0]) for mode in self.modes for m in self.robots
-        )
-
 
 class Indicators(Part):
     """Indicators as the reward, see `wrappers.IndicatorReward`.
