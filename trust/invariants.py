@@ -62,6 +62,14 @@ class Watch:
                          "item_status")
         }  # fmt: skip
 
+    def faults_changed(self) -> None:
+        """Note that faults were set since the last look: what was repaired may come back at once."""
+        now = self.world.state.failure_modes
+        self._modes = tuple(
+            tuple(name for name in before if name in after)
+            for before, after in zip(self._modes, now)
+        )
+
     def _demand(self, holds: bool, words: str) -> None:
         # Every comparison is written so that a number that is none fails it.
         if not holds:

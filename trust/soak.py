@@ -78,6 +78,7 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
         for _ in range(steps):
             if source.random() < 3.0 / steps:
                 _disturb(source, world, seconds)
+                watch.faults_changed()
             observations = world.step(steer(world, observations))
             watch.look()
             tally.steps += 1

@@ -37,6 +37,22 @@ def test_the_soak_says_how_far_it_went() -> None:
     assert "of 12 worlds" in done.stdout
 
 
+def test_the_watch_accuses_nobody_who_was_repaired_for_a_moment() -> None:
+    world = Warehouse(Scenario(n_robots=1))
+    world.reset(0, [Fault("dead", (0,))])
+    watch, heading = Watch(world), float(world.state.robot_heading[0])
+    watch.look()
+    world.set_faults([Fault("dead", (0,), onset=0.5 * world.scenario.control_period)])
+    watch.faults_changed()
+    world.step([[0.0, 0.0, 1.0, 0.0]])
+    assert world.state.robot_heading[0] != heading
+    watch.look()
+    # Without a change in between it may not turn.
+    world.state.robot_heading[0] += 0.1
+    with pytest.raises(BrokenPromiseError, match="turns"):
+        watch.look()
+
+
 Spoil = Callable[[Warehouse], None]
 
 
