@@ -380,5 +380,5 @@ def test_failed_runs_give_exit_code_1_and_a_report(tmp_path: Path) -> None:
     )
     assert done.returncode == 1, done.stderr
     # 32 conditions of the broken policy and the ablation's two, which stand.
-    assert "32 failed" in done.stdout
+    assert "32 failed, the first with RuntimeError: a wheel came off; " in done.stdout
     assert "1 of 1 runs failed" in (out / "report.md").read_text()

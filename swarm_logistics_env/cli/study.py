@@ -224,9 +224,10 @@ def _run(asked: Study, engine: Engine, shard: Shard | None) -> Tally:
 
 def _told(tally: Tally, players: str) -> str:
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
+    why = f", the first with {tally.error}; study export has each traceback" if tally.error else ""
     return (
         f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
-        f"were kept from before; {tally.failed} failed"
+        f"were kept from before; {tally.failed} failed{why}"
     )
 
 

@@ -34,12 +34,14 @@ class Tally:
     Attributes:
         played: runs played now; failed: those of them that failed; kept: found in the store.
         seconds: wall-clock time [s].
+        error: what the first that failed raised, without its traceback; None: none failed.
     """
 
     played: int
     failed: int
     kept: int
     seconds: float
+    error: str | None = None
 
 
 class Study:
@@ -178,12 +180,17 @@ class Study:
             runs = [run for run in whole if run.key not in done]
             kept = len(whole) - len(runs)
             finished = engine(runs)
+            first_error = None
             # Closed at once where this stops early, so that no worker outlives it.
             with closing(finished), Progress(runs, self.specification.name) as progress:
                 for run, outcome in finished:
                     store.add(run, outcome)
                     progress.advance(run, outcome)
-                return Tally(progress.done.total(), progress.failed, kept, progress.seconds)
+                    if outcome.error is not None and first_error is None:
+                        first_error = outcome.error.strip().splitlines()[-1]
+                return Tally(
+                    progress.done.total(), progress.failed, kept, progress.seconds, first_error
+                )
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.

@@ -262,6 +262,7 @@ def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:
     study = Study(out=tmp_path, **fields)
     tally = study.run()
     assert tally.failed == tally.played == 9
+    assert tally.error == "RuntimeError: a wheel came off"
     errors = study.results()["error"]
     assert errors.str.contains("RuntimeError: a wheel came off").all()
     assert errors.str.contains("Traceback").all()
