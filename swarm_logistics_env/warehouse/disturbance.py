@@ -20,6 +20,7 @@ def disturb(
     ranger_noise: float,
     position_noise: float,
     dropout: float,
+    ranger_range: NDArray[np.float64],
     full_range: float,
     view_range: float,
     far: float,
@@ -27,19 +28,21 @@ def disturb(
 ) -> None:
     """Add Gaussian noise to beams and positions of rows (N, D), and drop beams, in place.
 
-    A beam that is dropped reports `full_range`. What is measured stays within the column's range.
+    A beam that is dropped reports what one does that meets nothing: the robot's own range (N,), or
+    `full_range` if that is 0. What is measured stays within the column's range.
     """
     for robot in range(rows.shape[0]):
         if not present[robot]:
             continue
         out = rows[robot]
+        reach = ranger_range[robot] if ranger_range[robot] > 0.0 else full_range
         first = step * (2 * _SCANS + _POSITIONS)
         for beam in range(_SCANS):
             if dropout > 0.0 and uniform(keys[robot], 2 * (first + _SCANS + beam)) < dropout:
-                out[beam] = full_range
-            elif ranger_noise > 0.0 and out[beam] < full_range:
+                out[beam] = reach
+            elif ranger_noise > 0.0 and out[beam] < np.float32(reach):
                 noisy = out[beam] + ranger_noise * gaussian(keys[robot], first + beam)
-                out[beam] = min(max(noisy, 0.0), full_range)
+                out[beam] = min(max(noisy, 0.0), reach)
         if position_noise > 0.0:
             first += 2 * _SCANS
             for thing in range(row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1):

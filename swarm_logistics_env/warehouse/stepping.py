@@ -270,7 +270,8 @@ def perceive(
     if not is_exact or constants[SENSOR_DROPOUT] > 0.0:
         disturb(
             flags[at.PRESENT], keys, step, constants[RANGER_NOISE], constants[POSITION_NOISE],
-            constants[SENSOR_DROPOUT], constants[RANGER_RANGE], constants[VIEW_RANGE],
+            constants[SENSOR_DROPOUT], numbers[at.RANGER_RANGE], constants[RANGER_RANGE],
+            constants[VIEW_RANGE],
             max(constants[VIEW_RANGE], constants[RADIO_RANGE]), rows,
         )  # fmt: skip
     return anchored
