@@ -63,7 +63,7 @@ class Watch:
         }  # fmt: skip
 
     def faults_changed(self) -> None:
-        """Note that faults were set since the last look: what was repaired may come back at once."""
+        """Note that faults were set: what was repaired may come back within the next step."""
         now = self.world.state.failure_modes
         self._modes = tuple(
             tuple(name for name in before if name in after)
