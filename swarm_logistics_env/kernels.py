@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import math
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import ParamSpec, TypeVar, cast
@@ -43,9 +45,23 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     # other files that were compiled into it. So their digest goes into the name of the cache.
     name = function.__qualname__
     function.__qualname__ = f"{name}-{_SOURCES}"
-    compiled = numba.njit(function, cache=True, nogil=True, error_model="numpy")
+    try:
+        compiled = numba.njit(function, cache=True, nogil=True, error_model="numpy")
+    except RuntimeError:
+        # Neither the installation nor the user's own folder can be written.
+        _warn_of_no_cache()
+        compiled = numba.njit(function, nogil=True, error_model="numpy")
     function.__qualname__ = name
     return cast("Callable[P, R]", compiled)
+
+
+@functools.cache
+def _warn_of_no_cache() -> None:
+    warnings.warn(
+        "compiled code can be kept nowhere, so every process compiles for itself, which takes "
+        "half a minute: set NUMBA_CACHE_DIR to a folder that can be written",
+        stacklevel=4,
+    )
 
 
 @kernel
