@@ -33,8 +33,9 @@ def test_the_soak_says_how_far_it_went() -> None:
     command = [sys.executable, "-m", "trust.soak", "--worlds", "12", "--steps", "50"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.startswith("no promise broken: ")
-    assert "of 12 worlds" in done.stdout
+    last = done.stdout.splitlines()[-1]  # a slow machine tells of every minute before
+    assert last.startswith("no promise broken: ")
+    assert "of 12 worlds" in last
 
 
 def test_the_watch_accuses_nobody_who_was_repaired_for_a_moment() -> None:
@@ -50,6 +51,25 @@ def test_the_watch_accuses_nobody_who_was_repaired_for_a_moment() -> None:
     # Without a change in between it may not turn.
     world.state.robot_heading[0] += 0.1
     with pytest.raises(BrokenPromiseError, match="turns"):
+        watch.look()
+
+
+@pytest.mark.parametrize("heavy", [False, True])
+def test_a_crowd_presses_nobody_out_who_drives_at_most_0_8_radii_a_physics_step(
+    heavy: bool,
+) -> None:
+    scenario = Scenario(
+        n_robots=34, n_items=2, warehouse_width=2.4, warehouse_height=3.6, delivery_width=0.25,
+        restock=True, robot_radius=0.1, robot_mass=22.0 if heavy else 1.0, max_speed=1.6,
+        physics_period=0.05, control_period=0.25, item_radius=0.04,
+    )  # fmt: skip
+    world = Warehouse(scenario)
+    world.reset(0)
+    watch, rng = Watch(world), np.random.default_rng(0)
+    for step in range(150):
+        if step % 10 == 0:
+            commands = rng.uniform(-1.5, 1.5, (34, 4)) if step % 20 else np.full((34, 4), 1.0)
+        world.step(commands)
         watch.look()
 
 
