@@ -239,6 +239,8 @@ def test_policies_are_set_against_the_first() -> None:
     assert first.cell.performance.tolist() == [20, 22, 24, 26] * 2
     assert (first.interquartile_mean, first.worst_decile) == (23.0, 20.0)
     assert second.difference == spi.mean_interval([20, 22, 24, 26] * 2)
+    assert first.ratio is None
+    assert second.ratio == pytest.approx((2.0, 2.0, 2.0))
     assert second.improvement is not None
     assert second.improvement.value == 1.0
     # Twice the deliveries everywhere leaves every ratio as it was.
@@ -249,6 +251,17 @@ def test_policies_are_set_against_the_first() -> None:
     assert "Policies compared" in titles
     alone = judge(Study(sizes=[{"values": [5, 10]}]).plan(), {}, declared_seeds=20)
     assert "Policies compared" not in {chapter.title for chapter in document(alone).chapters}
+
+
+def test_nothing_is_a_multiple_of_no_deliveries() -> None:
+    study = Study(policies=["swarm-dt", "random-walk"], seeds=3, sizes=[{"values": [5, 10]}])
+
+    def play(policy: str, level: Level, seed: int) -> Outcome:
+        return Outcome("", np.arange(0.0 if policy == "swarm-dt" else 2.0 + seed), 500.0)
+
+    *_, last = cell_contests(judged(study, play))["Scalability"]
+    assert (last.cell.policy, last.ratio) == ("random-walk", None)
+    assert last.difference is not None
 
 
 def test_several_policies_over_one_seed_give_values_alone() -> None:

@@ -24,6 +24,8 @@ class CellContest:
         interquartile_mean, worst_decile: of its P [items].
         difference: its P less the baseline's, paired by seed, with 95 % interval [items]; None
             for the baseline itself, or where runs are missing or share no seeds.
+        ratio: its mean P as a multiple of the baseline's, with Fieller's 95 % interval; None as
+            above, and where the baseline delivers nothing.
         improvement: share of seeds on which it delivers more, ties counting half; None as above.
     """
 
@@ -31,6 +33,7 @@ class CellContest:
     interquartile_mean: float
     worst_decile: float
     difference: Interval | None
+    ratio: Interval | None
     improvement: Interval | None
 
 
@@ -74,18 +77,29 @@ def cell_contests(findings: Findings) -> dict[str, list[CellContest]]:
 
 
 def _cell_contest(findings: Findings, cell: Cell, baseline: Cell | None) -> CellContest:
-    difference = improvement = None
+    difference = ratio = improvement = None
     comparable = baseline is not None and not (cell.problem or baseline.problem)
     if baseline is not None and baseline is not cell and comparable and findings.plan.paired:
         difference = difference_interval(baseline.performance, cell.performance)
+        ratio = _ratio(baseline.performance, cell.performance)
         improvement = spi.probability_of_improvement(baseline.performance, cell.performance)
     return CellContest(
         cell,
         spi.interquartile_mean(cell.performance),
         spi.worst_decile(cell.performance),
         difference,
+        ratio,
         improvement,
     )
+
+
+def _ratio(baseline: NDArray[np.float64], performance: NDArray[np.float64]) -> Interval | None:
+    try:
+        change = spi.relative_change(baseline, performance)
+    except spi.IndicatorError:  # nothing to divide by
+        return None
+    low, high = (None if limit is None else 1.0 + limit for limit in (change.low, change.high))
+    return Interval(1.0 + change.value, low, high)
 
 
 def indicator_contests(findings: Findings) -> Iterator[IndicatorContest]:

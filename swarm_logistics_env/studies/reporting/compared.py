@@ -26,8 +26,8 @@ _HOW_TO_READ = (
     (
         "P: IQM is the mean without the lowest and the highest quarter of the seeds, worst tenth "
         "the mean of the lowest tenth, rounded up to whole seeds. Differences are paired by seed "
-        "(t-interval); the last column is the share of seeds with more deliveries, ties counting "
-        "half (Wilson)."
+        "(t-interval), and so are ratios of mean P (Fieller); the last column is the share of "
+        "seeds with more deliveries, ties counting half (Wilson)."
     ),
 )
 
@@ -108,6 +108,7 @@ def _cells(table: str, contests: list[CellContest], baseline: str) -> Section:
             f"{contest.interquartile_mean:.1f}",
             f"{contest.worst_decile:.1f}",
             wording.bracketed(contest.difference, 1),
+            wording.bracketed(contest.ratio, 2),
             wording.bracketed(contest.improvement, 2),
         )
         for contest in contests
@@ -116,7 +117,8 @@ def _cells(table: str, contests: list[CellContest], baseline: str) -> Section:
         f"P side by side: {table}",
         (
             "condition", "policy", "mean P [95 %]", "IQM of P", "worst tenth",
-            f"P - {baseline}'s [95 %]", f"delivers more than {baseline} [95 %]",
+            f"P - {baseline}'s [95 %]", f"P / {baseline}'s [95 %]",
+            f"delivers more than {baseline} [95 %]",
         ),
         rows,
     )  # fmt: skip
