@@ -8,7 +8,13 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import IndicatorError
-from swarm_logistics_env.spi.scaling_laws import Law
+from swarm_logistics_env.spi.scaling_laws import (
+    CURVES,
+    Law,
+    peak_of,
+    shapes_with_peak_at,
+    sharpness_of,
+)
 
 SIZES = np.array([5, 10, 20, 30, 40, 50, 60, 100, 150])
 TABLE_I = np.array([9, 18, 29, 33, 45, 56, 65, 74, 69])
@@ -78,6 +84,21 @@ def test_an_exact_law_is_recovered(law: Law, truth: tuple[float, ...], peak: flo
     assert (fit.peak_low, fit.peak_high) == pytest.approx((peak, peak), rel=1e-3)
     better, _ = spi.compare_scaling(n, p)
     assert better.law == law
+
+
+@pytest.mark.parametrize(
+    ("law", "parameters"),
+    [("usl", [3.0, 0.02, 1e-3]), ("power_exponential", [1.2, 0.95, 0.0077])],
+)
+def test_a_curve_is_made_again_from_its_peak_and_sharpness(
+    law: Law, parameters: list[float]
+) -> None:
+    fitted, n = np.array(parameters), SIZES.astype(np.float64)
+    peak = peak_of(law, fitted)
+    assert peak is not None
+    sharpness = np.array([sharpness_of(law, fitted, peak)])
+    factor = CURVES[law](fitted, n) / shapes_with_peak_at(law, peak, sharpness, n)[0]
+    np.testing.assert_allclose(factor, factor[0], rtol=1e-9)
 
 
 def test_the_interval_of_the_peak_covers() -> None:

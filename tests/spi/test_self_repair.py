@@ -129,6 +129,15 @@ def test_each_run_on_its_own_is_timed_or_censored() -> None:
         spi.repair_times(faulty, reference[:2], onset=ONSET, end=END)
 
 
+def test_faults_may_begin_with_the_run() -> None:
+    reference = regular(2)
+    seconds, back = spi.repair_times(
+        without(reference, 0, 300), reference, onset=0.0, end=END, window=100.0
+    )
+    assert back.all()
+    assert seconds == pytest.approx([390, 390], abs=6)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
