@@ -80,6 +80,7 @@ def test_an_exact_law_is_recovered(law: Law, truth: tuple[float, ...], peak: flo
     )  # fmt: skip
     fit = spi.fit_scaling(n, p, law=law)
     assert tuple(fit.parameters.values()) == pytest.approx(truth, rel=1e-5)
+    assert list(fit.parameters) == (["g", "a", "b"] if law == "usl" else ["k", "p", "q"])
     assert fit.peak == pytest.approx(peak, rel=1e-5)
     assert (fit.peak_low, fit.peak_high) == pytest.approx((peak, peak), rel=1e-3)
     better, _ = spi.compare_scaling(n, p)
