@@ -21,6 +21,8 @@ from swarm_logistics_env.records import Record
 DENSEST_COVER = 0.4
 # Numbers beyond these do not survive in float32 observations, or vanish when squared.
 SMALLEST, LARGEST = 1e-9, 1e9
+# Of its radius, what a robot may drive in one physics step: further, crowds press it through walls.
+LONGEST_STRIDE = 0.8
 MOST_SUBSTEPS = 1000
 
 
@@ -189,11 +191,12 @@ class Scenario(Record):
                 f"control_period = {self.control_period} s should be a whole multiple of "
                 f"physics_period = {self.physics_period} s"
             )
-        if self.max_speed * self.physics_period > self.robot_radius:
+        longest = LONGEST_STRIDE * self.robot_radius / self.max_speed
+        if self.physics_period > longest * (1.0 + 1e-9):
             raise ValueError(
                 f"physics_period = {self.physics_period} s lets a robot cross "
                 f"{self.max_speed * self.physics_period:g} m between two collision checks: should "
-                f"be at most robot_radius / max_speed = {self.robot_radius / self.max_speed:g} s"
+                f"be at most {LONGEST_STRIDE} robot_radius / max_speed = {longest:g} s"
             )
         if self.duration < self.control_period:
             raise ValueError(

@@ -104,7 +104,7 @@ def test_every_wrong_field_is_named_at_once() -> None:
         ),
         (
             {"physics_period": 0.1},
-            r"physics_period = 0.1 s lets a robot cross 0.2 m .* at most .* 0.0625 s",
+            r"physics_period = 0.1 s lets a robot cross 0.2 m .* at most .* 0.05 s",
         ),
         ({"duration": 0.05}, "duration = 0.05 s should be at least one control_period"),
     ],

@@ -16,8 +16,6 @@ from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STOR
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
 FINE = 0.02  # [s]: with longer physics periods a jam may be deeper in proportion
 JAM = 1.0  # [s] of overlap without a break make a jam
-STRIDE = 0.8  # radii: a robot that drives further in one physics step may be pressed out
-PRESSED_OUT = 0.3  # radii that its centre is out by then at most
 _TOUCH = 0.01  # [m]
 SLACK = 0.002  # [m]: the solver's slop and its push-out
 
@@ -123,10 +121,8 @@ class Watch:
             "close in one substep, beyond the depth of a jam",
         )
         lost = radius + scenario.item_radius
-        strides = closing / 2.0 > STRIDE * radius * (1.0 + 1e-9)
-        pressed = PRESSED_OUT * radius if strides else 0.0
         outside = np.maximum(-at, at - far).max(axis=1)[here]
-        self._demand(bool((outside < np.where(free, pressed, lost)[here]).all()), "a robot is out")
+        self._demand(bool((outside < np.where(free, 0.0, lost)[here]).all()), "a robot is out")
         self.deepest = max(self.deepest, deepest)
         # For how long each pair is deeper than it may be in a jam.
         if self._jammed.shape != depth.shape:

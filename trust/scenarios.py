@@ -7,6 +7,7 @@ from typing import Any
 
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.errors import ScenarioError
+from swarm_logistics_env.scenario import LONGEST_STRIDE
 from swarm_logistics_env.warehouse import FAILURE_MODES
 
 # Lengths are drawn around the robot's own, so that things meet; the rest within what may be built.
@@ -56,7 +57,7 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "n_obstacles": rarely(source.randint(1, 6), 0),
         "obstacle_radius": number(0.05, 0.6),
         "robot_mass": number(0.1, 50.0),
-        "max_speed": min(number(0.2, 4.0), radius / physics_period),
+        "max_speed": min(number(0.2, 4.0), LONGEST_STRIDE * radius / physics_period),
         "max_acceleration": number(0.5, 40.0),
         "max_turn_rate": number(0.5, 20.0),
         "ranger_range": number(0.2, 6.0),

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import trust
 from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.scenario import LONGEST_STRIDE
 from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED
 from trust.invariants import BrokenPromiseError, Watch
 from trust.soak import Tally, play
@@ -55,14 +56,13 @@ def test_the_watch_accuses_nobody_who_was_repaired_for_a_moment() -> None:
 
 
 @pytest.mark.parametrize("heavy", [False, True])
-def test_a_crowd_presses_nobody_out_who_drives_at_most_0_8_radii_a_physics_step(
-    heavy: bool,
-) -> None:
+def test_a_crowd_presses_nobody_out_at_the_longest_stride(heavy: bool) -> None:
     scenario = Scenario(
         n_robots=34, n_items=2, warehouse_width=2.4, warehouse_height=3.6, delivery_width=0.25,
         restock=True, robot_radius=0.1, robot_mass=22.0 if heavy else 1.0, max_speed=1.6,
         physics_period=0.05, control_period=0.25, item_radius=0.04,
     )  # fmt: skip
+    assert scenario.max_speed * scenario.physics_period == LONGEST_STRIDE * scenario.robot_radius
     world = Warehouse(scenario)
     world.reset(0)
     watch, rng = Watch(world), np.random.default_rng(0)
