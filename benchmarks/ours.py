@@ -17,7 +17,7 @@ from swarm_logistics_env.policies.policy import start
 
 FLOOR, ARRAYS = "pymunk floor", "env.step_arrays"
 _STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
-_WORLDS, _STEPS_OF_WORLDS = 8, 250
+_WORLDS, _STEPS_OF_WORLDS = 8, 1000
 SENSES = "all sensors, logistics, timers"
 
 
