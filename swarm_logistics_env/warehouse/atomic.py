@@ -31,26 +31,19 @@ def load(typing_context: Any, address: types.Type) -> Any:
     return types.int64(types.int64), generate
 
 
-@_generated
-def exchange(typing_context: Any, address: types.Type, value: types.Type) -> Any:
-    """Put an integer at `address`; returns what was there."""
+def _changed_by(operation: str) -> Callable[..., int]:
+    def typed(typing_context: Any, address: types.Type, value: types.Type) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            where, given = values
+            return builder.atomic_rmw(operation, _there(builder, where), given, _IN_ORDER)
 
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        where, new = values
-        return builder.atomic_rmw("xchg", _there(builder, where), new, _IN_ORDER)
+        return types.int64(types.int64, types.int64), generate
 
-    return types.int64(types.int64, types.int64), generate
+    return _generated(typed)
 
 
-@_generated
-def add(typing_context: Any, address: types.Type, value: types.Type) -> Any:
-    """Add to the integer at `address`; returns what was there before."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        where, more = values
-        return builder.atomic_rmw("add", _there(builder, where), more, _IN_ORDER)
-
-    return types.int64(types.int64, types.int64), generate
+# Of an address and an integer, which is put there or added; both return what was there before.
+exchange, add = _changed_by("xchg"), _changed_by("add")
 
 
 @_generated

@@ -115,8 +115,9 @@ class Warehouse:
         given, rows = self._checked(commands), self._blank_rows()
         state = self.state
         outcome = stepping.step(
-            self._tables.addresses, given, state.step + 1, state.requested, self._pauses(), rows
-        )
+            self._tables.addresses, given, state.step + 1, state.requested,
+            self._is_fault_due(self._next_time()), rows,
+        )  # fmt: skip
         return self.arrive(given, rows, outcome)
 
     def order(self) -> tuple[int, int, int, int, int, bool]:
@@ -133,7 +134,7 @@ class Warehouse:
         state, tables = self.state, self._tables
         return (
             tables.where, len(tables.addresses), len(state.robot_position), state.step + 1,
-            state.requested, self._pauses(),
+            state.requested, self._is_fault_due(self._next_time()),
         )  # fmt: skip
 
     def arrive(
@@ -151,15 +152,15 @@ class Warehouse:
             raise CommandError(
                 f"commands[{bad[0]}, {bad[1]}] = {commands[bad[0], bad[1]]}: should be finite"
             )
-        is_fault_due = self._pauses()
         self._log.append(commands)
         self._rows, state.step, state.time = rows, state.step + 1, self._next_time()
+        anchored = outcome
         if outcome == stepping.TO_BE_PERCEIVED:
             self._deliver()
-            if is_fault_due:
+            if self._is_fault_due(state.time):
                 self._apply_faults()
-            outcome = self._perceive()
-        state.anchoring_seconds += outcome * scenario.control_period
+            anchored = self._perceive()
+        state.anchoring_seconds += anchored * scenario.control_period
         if len(self._log) >= self._longest_log:
             self._remember()
         return rows
@@ -364,9 +365,9 @@ class Warehouse:
     def _next_time(self) -> float:
         return (self.state.step + 1) * self.scenario.control_period
 
-    def _pauses(self) -> bool:
-        """Return whether a fault begins or ends with the next step."""
-        return bool(self._fault_times) and self._fault_times[0] <= self._next_time() + 5e-7
+    def _is_fault_due(self, time: float) -> bool:
+        """Return whether a fault begins or ends until then [s]."""
+        return bool(self._fault_times) and self._fault_times[0] <= time + 5e-7
 
     def _perceive(self) -> int:
         state = self.state
