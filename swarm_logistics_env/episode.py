@@ -59,7 +59,7 @@ def run_episode(
 
     Raises:
         FaultError: a fault names robots that are not there.
-        PolicyError: the policy returned commands of the wrong shape, or not finite.
+        PolicyError: `policy` is none, or returned commands of the wrong shape, or not finite.
 
     Example:
         >>> from swarm_logistics_env import policies

@@ -8,6 +8,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from swarm_logistics_env.errors import SwarmLogisticsError, suggest
 
+_OTHER_KIND = ("int_type", "tuple_type")
+
 
 class Record(BaseModel):
     """A frozen, hashable set of named values that cannot be wrong.
@@ -57,6 +59,9 @@ class Record(BaseModel):
         # Of a list that lost its bad items: that it is too short is no news.
         deeper = {problem["loc"][:-1] for problem in found}
         found = [p for p in found if p["type"] != "too_short" or p["loc"] not in deeper]
+        # Of a number or a list: that it is not the other, where what is wrong with the one is told.
+        told = {p["loc"][:1] for p in found if p["type"] not in _OTHER_KIND}
+        found = [p for p in found if p["type"] not in _OTHER_KIND or p["loc"][:1] not in told]
         problems = (cls._problem(problem) for problem in found)
         return "; ".join(dict.fromkeys(problems))
 

@@ -137,6 +137,12 @@ def test_a_policy_that_returns_no_commands_is_named(commands: Any, complaint: st
         run_episode(Scenario(n_robots=2), Broken(commands), seed=0)
 
 
+def test_what_is_no_policy_is_refused() -> None:
+    name: Any = "swarm-dt"
+    with pytest.raises(PolicyError, match=r"'swarm-dt': should have .* policies\.load\(name\)"):
+        run_episode(Scenario(), name, seed=0)
+
+
 def test_faults_of_robots_that_are_not_there_are_refused() -> None:
     with pytest.raises(FaultError):
         run_episode(Scenario(n_robots=2), policies.load("swarm-dt"), 0, [Fault("FM1", 3)])

@@ -71,7 +71,7 @@ spoiled = st.tuples(
 faults = st.builds(
     Fault,
     st.sampled_from(sorted(FAILURE_MODES)),
-    st.integers(1, 3) | st.lists(st.integers(0, 4), min_size=1, max_size=2),
+    st.integers(1, 3) | st.lists(st.integers(0, 4), min_size=1, max_size=2, unique=True),
     onset=st.floats(0.0, 0.4),
 )
 commands = st.lists(st.floats(-2, 2) | odd_numbers, min_size=4, max_size=4)

@@ -16,8 +16,6 @@ from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STOR
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
 FINE = 0.02  # [s]: with longer physics periods a jam may be deeper in proportion
 JAM = 1.0  # [s] of overlap without a break make a jam
-_TOUCH = 0.01  # [m]
-SLACK = 0.002  # [m]: the solver's slop and its push-out
 
 
 class BrokenPromiseError(AssertionError):
@@ -43,13 +41,13 @@ class Watch:
         self._modes: tuple[tuple[str, ...], ...] = ()
         self._before: dict[str, NDArray[Any]] = {}
         self._jammed = np.zeros((0, 0))
-        self._were_shoved = self._pushed = np.zeros(world.state.n_robots, np.bool_)
+        self._covered = np.zeros(len(world.state.item_position), np.bool_)
 
     def look(self) -> None:
         """Check everything."""
         self._items()
+        self._cover()
         self._bodies()
-        self._laden_and_items()
         self._timers()
         self._capabilities()
         self._rows()
@@ -58,17 +56,21 @@ class Watch:
         self._speed = float(self.world.scenario.max_speed)
         self._before = {
             name: getattr(state, name).copy()
-            for name in ("robot_item", "robot_position", "robot_heading", "item_position",
-                         "item_status")
+            for name in ("robot_item", "robot_present", "robot_position", "robot_heading",
+                         "item_position", "item_status")
         }  # fmt: skip
 
     def faults_changed(self) -> None:
-        """Note that faults were set: what was repaired may come back within the next step."""
+        """Note that faults were set: what was repaired may come back within the next step.
+
+        Who was removed is above nothing when it begins.
+        """
         now = self.world.state.failure_modes
         self._modes = tuple(
             tuple(name for name in before if name in after)
             for before, after in zip(self._modes, now)
         )
+        self._before["robot_item"][~self.world.state.robot_present] = NOBODY
 
     def _demand(self, holds: bool, words: str) -> None:
         # Every comparison is written so that a number that is none fails it.
@@ -92,10 +94,8 @@ class Watch:
         times = np.array(state.delivery_times)
         self._demand(bool((np.diff(times) >= 0.0).all()), "delivery times fall")
         far = np.array([scenario.warehouse_width, scenario.warehouse_height])
-        # As far out as a robot that was shoved may have put it down.
-        out = scenario.item_radius + scenario.robot_radius
         here = state.item_position[state.item_status == STORED]
-        self._demand(bool(((here > -out) & (here < far + out)).all()), "an item lies outside")
+        self._demand(bool(((here > 0.0) & (here < far)).all()), "an item lies outside")
 
     def _bodies(self) -> None:
         scenario, state = self.world.scenario, self.world.state
@@ -108,72 +108,73 @@ class Watch:
         to_solids -= radius + scenario.obstacle_radius
         far = np.array([scenario.warehouse_width, scenario.warehouse_height])
         to_walls = np.hstack([at, far - at]) - radius
-        depth = np.hstack([np.where(off, -np.inf, -gaps), -to_solids, -to_walls])
+        to_items = np.linalg.norm(at[:, None] - state.item_position[None], axis=2)
+        to_items -= radius + scenario.item_radius
+        solid = (state.item_status == STORED) & ~self._covered
+        met = (state.robot_item != NOBODY)[:, None] & solid
+        depth = np.hstack(
+            [
+                np.where(off, -np.inf, -gaps),
+                -to_solids,
+                -to_walls,
+                np.where(met, -to_items, -np.inf),
+            ]
+        )
         depth[~here] = -np.inf
         # The speed of the last step is that before or after a change.
         closing = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period
         jam = SUSTAINED * max(1.0, scenario.physics_period / FINE)
-        free = ~self._shoved(depth)
-        deepest = float(depth[free].max(initial=-np.inf))
+        deepest = float(depth.max(initial=-np.inf))
         self._demand(
             deepest <= closing + jam,
             f"bodies overlap by {deepest:.4f} m: should be at most {closing:.4f} m, what they "
             "close in one substep, beyond the depth of a jam",
         )
-        lost = radius + scenario.item_radius
-        outside = np.maximum(-at, at - far).max(axis=1)[here]
-        self._demand(bool((outside < np.where(free, 0.0, lost)[here]).all()), "a robot is out")
+        inside = np.minimum(at, far - at).min(axis=1)[here]
+        self._demand(bool((inside > 0.0).all()), "a robot is out")
         self.deepest = max(self.deepest, deepest)
         # For how long each pair is deeper than it may be in a jam.
         if self._jammed.shape != depth.shape:
             self._jammed = np.zeros(depth.shape)
-        deep = (depth > jam) & free[:, None]
-        self._jammed = np.where(deep, self._jammed + scenario.control_period, 0.0)
+        self._jammed = np.where(depth > jam, self._jammed + scenario.control_period, 0.0)
         lasting = float(depth[self._jammed > JAM].max(initial=0.0))
         self._demand(
             lasting == 0.0,
             f"bodies overlap by more than {jam:.3f} m for {JAM} s, now by {lasting:.4f} m",
         )
 
-    def _shoved(self, depth: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which robots an item may push into others, (N,): no room, no way to be solid.
+    def _cover(self) -> None:
+        """Note which items are no obstacles: (I,), by the rule and not by what the world says.
 
-        A robot that takes an item while it stands above another is pushed off that one, and with
-        it those that it touches, and those that they touch.
+        Those that were put where they are, and those that a robot stood above when it took
+        another; until a step begins with no laden robot above.
         """
-        scenario, state = self.world.scenario, self.world.state
-        stored = state.item_position[state.item_status == STORED]
-        away = np.linalg.norm(state.robot_position[:, None] - stored[None], axis=2)
-        above = (away < scenario.robot_radius + scenario.item_radius - SLACK).any(axis=1)
-        above &= state.robot_item != NOBODY
-        touching = depth[:, : len(above)] > -2.0 * _TOUCH
-        self._pushed = _reached(self._were_shoved, touching)
-        shoved = _reached(above | self._were_shoved, touching)
-        # Out of each other it goes slowly, whether or not the item is still there.
-        self._were_shoved = above | (shoved & (depth > SLACK).any(axis=1))
-        return shoved
-
-    def _laden_and_items(self) -> None:
-        """A laden robot enters no item that it was not above when it took its own."""
-        scenario, state, before = self.world.scenario, self.world.state, self._before
-        if not before:
-            return
-        laden = (state.robot_item != NOBODY) & (state.robot_item == before["robot_item"])
-        laden &= ~self._pushed
-        free = (state.item_status == STORED) & (before["item_status"] == STORED)
-        free &= (state.item_position == before["item_position"]).all(axis=1)
-        radii = scenario.robot_radius + scenario.item_radius
-        then, now = (
-            radii - np.linalg.norm(at[laden][:, None] - state.item_position[free][None], axis=2)
-            for at in (before["robot_position"], state.robot_position)
-        )
-        # Others may push it on while it is being pushed off.
-        allowed = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period + SLACK
-        deeper = now - np.maximum(then, 0.0)
+        state, before = self.world.state, self._before
+        stored = state.item_status == STORED
+        if before:
+            self._covered &= self._above(before, before["robot_item"] != NOBODY).any(axis=0)
+            took = (state.robot_item != before["robot_item"]) & (state.robot_item != NOBODY)
+            # Those too that delivered at once what they took.
+            for robot in state.delivered_by[self._count.delivered if self._count else 0 :]:
+                took[robot] |= before["robot_item"][robot] == NOBODY
+            put = (before["item_status"] != STORED) | (
+                state.item_position != before["item_position"]
+            ).any(axis=1)
+            self._covered |= put | self._above(vars(state), took).any(axis=0)
+            if (before["robot_present"] & ~state.robot_present).any():
+                # Where they were when they took something is not known any more.
+                self._covered |= state.item_covered == 1
+        self._covered &= stored
         self._demand(
-            bool((deeper <= allowed).all()),
-            f"a laden robot drives {float(deeper.max(initial=0.0)):.4f} m into an item",
+            bool((self._covered == state.item_covered).all()), "an item is covered, or is not"
         )
+
+    def _above(self, at: dict[str, NDArray[Any]], laden: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which of the robots that are `laden` stand above which items, (N, I)."""
+        away = np.linalg.norm(at["robot_position"][:, None] - at["item_position"][None], axis=2)
+        reach = self.world.scenario.robot_radius + self.world.scenario.item_radius
+        above: NDArray[np.bool_] = laden[:, None] & (away < reach)
+        return above
 
     def _timers(self) -> None:
         state, limit = self.world.state, self.world.scenario.timer_limit
@@ -250,10 +251,3 @@ class Watch:
         asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
         flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
         self._demand(bool((flags.sum(axis=1) <= 1).all()), "a robot sees two requested items")
-
-
-def _reached(first: NDArray[np.bool_], touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the robots that touch one of `first`, or one that does, and so on."""
-    while not ((wider := first | touching[first].any(axis=0)) == first).all():
-        first = wider
-    return first

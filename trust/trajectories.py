@@ -40,8 +40,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "robot_in_delivery", "max_speed", "max_turn_rate",
     ),
     "items": (
-        "item_position", "item_status", "item_carrier", "robot_item", "robot_memory",
-        "obstacle_position",
+        "item_position", "item_status", "item_carrier", "item_covered", "robot_item",
+        "robot_memory", "obstacle_position",
     ),
     "signals": ("robot_timer", "robot_told", "robot_heard", "robot_message", "last_in_delivery"),
     "counts": ("step", "time", "requested", "delivery_times", "delivered_by", "anchoring_seconds"),

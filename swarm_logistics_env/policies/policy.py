@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.hearing import as_heard
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
@@ -34,7 +35,16 @@ class Policy(Protocol):
 
 
 def start(policy: Policy, scenario: Scenario, seed: int) -> None:
-    """Tell `policy` of an episode that begins."""
+    """Tell `policy` of an episode that begins.
+
+    Raises:
+        PolicyError: it is none.
+    """
+    if not isinstance(policy, Policy):
+        raise PolicyError(
+            f"policy = {policy!r}: should have the methods reset and act, as what "
+            "policies.load(name) returns has"
+        )
     configure = getattr(policy, "configure", None)
     if configure is not None:
         configure(scenario)

@@ -8,10 +8,6 @@ from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.testing.errors import OverlapError
 from swarm_logistics_env.testing.playing import Make, played
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.state import NOBODY, STORED
-
-# A laden robot above an item is pushed off it, this fast at most.
-_SHOVE = 1.5  # [m/s]
 
 
 def check_overlap(
@@ -28,14 +24,13 @@ def check_overlap(
     Raises:
         OverlapError: names the robots, the step and the depth.
     """
-    speed = shove = 0.0
+    speed = 0.0
     for moment in played(make, policy, seed, steps):
         world = moment.world
         # What held while the step was taken: its speed is that before or after a change.
-        allowed = max(speed, world.scenario.max_speed) * 2.0 + shove
+        allowed = max(speed, world.scenario.max_speed) * 2.0
         _check(world, allowed * world.scenario.physics_period, moment.step)
         speed = world.scenario.max_speed
-        shove = _SHOVE if _is_any_above_an_item(world) else 0.0
 
 
 def _check(world: Warehouse, allowed: float, step: int) -> None:
@@ -54,11 +49,3 @@ def _check(world: Warehouse, allowed: float, step: int) -> None:
             f"robots {one} and {other} overlap by {depth[deepest]:.4f} m at step {step}: should "
             f"be at most {allowed:.4f} m, what two robots close in one physics step"
         )
-
-
-def _is_any_above_an_item(world: Warehouse) -> bool:
-    state, scenario = world.state, world.scenario
-    laden = state.robot_position[state.robot_item != NOBODY]
-    free = state.item_position[state.item_status == STORED]
-    gaps = np.linalg.norm(laden[:, None] - free[None], axis=2)
-    return bool((gaps < scenario.robot_radius + scenario.item_radius).any())

@@ -42,6 +42,7 @@ def build(
     robot_item: NDArray[np.int64],
     item_position: NDArray[np.float64],
     item_status: NDArray[np.int64],
+    item_covered: NDArray[np.int64],
     obstacle_position: NDArray[np.float64],
 ) -> None:
     """Make everything and note it in the table, whose functions and filters are given.
@@ -94,8 +95,8 @@ def build(
     # On the static body, moved by their offset: no body to integrate or to read.
     for item in range(n_items):
         shape = new_circle(engine, static, item_radius, item_position[item])
-        met = engine[at.FREE_ITEM] if item_status[item] == STORED else engine[at.NO_ONE]
-        collide_with(engine, shape, met)
+        is_solid = item_status[item] == STORED and item_covered[item] == 0
+        collide_with(engine, shape, engine[at.FREE_ITEM] if is_solid else engine[at.NO_ONE])
         made_at(engine[at.ADD_SHAPE], (space, shape))
         engine[items + item] = shape
 

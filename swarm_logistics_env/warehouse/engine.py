@@ -73,14 +73,13 @@ def follow(
             collide_with(engine, robot_shape, engine[LADEN_ROBOT])
         else:
             collide_with(engine, robot_shape, engine[EMPTY_ROBOT])
-            put(engine, item_shape, item_position[item, 0], item_position[item, 1])
+            move(engine, item_shape, item_position[item, 0], item_position[item, 1])
 
 
 @kernel
-def put(engine: NDArray[np.int64], item_shape: int, x: float, y: float) -> None:
-    """Make an item an obstacle at (x, y) [m] for the laden."""
+def move(engine: NDArray[np.int64], item_shape: int, x: float, y: float) -> None:
+    """Move an item to (x, y) [m]; who collides with it stays as it is."""
     call_at(engine[SET_OFFSET], (item_shape, (x, y)))
-    collide_with(engine, item_shape, engine[FREE_ITEM])
     call_at(engine[REINDEX], (engine[SPACE], item_shape))
 
 

@@ -85,7 +85,8 @@ class Fault(Record):
         factor: for `motor_slow` and `view_reduced`: what is left, in [0, 1).
 
     Raises:
-        FaultError: an unknown mode, a factor or a duration that the mode does not have.
+        FaultError: an unknown mode, a factor or a duration that the mode does not have, a robot
+            that is named twice.
 
     Example:
         >>> Fault("FM1", 2, onset=200.0).robots
@@ -123,6 +124,8 @@ class Fault(Record):
             raise ValueError("a removed robot does not come back: duration should be None")
         if isinstance(self.robots, tuple) and not self.robots:
             raise ValueError("robots = (): should name at least one robot")
+        if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
+            raise ValueError(f"robots = {self.robots}: should name each robot once")
         return self
 
     def is_active(self, time: float) -> bool:

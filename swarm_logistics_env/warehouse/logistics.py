@@ -47,9 +47,10 @@ def open_grippers(
     memory: NDArray[np.int64],
     item_status: NDArray[np.int64],
     item_carrier: NDArray[np.int64],
+    item_covered: NDArray[np.int64],
     events: NDArray[np.int64],
 ) -> int:
-    """Put down what robots let go of; returns the number of events written.
+    """Put down what robots let go of, covered; returns the number of events written.
 
     The requested item is let go of anywhere, another one only outside the delivery area.
     """
@@ -67,6 +68,7 @@ def open_grippers(
         robot_item[robot] = NOBODY
         item_status[item] = STORED
         item_carrier[item] = NOBODY
+        item_covered[item] = 1
         events[n_events, 0] = PUT_DOWN
         events[n_events, 1] = robot
         events[n_events, 2] = item
@@ -132,6 +134,7 @@ def close_grippers(
     item_position: NDArray[np.float64],
     item_status: NDArray[np.int64],
     item_carrier: NDArray[np.int64],
+    item_covered: NDArray[np.int64],
     claim: NDArray[np.int64],
     claim_square: NDArray[np.float64],
     cell: float,
@@ -166,6 +169,7 @@ def close_grippers(
             robot_item[robot] = item
             item_status[item] = CARRIED
             item_carrier[item] = robot
+            item_covered[item] = 0
             item_position[item, 0] = position[robot, 0]
             item_position[item, 1] = position[robot, 1]
             events[n_events, 0] = LIFTED

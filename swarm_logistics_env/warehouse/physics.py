@@ -85,14 +85,14 @@ class Physics:
             scenario.robot_mass * scenario.max_acceleration, scenario.robot_radius,
             scenario.item_radius, scenario.obstacle_radius, state.robot_position,
             state.robot_velocity, state.robot_present, state.robot_item, state.item_position,
-            state.item_status, state.obstacle_position,
+            state.item_status, state.item_covered, state.obstacle_position,
         )  # fmt: skip
         # Not at the end of the process, which frees everything anyway.
         finalize(self, free, self.engine, n, scenario.n_items).atexit = False
         at.read_bodies(self.engine)
 
     def put_down(self, robot: int, item: int, x: float, y: float) -> None:
-        """Make `item` an obstacle at (x, y) [m] for the laden and `robot` an unladen one."""
+        """Put `item` to (x, y) [m], covered, and make `robot` an unladen one."""
         self.take_away(robot)
         self.place(item, x, y)
 
@@ -101,8 +101,8 @@ class Physics:
         self._let_collide(robot, at.EMPTY_ROBOT)
 
     def place(self, item: int, x: float, y: float) -> None:
-        """Make `item` an obstacle at (x, y) [m] for the laden."""
-        at.put(self.engine, int(self.engine[at.SHAPES + self._n_robots + item]), x, y)
+        """Put `item`, which is no obstacle, to (x, y) [m], covered."""
+        at.move(self.engine, int(self.engine[at.SHAPES + self._n_robots + item]), x, y)
 
     def remove(self, robot: int) -> None:
         """Take `robot` out of everybody's way, for good."""

@@ -153,6 +153,7 @@ def sense(
     told: NDArray[np.float64],
     in_delivery: NDArray[np.bool_],
     item_position: NDArray[np.float64],
+    item_covered: NDArray[np.int64],
     obstacle_position: NDArray[np.float64],
     ranger_range: NDArray[np.float64],
     view_range: NDArray[np.float64],
@@ -310,7 +311,7 @@ def sense(
                     dx * cosine + dy * sine, dy * cosine - dx * sine,
                     square, item_radius, scan_items,
                 )  # fmt: skip
-            touches |= is_laden & (square < touch_square)
+            touches |= is_laden & (square < touch_square) & (item_covered[item_members[place]] == 0)
             is_seen = square <= view_square
             if dropout > 0.0 and is_seen:
                 item = item_members[place]

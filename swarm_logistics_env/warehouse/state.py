@@ -16,7 +16,7 @@ NOBODY = -1
 HEADING, TIMER, TOLD, HEARD, MAX_SPEED, MAX_TURN_RATE, RANGER_RANGE, VIEW_RANGE = range(8)
 PRESENT, IN_DELIVERY, CONTACT, LIFTS, DELIVERS, SENDS, HEARS, HONEST, OBEYS, FAILED = range(10)
 ITEM, LAST_IN_DELIVERY, PILE = range(3)
-STATUS, CARRIER = range(2)
+STATUS, CARRIER, COVERED = range(3)
 
 T = TypeVar("T", bound=np.generic)
 
@@ -89,6 +89,7 @@ class WarehouseState:
     robot_pile = Column[np.int64]("links", PILE)  # (N,) towards one robot of those it touches
     item_status = Column[np.int64]("item_links", STATUS)  # (I,) STORED, CARRIED or DELIVERED
     item_carrier = Column[np.int64]("item_links", CARRIER)  # (I,) robot, or NOBODY
+    item_covered = Column[np.int64]("item_links", COVERED)  # (I,) 1: stored, yet no obstacle; or 0
 
     numbers, links, item_links = Array[np.float64](), Array[np.int64](), Array[np.int64]()
     flags = Array[np.bool_]()
@@ -106,13 +107,13 @@ class WarehouseState:
         self.flags = np.ones((10, n), np.bool_)
         self.flags[[IN_DELIVERY, CONTACT, FAILED]] = False
         self.links = np.full((3, n), NOBODY)
-        self.item_links = np.full((2, items), NOBODY)
+        self.item_links = np.full((3, items), NOBODY)
         self.robot_position = np.zeros((n, 2))
         self.robot_velocity = np.zeros((n, 2))
         self.robot_memory = np.full((n, scenario.memory_size), NOBODY)
         self.robot_message = np.zeros((n, scenario.message_size))
         self.item_position = np.zeros((items, 2))
-        self.item_status[:] = STORED
+        self.item_status[:], self.item_covered[:] = STORED, 0
         self.obstacle_position = np.zeros((scenario.n_obstacles, 2))
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * n  # per robot, those that hold
         self.step = 0  # control steps since the start

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import state as at
+from swarm_logistics_env.warehouse.covering import cover, uncover
 from swarm_logistics_env.warehouse.disturbance import disturb
 from swarm_logistics_env.warehouse.driving import drive
 from swarm_logistics_env.warehouse.engine import advance, follow
@@ -104,14 +105,21 @@ def step(
     velocities, numbers = numbers_in(tables, VELOCITIES), numbers_in(tables, NUMBERS)
     if not set_out(commands, constants, numbers, flags, bodies, velocities):
         return NOT_FINITE
-    pile = largest(counts_in(tables, LINKS)[at.PILE])
+    links, item_links = counts_in(tables, LINKS), counts_in(tables, ITEM_LINKS)
+    uncover(
+        engine, constants[ROBOT_RADIUS] + constants[ITEM_RADIUS], flags[at.PRESENT],
+        links[at.ITEM], item_links[at.COVERED], count_row_in(tables, ITEM_START),
+        count_row_in(tables, ITEM_MEMBERS), numbers_in(tables, ITEM_PLACES),
+        constants[ROBOT_CELL], count_row_in(tables, ROBOT_SIZE), count_row_in(tables, ROBOT_START),
+        count_row_in(tables, ROBOT_MEMBERS), numbers_in(tables, ROBOT_PLACES),
+    )  # fmt: skip
+    pile = largest(links[at.PILE])
     advance(engine, pile, int(constants[N_SUBSTEPS]), constants[PHYSICS_PERIOD])
     send(commands, flags, numbers_in(tables, MESSAGE))
     is_due = handle_items(
         commands, requested, constants, engine, bodies,
         numbers_in(tables, POSITION), numbers_in(tables, VELOCITY), flags,
-        counts_in(tables, LINKS), counts_in(tables, MEMORY),
-        numbers_in(tables, ITEM_POSITION), counts_in(tables, ITEM_LINKS),
+        links, counts_in(tables, MEMORY), numbers_in(tables, ITEM_POSITION), item_links,
         count_row_in(tables, CLAIM), number_row_in(tables, CLAIM_SQUARE),
         count_row_in(tables, ITEM_SIZE), count_row_in(tables, ITEM_START),
         count_row_in(tables, ITEM_MEMBERS), counts_in(tables, EVENTS),
@@ -195,12 +203,18 @@ def handle_items(
     able = flags[at.PRESENT] & flags[at.OBEYS]
     n_events = open_grippers(
         commands[:, 3], able, flags[at.IN_DELIVERY], requested, links[at.ITEM], memory,
-        item_links[at.STATUS], item_links[at.CARRIER], events,
+        item_links[at.STATUS], item_links[at.CARRIER], item_links[at.COVERED], events,
     )  # fmt: skip
     n_events = close_grippers(
         commands[:, 3], able & flags[at.LIFTS], position, requested, constants[PICKUP_RANGE],
         links[at.ITEM], memory, item_position, item_links[at.STATUS], item_links[at.CARRIER],
-        claim, claim_square, constants[ITEM_CELL], size, start, members, events, n_events,
+        item_links[at.COVERED], claim, claim_square, constants[ITEM_CELL], size, start, members,
+        events, n_events,
+    )  # fmt: skip
+    cover(
+        engine, events, n_events, constants[ROBOT_RADIUS] + constants[ITEM_RADIUS], position,
+        item_position, item_links[at.STATUS], item_links[at.COVERED],
+        constants[ITEM_CELL], size, start, members,
     )  # fmt: skip
     follow(engine, events, n_events, len(position), item_position)
     carrier = item_links[at.CARRIER, requested] if requested != at.NOBODY else at.NOBODY
@@ -259,8 +273,9 @@ def perceive(
         constants[OBSTACLE_RADIUS], constants[RADIO_RANGE], constants[MAX_SPEED],
         constants[TIMER_LIMIT], requested, flags[at.PRESENT], position, velocity,
         numbers[at.HEADING], links[at.ITEM], memory, numbers[at.TIMER], numbers[at.TOLD],
-        flags[at.IN_DELIVERY], item_position, obstacle_position, numbers[at.RANGER_RANGE],
-        numbers[at.VIEW_RANGE], flags[at.SENDS], flags[at.HEARS], flags[at.FAILED],
+        flags[at.IN_DELIVERY], item_position, item_links[at.COVERED], obstacle_position,
+        numbers[at.RANGER_RANGE], numbers[at.VIEW_RANGE],
+        flags[at.SENDS], flags[at.HEARS], flags[at.FAILED],
         constants[ROBOT_CELL], robot_size, robot_start, robot_members, robot_places,
         constants[ITEM_CELL], item_size, item_start, item_members, item_places,
         constants[RANGER_RANGE], flags[at.CONTACT], links[at.PILE], numbers[at.HEARD], keys, step,

@@ -334,7 +334,7 @@ class Warehouse:
         place = layout.place_restocked(
             self.scenario, self._seed or 0, state.delivered, taken, state.obstacle_position
         )
-        state.item_status[item] = STORED
+        state.item_status[item], state.item_covered[item] = STORED, 1
         state.item_position[item] = place
         self._physics.place(item, float(place[0]), float(place[1]))
 
@@ -350,7 +350,7 @@ class Warehouse:
         state = self.state
         item = int(state.robot_item[robot])
         if item != NOBODY:
-            state.item_status[item] = STORED
+            state.item_status[item], state.item_covered[item] = STORED, 1
             state.item_carrier[item] = NOBODY
             self._physics.put_down(robot, item, *state.item_position[item].tolist())
         self._physics.remove(robot)

@@ -50,7 +50,7 @@ def test_different_seeds_choose_different_robots_and_every_robot_has_its_turn() 
 
 def test_named_robots_fail_and_no_others() -> None:
     world = Warehouse(SMALL)
-    world.reset(0, [Fault("FM2", (6, 1, 1))])
+    world.reset(0, [Fault("FM2", (6, 1))])
     assert np.flatnonzero(world.state.failed).tolist() == [1, 6]
     assert world.struck_robots == (1, 6)
     assert world.state.failure_modes[1] == ("FM2",)
@@ -81,7 +81,9 @@ def test_faults_that_cannot_be_are_refused_at_the_reset(fault: Any, complaint: s
         ({"mode": "FM1", "robots": 0}, "Fault.robots = 0: should be greater than 0"),
         ({"mode": "FM1", "robots": ()}, "at least one robot"),
         ({"mode": "FM1", "robots": (-1,)}, "-1: should be greater than or equal to 0"),
-        ({"mode": "FM1", "robots": 1.5}, "Fault.robots = 1.5: should be a valid integer"),
+        ({"mode": "FM1", "robots": (2, 0, 2)}, r"\(2, 0, 2\): should name each robot once"),
+        ({"mode": "FM1", "robots": -1}, "^Fault.robots = -1: should be greater than 0$"),
+        ({"mode": "FM1", "robots": 1.5}, "^Fault.robots = 1.5: should be a valid integer, [^;]*$"),
         ({"mode": "FM1", "onset": -1.0}, "Fault.onset = -1.0: should be greater than or equal"),
         ({"mode": "FM1", "onset": float("nan")}, "Fault.onset = nan: should be a finite"),
         ({"mode": "FM1", "duration": 0.0}, "Fault.duration = 0.0: should be greater than 0"),

@@ -147,6 +147,64 @@ def test_a_laden_robot_does_not_drive_through_an_item(build: Build) -> None:
     assert world.state.item_position[2].tolist() == [3.0, 5.0]  # it stays put
 
 
+def test_a_robot_that_lifts_above_other_items_is_not_pushed_off_them(build: Build) -> None:
+    above = [(2.0, 5.1), (2.1, 5.15), (1.9, 5.15), (2.0, 4.8)]
+    world = build([(2.0, 5.0)], [FAR, *above], pickup_range=0.15)
+    alone = build([(2.0, 5.0)], [FAR, above[0]], pickup_range=0.15)
+    for command in [HOLD, *[STAY] * 5, *[EAST] * 10]:
+        world.step([command])
+        alone.step([command])
+        np.testing.assert_array_equal(world.state.robot_position, alone.state.robot_position)
+        assert not world.state.robot_contact[0]
+    assert world.state.robot_item[0] == 1
+    assert world.state.robot_velocity[0, 0] == pytest.approx(2.0)
+
+
+def test_an_item_that_a_robot_lifted_above_is_in_its_way_once_it_has_left(build: Build) -> None:
+    world = build([(2.0, 5.0)], [FAR, (2.0, 5.1), (2.1, 5.0)], memory_size=0, pickup_range=0.1)
+    world.step([HOLD])
+    assert world.state.item_covered.tolist() == [0, 0, 1]
+    for _ in range(5):
+        world.step([WEST])
+    assert world.state.item_covered.tolist() == [0, 0, 0]
+    for _ in range(20):
+        world.step([EAST])
+        assert world.state.robot_position[0, 0] <= 2.1 - DIAMETER + CLOSING / 2
+    assert world.state.robot_contact[0]
+
+
+def test_an_item_is_in_nobodys_way_while_any_laden_robot_stands_above_it(build: Build) -> None:
+    # Robot 0 lifts above item 2, robot 1 drives onto it; when robot 0 has left it still is free.
+    items = [FAR, (2.0, 5.1), (2.2, 5.0), (3.0, 5.1)]
+    world = build([(2.0, 5.0), (3.0, 5.0)], items, pickup_range=0.15)
+    world.step([HOLD, HOLD])
+    for commands in [[STAY, WEST]] * 6 + [[WEST, STAY]] * 8:
+        world.step(commands)
+    left, right = world.state.robot_position[:, 0]
+    assert left < 2.2 - DIAMETER
+    assert right < 2.2 + DIAMETER
+    assert world.state.item_covered[2] == 1
+    for _ in range(8):
+        world.step([STAY, EAST])
+    assert world.state.item_covered[2] == 0
+
+
+def test_an_item_put_down_beneath_a_laden_robot_does_not_push_it(build: Build) -> None:
+    # Items are wider than robots here: what robot 0 puts down reaches below robot 1.
+    items = [FAR, (2.0, 5.0), (2.3, 5.0)]
+    world = build([(2.0, 5.0), (2.26, 5.0)], items, item_radius=0.2, pickup_range=0.1)
+    world.step([HOLD, HOLD])
+    world.step([(0.0, 0.0, 0.0, -1.0), STAY])
+    before = world.state.robot_position.copy()
+    for _ in range(5):
+        world.step([STAY, STAY])
+    np.testing.assert_allclose(world.state.robot_position, before, atol=1e-3)
+    assert world.state.item_covered[1] == 1
+    for _ in range(10):
+        world.step([STAY, EAST])
+    assert world.state.item_covered[1] == 0
+
+
 def test_an_item_is_in_the_way_where_it_was_put_down_and_nowhere_else(build: Build) -> None:
     # Robot 0 carries item 1 from x = 2 to 4 and leaves it; robot 1, laden, then comes along.
     items = [FAR, (2.0, 5.1), (1.0, 5.1)]

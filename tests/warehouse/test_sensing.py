@@ -243,7 +243,9 @@ def narrowest_gap(world: Warehouse, me: int) -> float:
         (state.obstacle_position, scenario.obstacle_radius),
     ]
     if state.robot_item[me] != NOBODY:
-        things.append((state.item_position[free_items(world)], scenario.item_radius))
+        solid = free_items(world)
+        solid = solid[state.item_covered[solid] == 0]
+        things.append((state.item_position[solid], scenario.item_radius))
     for places, radius in things:
         distances = np.linalg.norm(places - state.robot_position[me], axis=1)
         gaps.extend((distances - radius - scenario.robot_radius).tolist())
@@ -307,11 +309,18 @@ def test_equal_timers_are_settled_by_the_nearest_teller(build: Build) -> None:
 
 
 def test_an_unladen_robot_feels_no_item_and_a_laden_one_does(build: Build) -> None:
-    world = build([(2.0, 2.0)], [(1.8, 2.0), (2.24, 2.0)])
+    world = build([(2.0, 2.0)], [(1.8, 2.0), (2.255, 2.0)])
     assert not world.state.robot_contact[0]
     world.step([HOLD])
     assert world.state.robot_item[0] == 0
     assert world.state.robot_contact[0]
+
+
+def test_a_laden_robot_does_not_feel_an_item_that_it_lifted_above(build: Build) -> None:
+    world = build([(2.0, 2.0)], [(1.8, 2.0), (2.24, 2.0)])
+    world.step([HOLD])
+    assert world.state.robot_item[0] == 0
+    assert not world.state.robot_contact[0]
 
 
 @pytest.mark.parametrize("x", np.linspace(1.0, 3.0, 21))

@@ -17,7 +17,6 @@ from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STOR
 N_SCENARIOS = 100
 N_STEPS = 80
 SLACK = 0.02  # [m] that bodies may sink into walls, besides what one physics step brings
-SHOVE = 1.5  # [m/s] at which an item pushes out a robot that takes up another one above it
 
 
 # -- 100 random worlds, checked after every step ------------------------------------------------
@@ -216,10 +215,9 @@ def check_changes(world: Warehouse, before: WarehouseState) -> None:
 
     newly_laden = (state.robot_item != before.robot_item) & (state.robot_item != NOBODY)
     overlap = deepest_overlap(state.robot_position[state.robot_present], scenario.robot_radius)
-    closing = 2.0 * scenario.max_speed + (SHOVE if is_any_above_an_item(before, scenario) else 0.0)
-    assert overlap <= closing * scenario.physics_period
+    assert overlap <= 2.0 * scenario.max_speed * scenario.physics_period
 
-    # A robot may travel at its top speed, plus what a shove adds.
+    # A robot may travel at its top speed, plus what others push it.
     moved = np.linalg.norm(state.robot_position - before.robot_position, axis=1)
     furthest = (2.0 * scenario.max_speed + 0.5) * scenario.control_period
     assert (moved[state.robot_present] <= furthest).all()
@@ -243,22 +241,13 @@ def is_left_alone(world: Warehouse, before: WarehouseState, robot: int) -> bool:
     state, scenario = world.state, world.scenario
     if not state.robot_present[robot] or np.linalg.norm(before.robot_velocity[robot]) > 1e-3:
         return False
-    # An item that it lifts above another one makes it collide with that one.
-    if before.robot_contact[robot] or before.robot_item[robot] != NOBODY:
+    if before.robot_contact[robot]:
         return False
     others = before.robot_present.copy()
     others[robot] = False
     gaps = np.linalg.norm(before.robot_position[others] - before.robot_position[robot], axis=1)
     reach = 2.0 * scenario.robot_radius + 2.5 * scenario.max_speed * scenario.control_period
     return bool((gaps > reach).all())
-
-
-def is_any_above_an_item(state: WarehouseState, scenario: Scenario) -> bool:
-    """Return whether a laden robot overlaps a free item, which then pushes it out."""
-    laden = state.robot_position[state.robot_item != NOBODY]
-    free = state.item_position[state.item_status == STORED]
-    gaps = np.linalg.norm(laden[:, None] - free[None], axis=2)
-    return bool((gaps < scenario.robot_radius + scenario.item_radius - 0.01).any())
 
 
 def deepest_overlap(position: NDArray[np.float64], radius: float) -> float:
