@@ -98,9 +98,11 @@ def test_an_empty_robot_that_opens_its_gripper_changes_nothing(build: Build) -> 
 
 
 def test_nothing_is_lifted_from_beyond_the_pickup_range(build: Build) -> None:
-    world = build([(2.0, 2.0), (5.0, 5.0)], [(2.251, 2.0), (5.249, 5.0)])
-    world.step([HOLD, HOLD])
-    assert world.state.robot_item.tolist() == [NOBODY, 1]
+    # The last stands at the very end of it, which belongs to it.
+    items = [(2.251, 2.0), (5.249, 5.0), (2.25, 8.0)]
+    world = build([(2.0, 2.0), (5.0, 5.0), (2.0, 8.0)], items)
+    world.step([HOLD, HOLD, HOLD])
+    assert world.state.robot_item.tolist() == [NOBODY, 1, 2]
 
 
 def test_a_laden_robot_lifts_nothing_more(build: Build) -> None:
@@ -137,7 +139,7 @@ def test_a_nearer_robot_that_does_not_hold_does_not_mask_an_item(
 
 @pytest.mark.parametrize(
     ("gripper", "is_laden_after"),
-    [(-1.0, False), (-0.51, False), (-0.49, True), (0.0, True), (0.49, True), (1.0, True)],
+    [(-1.0, False), (-0.51, False), (-0.5, True), (0.0, True), (0.5, True), (1.0, True)],
 )
 def test_between_open_and_hold_a_gripper_keeps_its_item(
     build: Build, gripper: float, is_laden_after: bool
@@ -148,7 +150,7 @@ def test_between_open_and_hold_a_gripper_keeps_its_item(
     assert bool(world.state.robot_item[0] != NOBODY) is is_laden_after
 
 
-@pytest.mark.parametrize(("gripper", "lifts"), [(0.49, False), (0.51, True), (9.0, True)])
+@pytest.mark.parametrize(("gripper", "lifts"), [(0.5, False), (0.51, True), (9.0, True)])
 def test_only_holding_lifts(build: Build, gripper: float, lifts: bool) -> None:
     world = build([(2.0, 2.0)], [(2.1, 2.0)])
     world.step([(0.0, 0.0, 0.0, gripper)])
@@ -435,6 +437,20 @@ def test_gossip_carries_a_timer_on_and_ages_it_by_every_hop(build: Build) -> Non
         rows = world.step([STAY] * 3)
     assert rows[1, row.LOWEST_TIMER : row.LOWEST_TIMER + 4] == pytest.approx([1, 3.5, 0, 0.0])
     assert rows[2, row.LOWEST_TIMER : row.LOWEST_TIMER + 4] == pytest.approx([1, 3.5, 0, 0.1])
+
+
+def test_with_gossip_the_lower_of_ones_own_timer_and_an_aged_one_is_told(build: Build) -> None:
+    # Robot 1 leaves the area; robot 0 stays there until it is taken out, robot 2 is never heard.
+    faults = [Fault("removed", (0,), onset=2.0)]
+    world = build([(9.5, 5.0), (8.2, 5.0), (1.0, 1.0)], [FAR], faults, relay="gossip")
+    for step in range(1, 31):
+        world.step([STAY, WEST if step <= 5 else STAY, STAY])
+        own, told = world.state.robot_timer[1], world.state.robot_told[1]
+        if 6 <= step < 20:
+            assert own > 0.3
+            assert told == pytest.approx(0.1)
+        if step > 21:
+            assert told == own
 
 
 def test_gossip_does_not_keep_a_timer_alive_for_ever(build: Build) -> None:
