@@ -35,6 +35,12 @@ def test_the_nearest_empty_robot_lifts_first(build: Build, item_x: float) -> Non
     assert world.state.item_status[0] == CARRIED
 
 
+def test_of_two_robots_equally_near_the_one_of_the_lower_number_lifts(build: Build) -> None:
+    world = build([(2.0, 2.0), (2.5, 2.0)], [(2.25, 2.0)])
+    world.step([HOLD, HOLD])
+    assert world.state.robot_item.tolist() == [0, NOBODY]
+
+
 def test_who_loses_an_item_takes_its_next_best_at_once(build: Build) -> None:
     # Both want item 1; robot 1 is nearer and robot 0 has item 2 in reach as well.
     world = build([(2.0, 2.0), (2.4, 2.0)], [FAR, (2.21, 2.0), (1.78, 2.0)])
