@@ -23,6 +23,8 @@ DENSEST_COVER = 0.4
 SMALLEST, LARGEST = 1e-9, 1e9
 # Of its radius, what a robot may drive in one physics step: further, crowds press it through walls.
 LONGEST_STRIDE = 0.8
+# A physics step [s]: with longer ones piles of robots stand inside themselves.
+LONGEST_PHYSICS_PERIOD = 0.02
 MOST_SUBSTEPS = 1000
 
 
@@ -180,6 +182,11 @@ class Scenario(Record):
                 raise ValueError(f"{name} = {value}: should be at least {SMALLEST:g}")
 
     def _check_periods(self) -> None:
+        if self.physics_period > LONGEST_PHYSICS_PERIOD:
+            raise ValueError(
+                f"physics_period = {self.physics_period} s: should be at most "
+                f"{LONGEST_PHYSICS_PERIOD} s, or robots in a crowd press each other through walls"
+            )
         ratio = self.control_period / self.physics_period
         if ratio > MOST_SUBSTEPS:
             raise ValueError(

@@ -102,9 +102,10 @@ def test_every_wrong_field_is_named_at_once() -> None:
             {"control_period": 0.05},
             "control_period = 0.05 s should be a whole multiple of physics_period = 0.02 s",
         ),
+        ({"physics_period": 0.05}, "physics_period = 0.05 s: should be at most 0.02 s, or robots"),
         (
-            {"physics_period": 0.1},
-            r"physics_period = 0.1 s lets a robot cross 0.2 m .* at most .* 0.05 s",
+            {"max_speed": 6.0},
+            r"physics_period = 0.02 s lets a robot cross 0.12 m .* at most .* 0.0166667 s",
         ),
         ({"duration": 0.05}, "duration = 0.05 s should be at least one control_period"),
     ],

@@ -14,7 +14,6 @@ from swarm_logistics_env.warehouse import FAILURE_MODES, FailureMode
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
-FINE = 0.02  # [s]: with longer physics periods a jam may be deeper in proportion
 JAM = 1.0  # [s] of overlap without a break make a jam
 
 
@@ -123,10 +122,9 @@ class Watch:
         depth[~here] = -np.inf
         # The speed of the last step is that before or after a change.
         closing = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period
-        jam = SUSTAINED * max(1.0, scenario.physics_period / FINE)
         deepest = float(depth.max(initial=-np.inf))
         self._demand(
-            deepest <= closing + jam,
+            deepest <= closing + SUSTAINED,
             f"bodies overlap by {deepest:.4f} m: should be at most {closing:.4f} m, what they "
             "close in one substep, beyond the depth of a jam",
         )
@@ -136,11 +134,11 @@ class Watch:
         # For how long each pair is deeper than it may be in a jam.
         if self._jammed.shape != depth.shape:
             self._jammed = np.zeros(depth.shape)
-        self._jammed = np.where(depth > jam, self._jammed + scenario.control_period, 0.0)
+        self._jammed = np.where(depth > SUSTAINED, self._jammed + scenario.control_period, 0.0)
         lasting = float(depth[self._jammed > JAM].max(initial=0.0))
         self._demand(
             lasting == 0.0,
-            f"bodies overlap by more than {jam:.3f} m for {JAM} s, now by {lasting:.4f} m",
+            f"bodies overlap by more than {SUSTAINED} m for {JAM} s, now by {lasting:.4f} m",
         )
 
     def _cover(self) -> None:

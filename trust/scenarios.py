@@ -43,7 +43,7 @@ def _fields(source: random.Random) -> dict[str, Any]:
 
     radius = number(0.05, 0.3)
     width = number(1.0, 12.0)
-    physics_period = source.choice([0.01, 0.02, 0.05])
+    physics_period = source.choice([0.01, 0.02, 0.005])
     fields: dict[str, Any] = {
         "robot_radius": radius,
         "item_radius": number(0.03, 0.3),

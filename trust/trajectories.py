@@ -101,7 +101,7 @@ def _stories() -> dict[str, Story]:
         "mixed swarm": Story(small(speed_mix=(1.0, 0.5), sensing_mix=(1.0, 0.6, 0.3))),
         "no memory": Story(small(memory_size=0)),
         "long memory": Story(small(memory_size=5)),
-        "other periods": Story(small(control_period=0.2, physics_period=0.05, max_speed=1.0)),
+        "other periods": Story(small(control_period=0.2, physics_period=0.01, max_speed=1.0)),
         "jam": Story(small(n_robots=30, n_items=1), steps=100),
         "swarm-dt-follow": Story(small(), policy="swarm-dt-follow"),
         "random-walk": Story(small(), policy="random-walk"),

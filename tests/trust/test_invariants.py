@@ -59,10 +59,11 @@ def test_the_watch_accuses_nobody_who_was_repaired_for_a_moment() -> None:
 def test_a_crowd_presses_nobody_out_at_the_longest_stride(heavy: bool) -> None:
     scenario = Scenario(
         n_robots=34, n_items=2, warehouse_width=2.4, warehouse_height=3.6, delivery_width=0.25,
-        restock=True, robot_radius=0.1, robot_mass=22.0 if heavy else 1.0, max_speed=1.6,
-        physics_period=0.05, control_period=0.25, item_radius=0.04,
+        restock=True, robot_radius=0.1, robot_mass=22.0 if heavy else 1.0, max_speed=4.0,
+        physics_period=0.02, control_period=0.1, item_radius=0.04,
     )  # fmt: skip
-    assert scenario.max_speed * scenario.physics_period == LONGEST_STRIDE * scenario.robot_radius
+    stride = scenario.max_speed * scenario.physics_period
+    assert stride == pytest.approx(LONGEST_STRIDE * scenario.robot_radius)
     world = Warehouse(scenario)
     world.reset(0)
     watch, rng = Watch(world), np.random.default_rng(0)

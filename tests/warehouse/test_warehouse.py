@@ -61,7 +61,7 @@ def random_scenario(rng: np.random.Generator) -> Scenario:
         ranger_range=rng.uniform(0.3, 2.0),
         pickup_range=rng.uniform(0.15, 0.5),
         relay="gossip" if rng.random() < 0.5 else "none",
-        physics_period=float(rng.choice([0.02, 0.025])),
+        physics_period=float(rng.choice([0.01, 0.02])),
         drive="differential" if rng.random() < 0.3 else "holonomic",
         sensing_mix=(1.0, 0.5) if rng.random() < 0.3 else (1.0,),
         ranger_noise=float(rng.choice([0.0, 0.1])),
