@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 from collections.abc import Container
@@ -45,10 +46,11 @@ def meanings(record: type[Record]) -> dict[str, str]:
     """Return what the docstrings of a record and its bases say of each field."""
     found: dict[str, str] = {}
     for kind in reversed(record.__mro__):
-        _, _, text = (vars(kind).get("__doc__") or "").partition("Args:\n")
+        # Python 3.13 takes the indent of a docstring away by itself.
+        _, _, text = inspect.cleandoc(vars(kind).get("__doc__") or "").partition("Args:\n")
         text, _, _ = text.partition("\n\n")
         for names, meaning in re.findall(
-            r"^ {8}([\w, ]+): (.*(?:\n {12}.*)*)", text + "\n", flags=re.MULTILINE
+            r"^ {4}([\w, ]+): (.*(?:\n {8}.*)*)", text + "\n", flags=re.MULTILINE
         ):
             sentence = " ".join(meaning.split())
             found |= dict.fromkeys(names.split(", "), sentence)

@@ -8,6 +8,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
+from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import notes
@@ -283,6 +284,7 @@ class Study:
             if existing:
                 raise StudyError("nothing has been run: call run() first")
             self._memory = Store(None)
+            finalize(self, self._memory.close)
         yield self._memory
 
 
