@@ -181,7 +181,7 @@ def test_imitation_brings_the_network_towards_the_teacher(small: Any) -> None:
     from swarm_logistics_env.train.imitation import imitate
     from swarm_logistics_env.train.teacher import taught
 
-    asked = Imitation(rounds=2, seconds=5.0, sizes=(4, 6), fit=150, last_fit=300, common_share=1.0)
+    asked = Imitation(rounds=3, seconds=5.0, sizes=(4, 6), fit=150, last_fit=300, common_share=1.0)
     training: Training = small()
     view = trainer._new_view(training)
     policy = make_learner(training, view, "cpu").policy

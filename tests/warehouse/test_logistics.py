@@ -163,6 +163,32 @@ def test_only_holding_lifts(build: Build, gripper: float, lifts: bool) -> None:
     assert bool(world.state.robot_item[0] == 0) is lifts
 
 
+def test_an_item_that_is_taken_away_hides_none_behind_it(build: Build) -> None:
+    # Robot 1 takes item 1 in the first step; then robot 0 looks past where it lay.
+    world = build([(2.0, 2.0), (2.1, 2.2)], [FAR, (2.1, 2.1), (2.15, 2.0)], pickup_range=0.2)
+    world.step([STAY, HOLD])
+    world.step([HOLD, HOLD])
+    assert world.state.robot_item.tolist() == [2, 1]
+
+
+def test_only_who_lifts_collides_with_items_and_only_until_it_lets_go(build: Build) -> None:
+    # Robots 1 and 2 lift in the same step, robot 0 does not; an item lies ahead of each.
+    robots = [(2.0, 2.0), (2.0, 4.0), (2.0, 6.0)]
+    ahead = [(3.0, 2.0), (3.0, 4.0), (3.0, 6.0)]
+    world = build(robots, [*ahead, (2.0, 4.1), (2.0, 6.1)], pickup_range=0.2)
+    world.step([STAY, HOLD, HOLD])
+    assert world.state.robot_item.tolist() == [NOBODY, 3, 4]
+    for _ in range(10):
+        world.step([EAST] * 3)
+    free, first, second = world.state.robot_position[:, 0]
+    assert free > 3.2
+    assert first == second == pytest.approx(2.75, abs=0.02)
+    world.step([STAY, OPEN, OPEN])
+    for _ in range(10):
+        world.step([STAY, EAST, EAST])
+    assert (world.state.robot_position[1:, 0] > 3.2).all()
+
+
 # -- letting go, and the memory -----------------------------------------------------------------
 
 
@@ -190,6 +216,22 @@ def test_the_items_last_put_down_are_not_lifted_again(build: Build) -> None:
     assert set(lifted[:3]) == {1, 2, 3}
     assert lifted[3:] == lifted[:2]  # forgotten after two others
     assert world.state.robot_memory[0].tolist() == [lifted[4], lifted[3]]
+
+
+@pytest.mark.parametrize("memory_size", [1, 3, 4])
+def test_the_memory_holds_the_items_last_put_down_newest_first(
+    build: Build, memory_size: int
+) -> None:
+    items = [FAR, (2.4, 2.0), (2.0, 2.5), (2.0, 1.4), (1.3, 2.0), (2.8, 2.0)]
+    world = build([(2.0, 2.0)], items, pickup_range=1.5, memory_size=memory_size)
+    lifted = []
+    for _ in range(7):
+        world.step([HOLD])
+        assert world.state.robot_item[0] not in lifted[:memory_size]
+        lifted.insert(0, int(world.state.robot_item[0]))
+        world.step([OPEN])
+        put_down = lifted[:memory_size]
+        assert world.state.robot_memory[0, : len(put_down)].tolist() == put_down
 
 
 def test_a_robot_without_memory_lifts_the_same_item_again(build: Build) -> None:
@@ -267,6 +309,12 @@ def test_an_item_is_delivered_as_soon_as_its_carriers_centre_is_inside(build: Bu
     assert state.item_status[0] == DELIVERED
     assert state.robot_item[0] == NOBODY
     assert state.requested == 1
+
+
+def test_the_very_border_belongs_to_the_delivery_area(build: Build) -> None:
+    world = build([(8.0, 5.0), (7.999, 7.0)], [FAR])
+    world.step([STAY, STAY])
+    assert world.state.robot_in_delivery.tolist() == [True, False]
 
 
 def test_another_item_is_not_delivered(build: Build) -> None:
@@ -467,6 +515,7 @@ def test_gossip_does_not_keep_a_timer_alive_for_ever(build: Build) -> None:
     for _ in range(60):
         world.step([STAY] * 3)
         told.append(world.state.robot_told[1:].copy())
+        assert (np.nan_to_num(told[-1]) < 2.0 - 1e-9).all()
     assert not np.isnan(told[9]).any()
     ages = np.nanmin(told[10:28], axis=1)
     assert (np.diff(ages) > 0.0).all()
