@@ -75,6 +75,13 @@ def _with(items: Places, carried: tuple[float, float]) -> Places:
     return [carried if item == (1.95, 3.0) else item for item in items]
 
 
+def test_an_item_behind_one_that_is_farther_is_found(build: Build) -> None:
+    # In the order in which they are looked at: near, farther, nearest.
+    world = build([(2.3, 3.3)], [FAR, (2.4, 3.3), (2.5, 3.3), (2.35, 3.3)])
+    world.step([HOLD])
+    assert world.state.robot_item[0] == 3
+
+
 def test_of_two_equally_near_the_lower_number_is_lifted(build: Build) -> None:
     for items in ([(2.25, 2.625), (2.25, 2.375)], [(2.25, 2.375), (2.25, 2.625)]):
         world = build([(2.25, 2.5)], [FAR, *items])
@@ -172,21 +179,39 @@ def test_an_item_that_is_taken_away_hides_none_behind_it(build: Build) -> None:
 
 
 def test_only_who_lifts_collides_with_items_and_only_until_it_lets_go(build: Build) -> None:
-    # Robots 1 and 2 lift in the same step, robot 0 does not; an item lies ahead of each.
+    # An item lies ahead of each robot; 1 and 2 lift in the same step, 0 never does.
     robots = [(2.0, 2.0), (2.0, 4.0), (2.0, 6.0)]
     ahead = [(3.0, 2.0), (3.0, 4.0), (3.0, 6.0)]
-    world = build(robots, [*ahead, (2.0, 4.1), (2.0, 6.1)], pickup_range=0.2)
+    world = build(robots, [FAR, *ahead, (2.0, 4.1), (2.0, 6.1)], pickup_range=0.2)
+    place = world.state.robot_position
     world.step([STAY, HOLD, HOLD])
-    assert world.state.robot_item.tolist() == [NOBODY, 3, 4]
+    assert world.state.robot_item.tolist() == [NOBODY, 4, 5]
     for _ in range(10):
         world.step([EAST] * 3)
-    free, first, second = world.state.robot_position[:, 0]
-    assert free > 3.2
-    assert first == second == pytest.approx(2.75, abs=0.02)
-    world.step([STAY, OPEN, OPEN])
+    assert place[0, 0] > 3.2
+    assert place[1, 0] == place[2, 0] == pytest.approx(2.75, abs=0.02)
+    world.step([STAY, OPEN, STAY])
     for _ in range(10):
-        world.step([STAY, EAST, EAST])
-    assert (world.state.robot_position[1:, 0] > 3.2).all()
+        world.step([WEST, EAST, EAST])
+    assert place[0, 0] < 2.5
+    assert place[1, 0] > 3.2
+    assert place[2, 0] == pytest.approx(2.75, abs=0.02)
+    world.step([STAY, STAY, OPEN])
+    for _ in range(10):
+        world.step([EAST, WEST, EAST])
+    assert place[0, 0] > 3.2
+    assert place[1, 0] < 2.95
+    assert place[2, 0] > 3.2
+
+
+def test_who_lifts_after_another_put_something_down_collides_with_items(build: Build) -> None:
+    world = build([(2.0, 2.0), (2.0, 4.0)], [FAR, (2.0, 2.1), (2.0, 4.1), (3.0, 4.0)])
+    world.step([HOLD, STAY])
+    world.step([OPEN, STAY])
+    world.step([STAY, HOLD])
+    for _ in range(10):
+        world.step([STAY, EAST])
+    assert world.state.robot_position[1, 0] == pytest.approx(2.75, abs=0.02)
 
 
 # -- letting go, and the memory -----------------------------------------------------------------
@@ -282,6 +307,14 @@ def test_letting_go_of_another_item_in_the_delivery_area_is_ignored(build: Build
         world.step([WEST])
     world.step([OPEN])
     assert world.state.robot_item[0] == NOBODY
+
+
+def test_letting_go_of_an_item_asked_for_earlier_is_ignored_there_too(build: Build) -> None:
+    world = build([(INSIDE, 5.0)], [(INSIDE, 5.1), FAR, FAR])
+    world.state.requested = 1
+    world.step([HOLD])
+    world.step([OPEN])
+    assert world.state.robot_item[0] == 0
 
 
 def test_who_cannot_let_go_keeps_nobody_behind_from_it(build: Build) -> None:
