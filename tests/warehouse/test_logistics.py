@@ -249,7 +249,7 @@ def test_the_memory_holds_the_items_last_put_down_newest_first(
 ) -> None:
     items = [FAR, (2.4, 2.0), (2.0, 2.5), (2.0, 1.4), (1.3, 2.0), (2.8, 2.0)]
     world = build([(2.0, 2.0)], items, pickup_range=1.5, memory_size=memory_size)
-    lifted = []
+    lifted: list[int] = []
     for _ in range(7):
         world.step([HOLD])
         assert world.state.robot_item[0] not in lifted[:memory_size]
