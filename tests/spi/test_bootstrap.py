@@ -38,6 +38,20 @@ def test_it_checks_the_default_interval() -> None:
     assert r.bootstrap_high == pytest.approx(r.high, abs=0.02)
 
 
+def test_with_equal_denominators_by_hand() -> None:
+    low, high = spi.studentised_bootstrap(P_F, np.ones(12), np.random.default_rng(3), resamples=999)
+    pivots = []
+    for drawn in np.random.default_rng(3).integers(12, size=(999, 12)):
+        again = P_F[drawn]
+        error = math.sqrt(((again - again.mean()) ** 2).sum() / 11 / 12)
+        pivots.append((again.mean() - P_F.mean()) / error)
+    pivots.sort()
+    error = math.sqrt(((P_F - P_F.mean()) ** 2).sum() / 11 / 12)
+    # The 25th and the 975th of 999: the 2.5 % and 97.5 % quantiles.
+    assert low == pytest.approx(P_F.mean() - pivots[974] * error, rel=1e-9)
+    assert high == pytest.approx(P_F.mean() - pivots[24] * error, rel=1e-9)
+
+
 def test_normal_pivots_give_students_interval() -> None:
     sample = rng.normal(0, 1, 400) + 10
     low, high = spi.studentised_bootstrap(sample, np.ones(400), np.random.default_rng(0))
