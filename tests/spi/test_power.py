@@ -79,6 +79,13 @@ def test_textbook_sample_size() -> None:
     assert spi.seeds_for_power(pilot, 0.5) == 34
 
 
+def test_a_small_effect_is_planned_for_too() -> None:
+    # Large samples: (1.960 + 0.842)^2 / d^2 pairs.
+    pilot = dataclasses.replace(PILOT, difference_sd=1.0, mean_denominator=1.0)
+    assert spi.no_plan_because(pilot, 0.01) is None
+    assert spi.seeds_for_power(pilot, 0.01) == pytest.approx(78_489, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("pilot", "effect", "reason"),
     [
