@@ -26,7 +26,6 @@ class Watch:
 
     Attributes:
         deepest: the greatest overlap seen between bodies [m].
-        deepest_jam: the greatest overlap that lasted for `JAM` [m].
 
     Raises:
         BrokenPromiseError: from `look`, with one sentence.
@@ -34,7 +33,7 @@ class Watch:
 
     def __init__(self, world: Warehouse) -> None:
         self.world = world
-        self.deepest = self.deepest_jam = 0.0
+        self.deepest = 0.0
         self._count: Count | None = None
         self._speed = 0.0
         self._modes: tuple[tuple[str, ...], ...] = ()
