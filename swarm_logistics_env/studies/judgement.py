@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import spi, streams
+from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
@@ -70,7 +70,7 @@ class Judgement:
 
     Attributes:
         estimate: with the unadjusted verdict; None: blocked.
-        adjusted_p, adjusted_verdict: under Holm within the family; None: blocked.
+        adjusted_p, adjusted_verdict: under Holm within the family; None: blocked, or unaffected.
         problem: why it is blocked, e.g. a failed run.
         saturated: it rests on a cell whose P is capped.
         claim: what is claimed: above the threshold (True), not above (False), nothing (None).
@@ -88,6 +88,11 @@ class Judgement:
     no_plan: str | None = None
     adjusted_p: float | None = None
     adjusted_verdict: Verdict | None = None
+
+    @property
+    def unaffected(self) -> bool:
+        """Whether both conditions gave the same runs: the value is exact, and no evidence."""
+        return self.estimate is not None and self.estimate.identical
 
     def on_claim(self, verdict: Verdict | None) -> Verdict | None:
         """Turn a verdict on "above the threshold" into one on what is claimed."""
@@ -173,6 +178,7 @@ class _Result:
     performance: NDArray[np.float64]
     problem: str | None
     saturated: bool
+    digests: tuple[str | None, ...]
 
 
 def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -> _Result:
@@ -191,7 +197,14 @@ def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -
         np.array([outcome.delivered for outcome in succeeded], dtype=np.float64),
         ", ".join(parts) or None,
         any(outcome.all_delivered for outcome in succeeded),
+        tuple(outcome.digest for outcome in succeeded),
     )
+
+
+def _identical(comparison: Comparison, used: Mapping[Arm, _Result]) -> bool:
+    """Return whether what was changed changed no run: equal digests, seed by seed."""
+    before, after = used[comparison.original].digests, used[comparison.changed].digests
+    return comparison.removed is None and before == after and None not in before
 
 
 def _cell(policy: str, table: str, arm: Arm, result: _Result, reference: Reference | None) -> Cell:
@@ -224,8 +237,8 @@ def _judgement(
                 lambda arm: used[arm].performance,
                 level=level,
                 paired=paired,
-                # The same stream for each: a verdict does not hang on the order of the questions.
-                bootstrap=streams.generator(0, "bootstrap") if paired else None,
+                saturated=[arm for arm in used if used[arm].saturated],
+                identical=_identical(comparison, used),
             )
         except spi.IndicatorError as error:
             problems = [str(error)]
@@ -259,7 +272,8 @@ def _adjusted(judgements: list[Judgement]) -> tuple[Judgement, ...]:
         estimates = [e for e in (judgements[index].estimate for index in members) if e is not None]
         if len(estimates) < len(members):
             continue
-        p_values = spi.holm([1.0 if e.p_value is None else e.p_value for e in estimates])
-        for index, p, verdict in zip(members, p_values.tolist(), spi.adjust(estimates)):
-            adjusted[index] = replace(judgements[index], adjusted_p=p, adjusted_verdict=verdict)
+        p_values = spi.adjusted_p_values(estimates)
+        for index, p, verdict in zip(members, p_values, spi.adjust(estimates)):
+            if not judgements[index].unaffected:
+                adjusted[index] = replace(judgements[index], adjusted_p=p, adjusted_verdict=verdict)
     return tuple(adjusted)
