@@ -1,0 +1,174 @@
+"""Matching: which conditions of two studies are compared, and which have no counterpart.
+
+Only judged policies are matched with each other: an ablation's second policy is a yardstick, and
+its own change is not asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from swarm_logistics_env.studies.execution import Outcome
+from swarm_logistics_env.studies.judgement import Cell, Findings
+
+_Content = tuple[object, ...]  # of a condition: all but its policy
+_Judged = dict[str, dict[_Content, Cell]]  # by the policy's label
+
+
+@dataclass(frozen=True)
+class Match:
+    """One condition that both studies hold.
+
+    Attributes:
+        name: policy, "change" and condition.
+        before, after: the cells of the old and of the new study.
+    """
+
+    name: str
+    before: Cell
+    after: Cell
+
+
+@dataclass(frozen=True)
+class Orphan:
+    """A judged policy of one study that the other gives nothing to compare with.
+
+    Attributes:
+        names: of its conditions, as `Match.name`.
+        problem: one sentence that names the policy and says what is missing.
+    """
+
+    policy: str
+    names: tuple[str, ...]
+    problem: str
+
+
+@dataclass(frozen=True)
+class Matching:
+    """What two studies have in common, and what only one of them has.
+
+    Attributes:
+        seeds: the shared ones; None: one of the studies has no seeds to share.
+        notes: sentences on conditions and seeds that only one of the studies has.
+    """
+
+    matches: tuple[Match, ...]
+    orphans: tuple[Orphan, ...]
+    seeds: tuple[int, ...] | None
+    notes: tuple[str, ...]
+
+
+def match(old: Findings, new: Findings) -> Matching:
+    """Match the conditions of two studies' judged policies, by what is varied.
+
+    A policy matches the one of its label; where each study judges a single policy these two match,
+    whatever they are called.
+    """
+    before, after = _judged(old), _judged(new)
+    partners = {label: label for label in after if label in before}
+    if len(before) == len(after) == 1:
+        partners = dict(zip(after, before))
+    matches: list[Match] = []
+    orphans = [
+        *_without_partner(before, partners.values(), "old", "new", tuple(after)),
+        *_without_partner(after, partners, "new", "old", tuple(before)),
+    ]
+    only: dict[str, list[str]] = {"old": [], "new": []}
+    for ours, theirs in partners.items():
+        named = ours if ours == theirs else f"{theirs} -> {ours}"
+        common = [content for content in after[ours] if content in before[theirs]]
+        if not common:
+            cells = (*before[theirs].values(), *after[ours].values())
+            problem = f"policy {named!r} is judged in both studies, but under no common condition"
+            orphans.append(Orphan(named, tuple(_names(named, cells)), problem))
+            continue
+        for content in common:
+            cell = after[ours][content]
+            (name,) = _names(named, [cell])
+            matches.append(Match(name, before[theirs][content], cell))
+        for study, own, others in (
+            ("old", before[theirs], after[ours]),
+            ("new", after[ours], before[theirs]),
+        ):
+            lacking = [cell for content, cell in own.items() if content not in others]
+            only[study] += [f"{named}, {cell.arm.level} ({cell.table})" for cell in lacking]
+    seeds = None
+    if old.plan.paired and new.plan.paired:
+        seeds = tuple(sorted({*old.plan.seeds} & {*new.plan.seeds}))
+    notes = [
+        f"Only in the {study} study, and not compared: {'; '.join(names)}."
+        for study, names in only.items()
+        if names
+    ]
+    if seeds:
+        notes += _seed_notes(seeds, old, new)
+    return Matching(tuple(matches), tuple(orphans), seeds, tuple(notes))
+
+
+def outcomes(findings: Findings, cell: Cell, seeds: Sequence[int]) -> list[Outcome]:
+    """Return the outcomes of a cell at the given seeds, in their order.
+
+    Raises:
+        KeyError: a run of them is missing; the cell then has a `problem`.
+    """
+    condition, code = cell.arm.condition, findings.plan.code
+    return [findings.outcomes[condition.run(code, seed).key] for seed in seeds]
+
+
+def ranges(seeds: Sequence[int]) -> str:
+    """Return ascending seeds in words, e.g. "0 to 3, 8"."""
+    breaks = [place for place, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
+    parts = [seeds[a:b] for a, b in pairwise([0, *breaks, len(seeds)])]
+    return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)
+
+
+def _judged(findings: Findings) -> _Judged:
+    """Return each condition of a judged policy once, by the policy's label and by all but it."""
+    plan = findings.plan
+    # An ablation's second policy may bear the label of a judged one: its place tells them apart.
+    yardsticks = {
+        (comparison.policy, comparison.table, comparison.changed)
+        for comparison in plan.comparisons
+        if comparison.indicator == "change"
+    }
+    found: _Judged = {}
+    for cell in findings.cells:
+        if (cell.policy, cell.table, cell.arm) in yardsticks:
+            continue
+        condition = cell.arm.condition
+        content = (condition.scenario, condition.faults, condition.behaviour)
+        # Imported tables may differ in P at one condition.
+        table = "" if plan.imported_from is None else cell.table
+        found.setdefault(cell.policy, {}).setdefault((*content, table), cell)
+    return found
+
+
+def _names(policy: str, cells: Iterable[Cell]) -> Iterator[str]:
+    for cell in cells:
+        yield f"{policy}: change, {cell.arm.level} ({cell.table})"
+
+
+def _without_partner(
+    own: _Judged, matched: Iterable[str], study: str, other: str, theirs: Sequence[str]
+) -> Iterator[Orphan]:
+    known = set(matched)
+    for label in (label for label in own if label not in known):
+        yield Orphan(
+            label,
+            tuple(_names(label, own[label].values())),
+            f"policy {label!r} of the {study} study has no match: the {other} study judges "
+            + (", ".join(map(repr, theirs)) or "no policy"),
+        )
+
+
+def _seed_notes(seeds: Sequence[int], old: Findings, new: Findings) -> Iterator[str]:
+    shared = set(seeds)
+    for study, findings in (("old", old), ("new", new)):
+        extra = [seed for seed in findings.plan.seeds if seed not in shared]
+        if extra:
+            yield (
+                f"Only in the {study} study, and left out: seeds {ranges(extra)}. Runs are paired "
+                f"over the shared seeds, {ranges(seeds)}."
+            )
