@@ -14,6 +14,7 @@ from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.conditions import Condition
+from swarm_logistics_env.studies.declaring import Declaration
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.reference import Reference, load_reference
@@ -148,7 +149,7 @@ def judge(
         for policy, table, arm in plan.cells
     )
     declared = range(declared_first_seed, declared_first_seed + declared_seeds)
-    level, exploratory = _level(plan, declared, declared_looks)
+    level, exploratory = _level(plan, Declaration(declared, declared_looks))
     judgements = [
         _judgement(comparison, results, reference, level=level, paired=plan.paired)
         for comparison in plan.comparisons
@@ -165,19 +166,13 @@ def judge(
     )
 
 
-def _level(plan: Plan, declared: range, declared_looks: tuple[int, ...]) -> tuple[float, bool]:
-    n_seeds = len(plan.seeds)
-    if not declared_looks:
-        return LEVEL, plan.seeds[0] not in declared or plan.seeds[-1] not in declared
-    as_declared = (
-        n_seeds in declared_looks
-        and plan.specification.looks == declared_looks
-        and plan.seeds.start == declared.start
-    )
-    if not as_declared:
+def _level(plan: Plan, declared: Declaration) -> tuple[float, bool]:
+    if not declared.covers(plan):
         return LEVEL, True
-    alphas = spi.look_levels(declared_looks, 1 - LEVEL)
-    return 1 - max(alphas[declared_looks.index(n_seeds)], _LEAST_ALPHA), False
+    if not declared.looks:
+        return LEVEL, False
+    alphas = spi.look_levels(declared.looks, 1 - LEVEL)
+    return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False
 
 
 @dataclass(frozen=True)
