@@ -348,10 +348,11 @@ def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
 TABLE = "kind,name,value,n_robots,seed,delivered\n"
 
 
-def imported(path: Path, faulty: tuple[int, ...]) -> str:
+def imported(path: Path, faulty: tuple[int, ...], first: int = 0) -> str:
     """A study of four seeds of P_o, P_S and the P_F that are given."""
-    rows = [f"fault,none,0,25,{s},{40 + s}\nfault,removed,1,25,{s},{38 + s}\n" for s in range(4)]
-    rows += [f"fault,FM1,1,25,{seed},{p}\n" for seed, p in enumerate(faulty)]
+    seeds = range(first, first + 4)
+    rows = [f"fault,none,0,25,{s},{40 + s}\nfault,removed,1,25,{s},{38 + s}\n" for s in seeds]
+    rows += [f"fault,FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
     path.with_suffix(".csv").write_text(TABLE + "".join(rows))
     assert app.run(["study", "import", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
     return str(path)
@@ -373,6 +374,19 @@ def test_regression_gate_fails_with_exit_code_1(
         assert words in capsys.readouterr().out
     assert app.run(["study", "compare", old, new, "--fail-if", "S < 0"]) == 2
     assert "tests nothing" in capsys.readouterr().err
+
+
+def test_imported_runs_are_paired_by_the_seeds_of_their_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = imported(tmp_path / "old", (40, 42, 47, 44))
+    new = imported(tmp_path / "new", (48, 43, 41, 42), first=2)
+    capsys.readouterr()
+    assert app.run(["study", "compare", old, new, "--fail-if", "change < 0 at FM1"]) == 0
+    printed = capsys.readouterr().out
+    # Seeds 2 and 3: 48 + 43 instead of 47 + 44. By their places it would be a gain of 1.
+    assert "change, FM1, m = 1 (Fault tolerance and robustness) | 0.000 [" in printed
+    assert "Only in the old study, and left out: seeds 0 to 1." in printed
 
 
 def test_power_of_a_stored_study_and_of_a_pilot(

@@ -14,7 +14,8 @@ from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.gate import Gate
 from swarm_logistics_env.studies.judgement import Findings
-from swarm_logistics_env.studies.matching import Match, match, outcomes, ranges
+from swarm_logistics_env.studies.matching import Match, match, outcomes
+from swarm_logistics_env.studies.seeds import seeds_in_words
 
 # An estimate; a number that is exact, as the runs are the same runs; or why it cannot be judged.
 _Found = Estimate | float | str
@@ -143,8 +144,9 @@ def _change(
     if seeds is not None:
         if not seeds:
             return (
-                f"the studies share no seed: the old one has {ranges(old.plan.seeds)}, the new "
-                f"one {ranges(new.plan.seeds)}; play one of them on the other's seeds"
+                f"the studies share no seed: the old one has {seeds_in_words(old.plan.seeds)}, "
+                f"the new one {seeds_in_words(new.plan.seeds)}; play one of them on the other's "
+                "seeds"
             )
         pair = outcomes(old, before, seeds), outcomes(new, after, seeds)
         if identical(*pair):

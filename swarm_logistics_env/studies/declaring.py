@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from swarm_logistics_env.studies import notes
+from swarm_logistics_env.studies.seeds import seeds_in_words
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.plan import Plan
@@ -47,6 +49,8 @@ class Declaration:
 
     def covers(self, plan: Plan) -> bool:
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
+        if plan.imported_from is not None:
+            return True  # nothing is added to what was imported
         if not self.looks:
             return plan.seeds[0] in self.seeds and plan.seeds[-1] in self.seeds
         return (
@@ -72,7 +76,6 @@ class Declaration:
         )
 
 
-def _counted(seeds: range) -> str:
-    if len(seeds) == 1:
-        return f"one seed ({seeds[0]})"
-    return f"{len(seeds)} seeds ({seeds[0]} to {seeds[-1]})"
+def _counted(seeds: Sequence[int]) -> str:
+    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
+    return f"{count} ({seeds_in_words(seeds)})"

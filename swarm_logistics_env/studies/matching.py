@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.judgement import Cell, Findings
+from swarm_logistics_env.studies.seeds import seeds_in_words
 
 _Content = tuple[object, ...]  # of a condition: all but its policy
 _Judged = dict[str, dict[_Content, Cell]]  # by the policy's label
@@ -117,13 +117,6 @@ def outcomes(findings: Findings, cell: Cell, seeds: Sequence[int]) -> list[Outco
     return [findings.outcomes[condition.run(code, seed).key] for seed in seeds]
 
 
-def ranges(seeds: Sequence[int]) -> str:
-    """Return ascending seeds in words, e.g. "0 to 3, 8"."""
-    breaks = [place for place, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
-    parts = [seeds[a:b] for a, b in pairwise([0, *breaks, len(seeds)])]
-    return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)
-
-
 def _judged(findings: Findings) -> _Judged:
     """Return each condition of a judged policy once, by the policy's label and by all but it."""
     plan = findings.plan
@@ -169,6 +162,6 @@ def _seed_notes(seeds: Sequence[int], old: Findings, new: Findings) -> Iterator[
         extra = [seed for seed in findings.plan.seeds if seed not in shared]
         if extra:
             yield (
-                f"Only in the {study} study, and left out: seeds {ranges(extra)}. Runs are paired "
-                f"over the shared seeds, {ranges(seeds)}."
+                f"Only in the {study} study, and left out: seeds {seeds_in_words(extra)}. "
+                f"Runs are paired over the shared seeds, {seeds_in_words(seeds)}."
             )

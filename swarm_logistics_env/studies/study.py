@@ -171,7 +171,7 @@ class Study:
         with self._store() as store:
             self._refuse_another(store)
             if Declaration.noted(store) is None:
-                Declaration(plan.seeds, self.specification.looks).note(store)
+                Declaration(self.specification.seed_numbers, self.specification.looks).note(store)
             store.set_note(notes.SPECIFICATION, self.specification.to_json())
             store.set_note(notes.CODE, plan.code)
             store.set_note(notes.IDENTITIES, json.dumps(dict(plan.identities)))
@@ -227,7 +227,7 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            declared = Declaration.noted(store) or Declaration(plan.seeds)
+            declared = Declaration.noted(store) or Declaration(self.specification.seed_numbers)
             return judge(
                 plan,
                 store.outcomes(plan.runs()),
