@@ -126,9 +126,9 @@ def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, _Found]]:
 
 def _changes(gate: Gate, old: Findings, new: Findings) -> Iterator[tuple[str, _Found]]:
     matching = match(old, new)
-    for orphan in matching.orphans:
-        if any(gate.at in name for name in orphan.names):
-            yield f"{orphan.policy}: change", orphan.problem
+    for unmatched in matching.unmatched:
+        if any(gate.at in name for name in unmatched.names):
+            yield f"{unmatched.policy}: change", unmatched.problem
     for matched in matching.matches:
         if gate.at in matched.name:
             yield matched.name, _change(gate, old, new, matched, matching.seeds)

@@ -1,12 +1,12 @@
 """Matching: which conditions of two studies are compared, and which have no counterpart.
 
-Only judged policies are matched with each other: an ablation's second policy is a yardstick, and
-its own change is not asked.
+Only judged policies are matched with each other: the second policy of an ablation is there to be
+compared with, and how it has changed is not asked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from swarm_logistics_env.studies.execution import Outcome
@@ -32,7 +32,7 @@ class Match:
 
 
 @dataclass(frozen=True)
-class Orphan:
+class Unmatched:
     """A judged policy of one study that the other gives nothing to compare with.
 
     Attributes:
@@ -55,7 +55,7 @@ class Matching:
     """
 
     matches: tuple[Match, ...]
-    orphans: tuple[Orphan, ...]
+    unmatched: tuple[Unmatched, ...]
     seeds: tuple[int, ...] | None
     notes: tuple[str, ...]
 
@@ -71,40 +71,29 @@ def match(old: Findings, new: Findings) -> Matching:
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
     matches: list[Match] = []
-    orphans = [
+    unmatched = [
         *_without_partner(before, partners.values(), "old", "new", tuple(after)),
         *_without_partner(after, partners, "new", "old", tuple(before)),
     ]
-    only: dict[str, list[str]] = {"old": [], "new": []}
-    for ours, theirs in partners.items():
-        named = ours if ours == theirs else f"{theirs} -> {ours}"
-        common = [content for content in after[ours] if content in before[theirs]]
+    notes: list[str] = []
+    for label, old_label in partners.items():
+        named = label if label == old_label else f"{old_label} -> {label}"
+        theirs, ours = before[old_label], after[label]
+        common = [content for content in ours if content in theirs]
         if not common:
-            cells = (*before[theirs].values(), *after[ours].values())
+            names = tuple(_name(named, cell) for cell in (*theirs.values(), *ours.values()))
             problem = f"policy {named!r} is judged in both studies, but under no common condition"
-            orphans.append(Orphan(named, tuple(_names(named, cells)), problem))
+            unmatched.append(Unmatched(named, names, problem))
             continue
-        for content in common:
-            cell = after[ours][content]
-            (name,) = _names(named, [cell])
-            matches.append(Match(name, before[theirs][content], cell))
-        for study, own, others in (
-            ("old", before[theirs], after[ours]),
-            ("new", after[ours], before[theirs]),
-        ):
-            lacking = [cell for content, cell in own.items() if content not in others]
-            only[study] += [f"{named}, {cell.arm.level} ({cell.table})" for cell in lacking]
+        matches += [Match(_name(named, ours[c]), theirs[c], ours[c]) for c in common]
+        notes += _only_in("old", named, theirs, ours)
+        notes += _only_in("new", named, ours, theirs)
     seeds = None
     if old.plan.paired and new.plan.paired:
         seeds = tuple(sorted({*old.plan.seeds} & {*new.plan.seeds}))
-    notes = [
-        f"Only in the {study} study, and not compared: {'; '.join(names)}."
-        for study, names in only.items()
-        if names
-    ]
     if seeds:
         notes += _seed_notes(seeds, old, new)
-    return Matching(tuple(matches), tuple(orphans), seeds, tuple(notes))
+    return Matching(tuple(matches), tuple(unmatched), seeds, tuple(notes))
 
 
 def outcomes(findings: Findings, cell: Cell, seeds: Sequence[int]) -> list[Outcome]:
@@ -121,14 +110,14 @@ def _judged(findings: Findings) -> _Judged:
     """Return each condition of a judged policy once, by the policy's label and by all but it."""
     plan = findings.plan
     # An ablation's second policy may bear the label of a judged one: its place tells them apart.
-    yardsticks = {
+    second = {
         (comparison.policy, comparison.table, comparison.changed)
         for comparison in plan.comparisons
         if comparison.indicator == "change"
     }
     found: _Judged = {}
     for cell in findings.cells:
-        if (cell.policy, cell.table, cell.arm) in yardsticks:
+        if (cell.policy, cell.table, cell.arm) in second:
             continue
         condition = cell.arm.condition
         content = (condition.scenario, condition.faults, condition.behaviour)
@@ -138,22 +127,30 @@ def _judged(findings: Findings) -> _Judged:
     return found
 
 
-def _names(policy: str, cells: Iterable[Cell]) -> Iterator[str]:
-    for cell in cells:
-        yield f"{policy}: change, {cell.arm.level} ({cell.table})"
+def _name(policy: str, cell: Cell) -> str:
+    return f"{policy}: change, {cell.arm.level} ({cell.table})"
 
 
 def _without_partner(
     own: _Judged, matched: Iterable[str], study: str, other: str, theirs: Sequence[str]
-) -> Iterator[Orphan]:
+) -> Iterator[Unmatched]:
     known = set(matched)
     for label in (label for label in own if label not in known):
-        yield Orphan(
+        yield Unmatched(
             label,
-            tuple(_names(label, own[label].values())),
+            tuple(_name(label, cell) for cell in own[label].values()),
             f"policy {label!r} of the {study} study has no match: the {other} study judges "
             + (", ".join(map(repr, theirs)) or "no policy"),
         )
+
+
+def _only_in(
+    study: str, policy: str, own: Mapping[_Content, Cell], others: Mapping[_Content, Cell]
+) -> Iterator[str]:
+    lacking = [cell for content, cell in own.items() if content not in others]
+    if lacking:
+        levels = "; ".join(f"{cell.arm.level} ({cell.table})" for cell in lacking)
+        yield f"Only in the {study} study, and not compared: {policy}, {levels}."
 
 
 def _seed_notes(seeds: Sequence[int], old: Findings, new: Findings) -> Iterator[str]:
