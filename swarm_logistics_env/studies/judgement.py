@@ -14,6 +14,7 @@ from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.conditions import Condition
+from swarm_logistics_env.studies.declaring import Declaration
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.reference import Reference, load_reference
@@ -111,7 +112,7 @@ class Findings:
         plan: of the study.
         cells: every P, in the order of the tables.
         judgements: every comparison, in the order of the tables.
-        exploratory: more seeds than were declared at the study's start, or a look that was not,
+        exploratory: seeds that were not declared at the study's start, or a look that was not,
             so the verdicts' error level is not the nominal one.
         outcomes: of the plan's runs, by key, for what P alone does not tell.
         level: confidence level of the indicators' intervals and verdicts; above 0.95 at a
@@ -134,8 +135,14 @@ def judge(
     outcomes: Mapping[str, Outcome],
     declared_seeds: int,
     declared_looks: tuple[int, ...] = (),
+    declared_first_seed: int = 0,
 ) -> Findings:
     """Judge a plan by the outcomes of its runs, keyed by run.
+
+    Args:
+        declared_seeds: how many seeds were declared before the first run.
+        declared_looks: at how many seeds the study was then declared to be judged.
+        declared_first_seed: the smallest of the declared seeds.
 
     A comparison that needs a run which failed or is missing is blocked, and with it the adjusted
     verdicts of its family, whose size would else be too small.
@@ -146,7 +153,8 @@ def judge(
         _cell(policy, table, arm, results[arm.condition.key], reference)
         for policy, table, arm in plan.cells
     )
-    level, exploratory = _level(plan, declared_seeds, declared_looks)
+    declared = range(declared_first_seed, declared_first_seed + declared_seeds)
+    level, exploratory = _level(plan, Declaration(declared, declared_looks))
     judgements = [
         _judgement(comparison, results, reference, level=level, paired=plan.paired)
         for comparison in plan.comparisons
@@ -163,14 +171,13 @@ def judge(
     )
 
 
-def _level(plan: Plan, declared_seeds: int, declared_looks: tuple[int, ...]) -> tuple[float, bool]:
-    n_seeds = len(plan.seeds)
-    if not declared_looks:
-        return LEVEL, n_seeds > declared_seeds
-    if n_seeds not in declared_looks or plan.specification.looks != declared_looks:
+def _level(plan: Plan, declared: Declaration) -> tuple[float, bool]:
+    if not declared.covers(plan):
         return LEVEL, True
-    alphas = spi.look_levels(declared_looks, 1 - LEVEL)
-    return 1 - max(alphas[declared_looks.index(n_seeds)], _LEAST_ALPHA), False
+    if not declared.looks:
+        return LEVEL, False
+    alphas = spi.look_levels(declared.looks, 1 - LEVEL)
+    return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from swarm_logistics_env.spi.estimate import Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.judgement import Findings, Judgement
+from swarm_logistics_env.studies.seeds import seeds_in_words
 
 SATURATED = "†"
 UNAFFECTED = "unaffected by construction"
@@ -155,9 +156,8 @@ def seeds_text(findings: Findings) -> str:
     seeds = findings.plan.seeds
     if not findings.plan.paired:
         return f"{len(seeds)} unpaired {'run' if len(seeds) == 1 else 'runs'} a condition"
-    if len(seeds) == 1:
-        return f"one seed ({seeds[0]})"
-    return f"{len(seeds)} paired seeds ({seeds[0]} to {seeds[-1]})"
+    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
+    return f"{count} ({seeds_in_words(seeds)})"
 
 
 def counted(verdicts: Counter[str]) -> str:
