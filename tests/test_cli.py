@@ -260,6 +260,10 @@ def test_study_plan_prints_conditions_once_and_what_they_take(
     assert "4 conditions (1 shared) x 3 seeds = 12 runs" in printed
     assert "On one process of this machine at most " in printed
     assert list(tmp_path.iterdir()) == [path]
+    path.write_text("first_seed = 500\nseeds = 3\n" + path.read_text())
+    for arguments, first in (([], 500), (["--first-seed", "1000"], 1000)):
+        assert app.run(["study", "plan", str(path), *arguments]) == 0
+        assert f"x 3 seeds from {first} on = 12 runs" in capsys.readouterr().out
 
 
 def stored(directory: Path) -> int:

@@ -20,7 +20,11 @@ StudyArgument = Annotated[
 ]
 SeedsOption = Annotated[
     int | None,
-    typer.Option(min=1, help="Seeds 0, 1, ... of every condition; the study's if not given."),
+    typer.Option(min=1, help="Number of seeds of every condition; the study's if not given."),
+]
+FirstSeedOption = Annotated[
+    int | None,
+    typer.Option(min=0, help="Smallest seed, the others follow it; the study's if not given."),
 ]
 PolicyOption = Annotated[
     list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
@@ -44,6 +48,7 @@ def group() -> None:
 def plan_command(
     asked: StudyArgument,
     seeds: SeedsOption = None,
+    first_seed: FirstSeedOption = None,
     policies: PolicyOption = None,
     trust_code: TrustCodeOption = False,
 ) -> None:
@@ -51,7 +56,7 @@ def plan_command(
     from swarm_logistics_env.cli.tables import show
     from swarm_logistics_env.studies.pilot import expect
 
-    plan = study_of(asked, None, seeds, policies, trust_code).plan()
+    plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     expected = expect(plan)
     show(_conditions(plan))
     typer.echo(plan)
@@ -66,6 +71,7 @@ def run_command(
     asked: StudyArgument,
     out: Annotated[Path, typer.Option(help="Directory of its store and report.")],
     seeds: SeedsOption = None,
+    first_seed: FirstSeedOption = None,
     policies: PolicyOption = None,
     processes: ProcessesOption = None,
     engine: Annotated[
@@ -89,7 +95,8 @@ def run_command(
     from swarm_logistics_env.studies.shards import Shard
 
     part = Shard.parse(shard) if shard else None
-    chosen = study_of(asked, out / part.directory if part else out, seeds, policies, trust_code)
+    place = out / part.directory if part else out
+    chosen = study_of(asked, place, seeds, policies, trust_code, first_seed=first_seed)
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
     typer.echo(f"{chosen.plan()}\n")
@@ -169,6 +176,8 @@ def study_of(
     seeds: int | None,
     policies: list[str] | None,
     trust_code: bool = False,
+    *,
+    first_seed: int | None = None,
     **fields: object,
 ) -> Study:
     """Return the study of a file or a preset with the options and fields that are given.
@@ -180,6 +189,8 @@ def study_of(
 
     if seeds is not None:
         fields["seeds"] = seeds
+    if first_seed is not None:
+        fields["first_seed"] = first_seed
     if policies:
         fields["policies"] = tuple(policies)
     if asked.endswith(".toml") or Path(asked).is_file():

@@ -106,7 +106,7 @@ class Findings:
         plan: of the study.
         cells: every P, in the order of the tables.
         judgements: every comparison, in the order of the tables.
-        exploratory: more seeds than were declared at the study's start, or a look that was not,
+        exploratory: seeds that were not declared at the study's start, or a look that was not,
             so the verdicts' error level is not the nominal one.
         outcomes: of the plan's runs, by key, for what P alone does not tell.
         level: confidence level of the indicators' intervals and verdicts; above 0.95 at a
@@ -129,8 +129,14 @@ def judge(
     outcomes: Mapping[str, Outcome],
     declared_seeds: int,
     declared_looks: tuple[int, ...] = (),
+    declared_first_seed: int = 0,
 ) -> Findings:
     """Judge a plan by the outcomes of its runs, keyed by run.
+
+    Args:
+        declared_seeds: how many seeds were declared before the first run.
+        declared_looks: at how many seeds the study was then declared to be judged.
+        declared_first_seed: the smallest of the declared seeds.
 
     A comparison that needs a run which failed or is missing is blocked, and with it the adjusted
     verdicts of its family, whose size would else be too small.
@@ -141,7 +147,8 @@ def judge(
         _cell(policy, table, arm, results[arm.condition.key], reference)
         for policy, table, arm in plan.cells
     )
-    level, exploratory = _level(plan, declared_seeds, declared_looks)
+    declared = range(declared_first_seed, declared_first_seed + declared_seeds)
+    level, exploratory = _level(plan, declared, declared_looks)
     judgements = [
         _judgement(comparison, results, reference, level=level, paired=plan.paired)
         for comparison in plan.comparisons
@@ -158,11 +165,16 @@ def judge(
     )
 
 
-def _level(plan: Plan, declared_seeds: int, declared_looks: tuple[int, ...]) -> tuple[float, bool]:
+def _level(plan: Plan, declared: range, declared_looks: tuple[int, ...]) -> tuple[float, bool]:
     n_seeds = len(plan.seeds)
     if not declared_looks:
-        return LEVEL, n_seeds > declared_seeds
-    if n_seeds not in declared_looks or plan.specification.looks != declared_looks:
+        return LEVEL, plan.seeds[0] not in declared or plan.seeds[-1] not in declared
+    as_declared = (
+        n_seeds in declared_looks
+        and plan.specification.looks == declared_looks
+        and plan.seeds.start == declared.start
+    )
+    if not as_declared:
         return LEVEL, True
     alphas = spi.look_levels(declared_looks, 1 - LEVEL)
     return 1 - max(alphas[declared_looks.index(n_seeds)], _LEAST_ALPHA), False

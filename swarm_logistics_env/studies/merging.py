@@ -17,17 +17,17 @@ from swarm_logistics_env.studies.store import FILE_NAME, Store
 def merge(directories: Sequence[Path], out: Path) -> int:
     """Write the runs of several stores into a new one; return how many runs it holds.
 
-    The studies must be one but for their seeds, of which the merged one has the most, and their
-    policies, of which it has all. A run that failed in one store and succeeded in another
-    succeeded.
+    The studies must be one but for their seeds and their policies, of which the merged one has
+    all. A run that failed in one store and succeeded in another succeeded. Only the seeds that
+    every study declared count as declared, so verdicts over more of them are exploratory.
 
     Args:
         directories: of the studies.
         out: directory of the merged one; it may hold theirs, but no study of its own.
 
     Raises:
-        StudyError: a store cannot be read, the studies differ, two stores have different results
-            of one run, or `out` holds a study.
+        StudyError: a store cannot be read, the studies differ, seeds lie between theirs that none
+            has, two stores have different results of one run, or `out` holds a study.
     """
     refuse_study_in(out, "merge")
     planned = {directory: _notes(directory) for directory in directories}
@@ -48,7 +48,8 @@ def _notes(directory: Path) -> dict[str, str]:
 
 
 def _united(planned: dict[Path, dict[str, str]]) -> dict[str, str]:
-    first, *others = planned
+    # By their seeds, so that no study comes before the one that joins it to the others.
+    first, *others = sorted(planned, key=lambda directory: _seeds(planned[directory]).start)
     united = dict(planned[first])
     for other in others:
         theirs = planned[other]
@@ -61,10 +62,27 @@ def _united(planned: dict[Path, dict[str, str]]) -> dict[str, str]:
             raise StudyError(f"{first} and {other} declared different looks")
         united[notes.SPECIFICATION] = _specification(united, theirs, first, other)
         united[notes.IDENTITIES] = _identities(united, theirs, first, other)
-        united[notes.DECLARED_SEEDS] = str(
-            min(int(united[notes.DECLARED_SEEDS]), int(theirs[notes.DECLARED_SEEDS]))
-        )
+        declared = _declared(united, theirs)
+        united[notes.DECLARED_FIRST_SEED] = str(declared.start)
+        united[notes.DECLARED_SEEDS] = str(len(declared))
     return united
+
+
+def _seeds(planned: dict[str, str]) -> range:
+    specification = Specification.from_json(planned[notes.SPECIFICATION])
+    first = specification.first_seed
+    return range(first, first + specification.seeds)
+
+
+def _declared(ours: dict[str, str], theirs: dict[str, str]) -> range:
+    mine, yours = (
+        range(first, first + int(one[notes.DECLARED_SEEDS]))
+        for one in (ours, theirs)
+        for first in [int(one.get(notes.DECLARED_FIRST_SEED, 0))]
+    )
+    both = range(max(mine.start, yours.start), min(mine.stop, yours.stop))
+    # With none in common, any less than all: the whole was declared by nobody.
+    return both or mine
 
 
 def _specification(ours: dict[str, str], theirs: dict[str, str], first: Path, other: Path) -> str:
@@ -72,11 +90,18 @@ def _specification(ours: dict[str, str], theirs: dict[str, str], first: Path, ot
         Specification.from_json(one[notes.SPECIFICATION]).model_dump(mode="json")
         for one in (ours, theirs)
     )
-    free = ("seeds", "policies")
+    free = ("first_seed", "seeds", "policies")
     differing = [name for name in mine if name not in free and mine[name] != yours[name]]
     if differing:
         raise StudyError(f"{first} and {other} differ in {', '.join(differing)}: not one study")
-    mine["seeds"] = max(mine["seeds"], yours["seeds"])
+    seeds, further = _seeds(ours), _seeds(theirs)
+    if further.start > seeds.stop:
+        raise StudyError(
+            f"{other} has the seeds from {further.start} on, the studies before it end with seed "
+            f"{seeds.stop - 1}: seeds lie between them that no study has, and to judge them as "
+            "one study each seed is needed"
+        )
+    mine["seeds"] = max(seeds.stop, further.stop) - seeds.start
     mine["policies"] += [policy for policy in yours["policies"] if policy not in mine["policies"]]
     return Specification(**mine).to_json()
 

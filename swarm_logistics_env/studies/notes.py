@@ -17,6 +17,7 @@ SPECIFICATION = "specification"  # JSON
 CODE = "code"  # version
 IDENTITIES = "identities"  # of policies, JSON
 DECLARED_SEEDS = "declared_seeds"  # how many, at the first run
+DECLARED_FIRST_SEED = "declared_first_seed"  # at the first run; absent: 0
 DECLARED_LOOKS = "declared_looks"  # JSON, at the first run
 IMPORTED = "imported"  # where the runs came from; absent: they were run
 
@@ -25,6 +26,7 @@ _NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
 
 # Written with digits alone, as int() reads it.
 _Count = Annotated[int, Field(gt=0, strict=True)]
+_Seed = Annotated[int, Field(ge=0, strict=True)]
 
 
 class _Origin(Record):
@@ -37,6 +39,7 @@ class _Origin(Record):
 _FORMS: dict[str, TypeAdapter[Any]] = {
     IDENTITIES: TypeAdapter(dict[str, str]),
     DECLARED_SEEDS: TypeAdapter(_Count),
+    DECLARED_FIRST_SEED: TypeAdapter(_Seed),
     DECLARED_LOOKS: TypeAdapter(tuple[_Count, ...]),
     IMPORTED: TypeAdapter(_Origin),
 }
@@ -60,7 +63,7 @@ def planned(store: Store, directory: Path) -> dict[str, str]:
     Raises:
         StudyError: one is missing.
     """
-    found = {name: store.note(name) for name in (*_NEEDED, DECLARED_LOOKS)}
+    found = {name: store.note(name) for name in (*_NEEDED, DECLARED_FIRST_SEED, DECLARED_LOOKS)}
     for name in _NEEDED:
         if found[name] is None:
             raise StudyError(

@@ -56,7 +56,8 @@ class Plan:
     @property
     def seeds(self) -> range:
         """The seeds of every condition."""
-        return range(self.specification.seeds)
+        first = self.specification.first_seed
+        return range(first, first + self.specification.seeds)
 
     @cached_property
     def cells(self) -> tuple[tuple[str, str, Arm], ...]:
@@ -83,9 +84,10 @@ class Plan:
 
     def __str__(self) -> str:
         asked, run = len(self.cells), len(self.conditions)
+        first = f" from {self.seeds.start} on" if self.seeds.start else ""
         return (
             f"{self.specification.name}: {len(self.comparisons)} comparisons of {asked} cells; "
-            f"{run} conditions ({asked - run} shared) x {len(self.seeds)} seeds = "
+            f"{run} conditions ({asked - run} shared) x {len(self.seeds)} seeds{first} = "
             f"{run * len(self.seeds)} runs"
         )
 

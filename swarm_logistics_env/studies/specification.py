@@ -25,6 +25,8 @@ from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 ScenarioFields = dict[str, Any]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
 MOST_SEEDS = 100_000
+# Every seed stays below 2**31: policies hand it to generators of all kinds.
+HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 Judged = Literal["S", "FT", "R", "A", "change"]
 
 
@@ -171,7 +173,8 @@ class Specification(_Part):
         name: of the study.
         policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
             `act`.
-        seeds: number of seeds; 0 .. seeds - 1, the same for every condition.
+        seeds: number of seeds, the same for every condition.
+        first_seed: the smallest seed, 0 or more; the others follow it one by one.
         scenario: the base; a dict of fields, "preset" among them, makes one.
         sizes, faults, parameters, ablations: what is varied.
         indicators: which of them are asked; conditions that only others need are not run.
@@ -186,6 +189,7 @@ class Specification(_Part):
     name: str = "study"
     policies: Annotated[tuple[PolicySource, ...], Field(min_length=1)] = ("swarm-dt",)
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
+    first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
     scenario: Annotated[Scenario, BeforeValidator(_scenario)] = Scenario()
     sizes: Annotated[tuple[Sizes, ...], BeforeValidator(_each(Sizes))] = ()
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()

@@ -172,8 +172,10 @@ class Study:
                 raise StudyError(f"the study in {self.out} was imported: run into a new directory")
             self._refuse_another(store)
             if store.note(notes.DECLARED_SEEDS) is None:
-                store.set_note(notes.DECLARED_SEEDS, str(len(plan.seeds)))
+                store.set_note(notes.DECLARED_FIRST_SEED, str(plan.seeds.start))
                 store.set_note(notes.DECLARED_LOOKS, json.dumps(self.specification.looks))
+                # Last: where it is noted, the others are.
+                store.set_note(notes.DECLARED_SEEDS, str(len(plan.seeds)))
             store.set_note(notes.SPECIFICATION, self.specification.to_json())
             store.set_note(notes.CODE, plan.code)
             store.set_note(notes.IDENTITIES, json.dumps(dict(plan.identities)))
@@ -220,6 +222,7 @@ class Study:
                 store.outcomes(plan.runs()),
                 int(store.note(notes.DECLARED_SEEDS) or len(plan.seeds)),
                 tuple(json.loads(store.note(notes.DECLARED_LOOKS) or "[]")),
+                int(store.note(notes.DECLARED_FIRST_SEED) or 0),
             )
 
     def results(self) -> pd.DataFrame:

@@ -69,6 +69,15 @@ def test_look_that_was_not_declared_is_exploratory(tmp_path: Path) -> None:
         assert study.findings().level == 0.95
 
 
+def test_a_look_at_other_seeds_than_the_declared_ones_is_exploratory(tmp_path: Path) -> None:
+    looks = (2, 3)
+    Study(out=tmp_path, seeds=2, first_seed=1000, looks=looks, **FIELDS).run()
+    assert not Study.stored(tmp_path).findings().exploratory
+    other = Study(out=tmp_path, seeds=3, first_seed=0, looks=looks, **FIELDS)
+    other.run()
+    assert other.findings().exploratory
+
+
 def test_looks_that_are_declared_late_change_nothing(tmp_path: Path) -> None:
     Study(out=tmp_path, seeds=2, **FIELDS).run()
     study = Study(out=tmp_path, seeds=3, looks=(3, 6), **FIELDS)
@@ -84,8 +93,8 @@ def test_report_tells_the_declared_looks_and_their_levels(tmp_path: Path) -> Non
     assert f"| 1 of 2 | 2 | {first:.4f} | {100 * (1 - first):.4g} % | this report |" in text
     assert f"| 2 of 2 | 4 | {last:.4f} | {100 * (1 - last):.4g} % | to come |" in text
     assert f"| P [95 %] | one run [95 %] | S [{100 * (1 - first):.4g} %]" in text
-    assert "none of these looks" not in text
+    assert "No look was declared" not in text
     other = Study(out=tmp_path, seeds=3, looks=(2, 3), **FIELDS)
     other.run()
     told = markdown(document(other.findings()))
-    assert "3 seeds are none of these looks: every verdict is exploratory." in told
+    assert "No look was declared at 3 paired seeds (0 to 2): every verdict is exploratory." in told

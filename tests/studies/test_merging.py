@@ -47,6 +47,25 @@ def test_seeds_and_policies_of_two_machines_become_one_study(tmp_path: Path) -> 
     assert not [path for path in (tmp_path / "both").iterdir() if path.name != FILE_NAME]
 
 
+def test_seeds_of_three_machines_are_joined_whatever_their_order(tmp_path: Path) -> None:
+    parts = {first: played(tmp_path / str(first), first_seed=first) for first in (1000, 1002, 1004)}
+    with pytest.raises(StudyError, match="from 1004 on, the studies before it end with seed 1001"):
+        merge([parts[1004], parts[1000]], tmp_path / "gap")
+    merge([parts[1004], parts[1000], parts[1002]], tmp_path / "whole")
+    merged = Study.stored(tmp_path / "whole")
+    assert merged.plan().seeds == range(1000, 1006)
+    findings = merged.findings()
+    assert not any(cell.problem for cell in findings.cells)
+    # Each machine declared its own seeds, nobody the whole.
+    assert findings.exploratory
+
+
+def test_shards_of_one_declared_study_stay_as_declared(tmp_path: Path) -> None:
+    parts = [played(tmp_path / name, first_seed=1000) for name in ("one", "other")]
+    merge(parts, tmp_path / "both")
+    assert not Study.stored(tmp_path / "both").findings().exploratory
+
+
 def test_success_wins_over_failure_whichever_comes_first(tmp_path: Path) -> None:
     whole = played(tmp_path / "whole")
     failed = altered(

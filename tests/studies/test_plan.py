@@ -86,6 +86,8 @@ def test_policy_parameters_make_another_condition() -> None:
         ({"sizes": [{"valeus": [2, 3]}]}, "Sizes has no field 'valeus'; did you mean 'values'?"),
         ({"seedz": 3}, "did you mean 'seeds'?"),
         ({"seeds": 0}, "Specification.seeds = 0: should be greater than 0"),
+        ({"first_seed": -1}, "first_seed = -1: should be greater than or equal to 0"),
+        ({"first_seed": 2**31}, "first_seed = 2147483648: should be less than or equal to"),
         ({"scenario": {"n_robot": 3}}, "did you mean 'n_robots'?"),
         ({"scenario": {"preset": "papr"}}, "did you mean 'paper'?"),
         ({"sizes": [{"values": [5, 5]}]}, "ascending"),

@@ -217,6 +217,47 @@ def test_finished_runs_are_kept_and_seeds_can_be_added(tmp_path: Path) -> None:
     assert len(more.results()) == 9
 
 
+def test_seeds_may_start_anywhere_and_others_than_the_declared_ones_are_exploratory(
+    tmp_path: Path,
+) -> None:
+    fields = {**SMALL, "faults": [], "parameters": [], "ablations": [], "seeds": 2}
+    first = Study(out=tmp_path, **fields, first_seed=1000)
+    first.run()
+    assert sorted(set(first.results()["seed"])) == [1000, 1001]
+    assert not first.findings().exploratory
+    assert not Study.stored(tmp_path).findings().exploratory
+    report = first.report()[0].read_text()
+    assert "2 seeds (1000 to 1001), the same seeds" in report
+    assert "2 paired seeds (1000 to 1001)" in report
+    fresh = Study(out=tmp_path, **fields, first_seed=2000)
+    assert fresh.run().kept == 0  # as many, but others
+    assert fresh.findings().exploratory
+    overlapping = Study(out=tmp_path, **fields, first_seed=999)
+    assert overlapping.run().kept == 3  # those of seed 1000
+    assert overlapping.findings().exploratory
+    again = Study(out=tmp_path, **fields, first_seed=1000)
+    assert again.run().played == 0
+    assert not again.findings().exploratory
+
+
+def test_stores_from_before_first_seeds_declared_their_seeds_from_0_on(tmp_path: Path) -> None:
+    fields = {**SMALL, "faults": [], "parameters": [], "ablations": []}
+    Study(out=tmp_path, **{**fields, "seeds": 2}).run()
+    with sqlite3.connect(tmp_path / FILE_NAME) as database:
+        database.execute("DELETE FROM notes WHERE name = 'declared_first_seed'")
+        (text,) = database.execute(
+            "SELECT value FROM notes WHERE name = 'specification'"
+        ).fetchone()
+        older = {name: value for name, value in json.loads(text).items() if name != "first_seed"}
+        database.execute(
+            "UPDATE notes SET value = ? WHERE name = 'specification'", (json.dumps(older),)
+        )
+    database.close()
+    stored = Study.stored(tmp_path)
+    assert stored.plan().seeds == range(2)
+    assert not stored.findings().exploratory
+
+
 def test_another_study_does_not_enter_the_directory_of_this_one(tmp_path: Path) -> None:
     fields = {**SMALL, "faults": [], "parameters": [], "ablations": [], "seeds": 1}
     Study(out=tmp_path, **{**fields, "name": "first"}).run()

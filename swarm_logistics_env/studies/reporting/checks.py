@@ -44,7 +44,9 @@ def _looks(findings: Findings) -> Section:
         )
     ]
     if findings.exploratory:
-        lines.append(f"{n_seeds} seeds are none of these looks: every verdict is exploratory.")
+        lines.append(
+            f"No look was declared at {wording.seeds_text(findings)}: every verdict is exploratory."
+        )
     return Section(
         "Declared looks",
         ("look", "seeds", "p below", "level of intervals", "when"),
