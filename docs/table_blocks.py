@@ -175,15 +175,17 @@ def _shortfall(findings: Findings) -> list[str]:
     told, short = [], True
     for name in networks:
         change = spi.relative_change(unbroken["homing"].performance, unbroken[name].performance)
+        sign, word = (-1.0, "less") if change.value < 0.0 else (1.0, "more")
         limits = ""
         if change.low is not None and change.high is not None:
-            limits = f" [{100 * change.low:.1f}, {100 * change.high:.1f}]"
+            low, high = sorted((100 * sign * change.low, 100 * sign * change.high))
+            limits = f" [{low:.1f}, {high:.1f}]"
             short = short and change.high < 0.0
-        told.append(f"`{name}` {100 * change.value:.1f} %{limits}")
+        told.append(f"`{name}` {100 * abs(change.value):.1f} %{limits} {word}")
     robots = unbroken["homing"].arm.condition.scenario.n_robots
     text = (
         f"The networks imitate `homing`{' and fall short of it' if short else ''}: at N = {robots} "
-        f"without faults, paired by seed, they deliver against it {', '.join(told)}."
+        f"without faults, paired by seed, {', '.join(told)}."
     )
     return ["", text]
 
