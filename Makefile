@@ -18,10 +18,11 @@ SUPERSUIT := .venvs/supersuit
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs format clean
+.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
+	@echo "make tables          play the studies behind the README's tables (a quarter of an hour) and write the tables"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make check           lint and types only"
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
@@ -36,6 +37,9 @@ help:
 
 paper: $(STUDY)/installed
 	$(STUDY)/bin/swarm-logistics study run paper --seeds $(SEEDS) --out $(OUT)
+
+tables: $(STUDY)/installed
+	$(STUDY)/bin/python docs/play_tables.py
 
 test: check
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=

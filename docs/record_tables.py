@@ -1,11 +1,11 @@
-"""Tables of a record's fields, for the pages that are generated."""
+"""Markdown tables, those of a record's fields among them, for the pages that are generated."""
 
 from __future__ import annotations
 
 import inspect
 import json
 import re
-from collections.abc import Container
+from collections.abc import Container, Sequence
 
 from pydantic_core import PydanticUndefined
 
@@ -16,13 +16,12 @@ from swarm_logistics_env.scenario import Scenario
 def fields(record: type[Record], leave_out: Container[str] = ()) -> str:
     """Return a table of a record's fields with their defaults and what its docstring says."""
     said = meanings(record)
-    rows = ["| field | default | meaning |", "| --- | --- | --- |"]
-    rows += [
-        f"| `{name}` | {default(record, name)} | {said.get(name, '')} |"
+    rows = [
+        (f"`{name}`", default(record, name), said.get(name, ""))
         for name in record.model_fields
         if name not in leave_out
     ]
-    return "\n".join(rows)
+    return table(("field", "default", "meaning"), rows)
 
 
 def default(record: type[Record], name: str) -> str:
@@ -60,3 +59,9 @@ def meanings(record: type[Record]) -> dict[str, str]:
 def summary(documented: object) -> str:
     """Return the first paragraph of a docstring, on one line."""
     return " ".join((documented.__doc__ or "").split("\n\n")[0].split())
+
+
+def table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> str:
+    """Return a Markdown table."""
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(str(cell) for cell in line)} |" for line in lines)

@@ -27,6 +27,13 @@ LONGEST_STRIDE = 0.8
 LONGEST_PHYSICS_PERIOD = 0.02
 MOST_SUBSTEPS = 1000
 
+# Public addresses of what the defaults were taken from.
+SOURCES = {
+    "paper": "https://arxiv.org/abs/2311.01944",
+    "simulator": "https://github.com/emmilner/swarm_sim",
+    "descendant": "https://github.com/suet-lee/swarm-warehouse",
+    "DOTS": "https://arxiv.org/abs/2203.13809",
+}
 
 Probability = Annotated[float, Field(ge=0, le=1)]
 Mix = Annotated[tuple[Annotated[float, Field(gt=0, le=1)], ...], Field(min_length=1)]
@@ -59,9 +66,11 @@ CHANGES_DURING_RUN = frozenset(
 class Scenario(Record):
     """Every condition of one run. The defaults are the paper's set-up.
 
-    Sources: "paper" is Milner, Sooriyabandara and Hauert, Swarm Performance Indicators;
-    "DOTS" the robots' developers; "simulator" the paper's author's public early simulator;
-    "measured" means chosen here because it brings the paper's tables closest.
+    Each default ends with where it comes from. "source": see `SOURCES`; "paper" is Milner,
+    Sooriyabandara and Hauert, Swarm Performance Indicators; "simulator" its author's early
+    simulator, "descendant" a later one that grew from it; "DOTS" the robots' developers. "fitted":
+    chosen here, because it brings the paper's tables closest. "off": an addition of this package,
+    which the default leaves out.
 
     Raises:
         ScenarioError: a field is unknown or out of range, or the whole cannot be built (robots
@@ -70,71 +79,75 @@ class Scenario(Record):
 
     error_type: ClassVar[type[SwarmLogisticsError]] = ScenarioError
 
-    n_robots: PositiveInt = Field(25, description="swarm size N [robots]; paper")
-    n_items: PositiveInt = Field(60, description="items in storage at the start; paper")
-    warehouse_width: PositiveFloat = Field(10.0, description="along x [m]; paper")
-    warehouse_height: PositiveFloat = Field(10.0, description="along y [m]; paper")
+    n_robots: PositiveInt = Field(25, description="swarm size N [robots]; source: paper")
+    n_items: PositiveInt = Field(60, description="items in storage at the start; source: paper")
+    warehouse_width: PositiveFloat = Field(10.0, description="along x [m]; source: paper")
+    warehouse_height: PositiveFloat = Field(10.0, description="along y [m]; source: paper")
     delivery_width: PositiveFloat = Field(
-        2.0, description="delivery area: strip along the wall x = warehouse_width [m]; simulator"
+        2.0,
+        description="delivery area: strip along the wall at the highest x [m]; source: simulator",
     )
-    duration: PositiveFloat = Field(500.0, description="episode [s]; paper")
+    duration: PositiveFloat = Field(500.0, description="episode [s]; source: paper")
     restock: bool = Field(
-        False, description="a delivered item returns to storage and requests never end; here"
+        False, description="a delivered item returns to storage and requests never end; off"
     )
-    n_obstacles: NonNegativeInt = Field(0, description="static discs; here")
-    obstacle_radius: PositiveFloat = Field(0.3, description="[m]; here")
+    n_obstacles: NonNegativeInt = Field(0, description="static discs; off")
+    obstacle_radius: PositiveFloat = Field(0.3, description="[m], if there are any; off")
 
-    robot_radius: PositiveFloat = Field(0.125, description="[m]; DOTS")
-    robot_mass: PositiveFloat = Field(3.0, description="[kg]; DOTS")
-    max_speed: PositiveFloat = Field(2.0, description="[m/s]; simulator (DOTS say 1)")
-    max_acceleration: PositiveFloat = Field(20.0, description="[m/s^2]; simulator, measured")
-    max_turn_rate: PositiveFloat = Field(6.0, description="[rad/s]; DOTS")
-    ranger_range: PositiveFloat = Field(2.0, description="16 laser rangers [m]; DOTS")
-    view_range: PositiveFloat = Field(
-        1.0, description="items and robots in view of the cameras [m]; DOTS"
+    robot_radius: PositiveFloat = Field(0.125, description="[m]; source: DOTS, simulator")
+    robot_mass: PositiveFloat = Field(3.0, description="[kg]; source: DOTS")
+    max_speed: PositiveFloat = Field(
+        2.0, description="[m/s], DOTS drive 1; source: simulator, descendant"
     )
-    radio_range: PositiveFloat = Field(4.0, description="[m]; measured")
+    max_acceleration: PositiveFloat = Field(20.0, description="[m/s^2], nearly at once; fitted")
+    max_turn_rate: PositiveFloat = Field(6.0, description="[rad/s]; source: DOTS")
+    ranger_range: PositiveFloat = Field(2.0, description="16 laser rangers [m]; source: DOTS")
+    view_range: PositiveFloat = Field(
+        1.0, description="items and robots in view of the cameras [m]; source: DOTS"
+    )
+    radio_range: PositiveFloat = Field(4.0, description="how far a robot is heard [m]; fitted")
     pickup_range: PositiveFloat = Field(
-        0.25, description="lifts an item this near, centre to centre [m]; simulator"
+        0.25,
+        description="lifts an item this near, centre to centre [m]; source: simulator, descendant",
     )
     drive: Literal["holonomic", "differential"] = Field(
-        "holonomic", description="differential: no sideways motion, `left` is ignored; DOTS"
+        "holonomic", description="differential: no sideways motion, `left` is ignored; source: DOTS"
     )
     speed_mix: Mix = Field(
-        (1.0,), description="robot i has factor i (repeating) of max_speed and turn rate; here"
+        (1.0,), description="robot i has factor i (repeating) of max_speed and turn rate; off"
     )
     sensing_mix: Mix = Field(
-        (1.0,), description="robot i has factor i (repeating) of ranger and view range; here"
+        (1.0,), description="robot i has factor i (repeating) of ranger and view range; off"
     )
     memory_size: Annotated[int, Field(ge=0, le=16)] = Field(
-        2, description="items last put down, not lifted again until a delivery; simulator"
+        2, description="items last put down, not lifted again until a delivery; source: simulator"
     )
     timer_limit: PositiveFloat = Field(
-        10.0, description="timer since the delivery area falls silent at [s]; paper"
+        10.0, description="timer since the delivery area falls silent at [s]; source: paper"
     )
     relay: Literal["none", "gossip"] = Field(
-        "none", description="robots tell their own timer, or the lowest heard, aged; paper"
+        "none", description="robots tell their own timer, or the lowest heard, aged; source: paper"
     )
 
     ranger_noise: NonNegativeFloat = Field(
-        0.0, description="standard deviation of every beam [m]; not published, so 0; here"
+        0.0, description="standard deviation of every beam [m]; not published, so 0; off"
     )
     position_noise: NonNegativeFloat = Field(
-        0.0, description="standard deviation of x and of y of neighbours and items [m]; here"
+        0.0, description="standard deviation of x and of y of neighbours and items [m]; off"
     )
     sensor_dropout: Probability = Field(
-        0.0, description="a beam, or a thing in view, is missed in a step [probability]; here"
+        0.0, description="a beam, or a thing in view, is missed in a step [probability]; off"
     )
     radio_loss: Probability = Field(
-        0.0, description="what one robot sends another is lost in a step [probability]; measured 0"
+        0.0, description="what one robot sends another is lost in a step [probability]; fitted"
     )
     message_size: Annotated[int, Field(ge=0, le=64)] = Field(
-        0, description="numbers in [-1, 1] that each robot broadcasts as it likes; here"
+        0, description="numbers in [-1, 1] that each robot broadcasts as it likes; off"
     )
 
-    item_radius: PositiveFloat = Field(0.125, description="[m]; simulator")
-    control_period: PositiveFloat = Field(0.1, description="one command per [s]; measured")
-    physics_period: PositiveFloat = Field(0.02, description="one physics step per [s]; measured")
+    item_radius: PositiveFloat = Field(0.125, description="[m]; source: simulator, descendant")
+    control_period: PositiveFloat = Field(0.1, description="one command per [s]; fitted")
+    physics_period: PositiveFloat = Field(0.02, description="one physics step per [s]; fitted")
 
     @property
     def storage_width(self) -> float:

@@ -137,7 +137,9 @@ def test_what_a_policy_of_ones_own_raises_is_one_sentence(
 
 def test_scenario_sheet_and_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["scenario", "--set", "n_robots=40"]) == 0
-    assert "| n_robots | 40 (default 25) |" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "| n_robots | 40 (default 25) |" in printed
+    assert "https://arxiv.org/abs/2311.01944" in printed  # whose defaults these are
     assert app.run(["scenario", "--preset", "paper_scalability", "--json"]) == 0
     assert Scenario.from_json(capsys.readouterr().out) == Scenario.preset("paper_scalability")
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import SCENARIO_PRESETS, Scenario, Warehouse
 from swarm_logistics_env.errors import ScenarioError, SwarmLogisticsError
+from swarm_logistics_env.scenario import SOURCES
 
 
 def test_the_defaults_are_the_papers_set_up() -> None:
@@ -170,10 +171,10 @@ def test_the_sheet_lists_every_field_with_its_value_unit_and_source() -> None:
         # A length, a time and the like has its unit; the source comes last.
         value = field.default
         assert not isinstance(value, float) or "[" in meaning, name
-        source = meaning.rsplit(";", 1)[-1]
-        known = ("paper", "DOTS", "simulator", "measured", "here")
-        assert ";" in meaning, name
-        assert any(word in source for word in known), name
+        origin = meaning.rsplit("; ", 1)[-1]
+        kind, _, sources = origin.partition(": ")
+        assert kind in ("source", "fitted", "off"), name
+        assert set(sources.split(", ")) <= (SOURCES.keys() if kind == "source" else {""}), name
     assert "| 7 (default 25) |" in rows["n_robots"]
     assert "| 1.25 (default 2) |" in rows["max_speed"]
     assert "| 60 |" in rows["n_items"]

@@ -54,9 +54,17 @@ def scenario_command(
     changes: SetOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="As JSON, to be read back.")] = False,
 ) -> None:
-    """Print every condition of a run: value, unit, source."""
+    """Print every condition of a run: value, unit, and whether the default is sourced or fitted."""
+    from swarm_logistics_env.scenario import SOURCES
+
     chosen = scenario_of(preset, changes)
-    typer.echo(chosen.to_json() if as_json else chosen.sheet().rstrip("\n"))
+    if as_json:
+        typer.echo(chosen.to_json())
+        return
+    typer.echo(chosen.sheet())
+    typer.echo("fitted: chosen to bring the paper's tables closest. off: added here, left out.")
+    for name, address in SOURCES.items():
+        typer.echo(f"{name}: {address}")
 
 
 @app.command("run")

@@ -17,6 +17,7 @@ from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.executable import SUFFIX as EXECUTABLE
 from swarm_logistics_env.policies.executable import StableBaselinesPolicy
 from swarm_logistics_env.policies.files import SUFFIX, read_policy
+from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.policies.tuned import SUFFIX as TUNED
@@ -46,6 +47,7 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
     # Swarm D-T without its taxis: the ablation.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
+    "homing": Homing,
     "central": Central,
 }
 

@@ -18,8 +18,8 @@ from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
 WALL_REACH, FAR, NEAR = 0.7, 2.0, 0.5  # [m], where nearness 1 .. 0 ends
-WHIM_TIME = 0.8  # [s] that a random direction lasts
-FIRST_WHIM = 1_000_003  # number in the robot's stream
+RANDOM_HEADING_TIME = 0.8  # [s] that a random direction lasts
+FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
 
 OUTPUTS = ("along", "aside", "gripper")
 
@@ -79,7 +79,9 @@ class MotionFrame:
         """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on."""
         known.remember(observations, self._period, self.memory)
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
-        read_rows(observations, self.memory, self.keys, self._whims(), inputs, self._turned)
+        read_rows(
+            observations, self.memory, self.keys, self._random_headings(), inputs, self._turned
+        )
         if not self._listens:
             inputs[:, LEAD] = 0.0
         self.counts += 1
@@ -94,7 +96,12 @@ class MotionFrame:
         known.remember(observations, self._period, memory)
         inputs = np.empty((len(rows), len(INPUTS)), np.float32)
         read_rows(
-            observations, memory, self.keys[rows], self._whims()[rows], inputs, np.empty(len(rows))
+            observations,
+            memory,
+            self.keys[rows],
+            self._random_headings()[rows],
+            inputs,
+            np.empty(len(rows)),
         )
         if not self._listens:
             inputs[:, LEAD] = 0.0
@@ -113,8 +120,8 @@ class MotionFrame:
         x, y = commands[:, 0], commands[:, 1]
         return np.stack([cos * x + sin * y, cos * y - sin * x, commands[:, 3]], axis=1)
 
-    def _whims(self) -> NDArray[np.int64]:
-        return (self.counts * self._period / WHIM_TIME + 1e-9).astype(np.int64)
+    def _random_headings(self) -> NDArray[np.int64]:
+        return (self.counts * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
 
 
 @kernel
@@ -122,7 +129,7 @@ def read_rows(
     rows: NDArray[np.float32],
     memory: NDArray[np.float64],
     keys: NDArray[np.uint64],
-    whims: NDArray[np.int64],
+    random_headings: NDArray[np.int64],
     inputs: NDArray[np.float32],
     turned: NDArray[np.float64],
 ) -> None:
@@ -201,14 +208,14 @@ def read_rows(
         at += 3
         told[at], told[at + 1] = own[known.FAILED], own[known.STUCK]
         at += 2
-        whim = whim_of(keys[robot], whims[robot]) - turned[robot]
-        told[at], told[at + 1] = math.cos(whim), math.sin(whim)
+        angle = random_heading(keys[robot], random_headings[robot]) - turned[robot]
+        told[at], told[at + 1] = math.cos(angle), math.sin(angle)
 
 
 @kernel
-def whim_of(key: np.uint64, number: int) -> float:
+def random_heading(key: np.uint64, number: int) -> float:
     """Return a robot's random direction number `number`, in its own frame [rad]."""
-    return 2.0 * math.pi * uniform(key, FIRST_WHIM + number)
+    return 2.0 * math.pi * uniform(key, FIRST_RANDOM_HEADING + number)
 
 
 @kernel

@@ -29,30 +29,31 @@ from swarm_logistics_env.streams import row_keys
 class SwarmDTParameters(Record):
     """The constants of Swarm D-T.
 
-    Sources: "paper"; "simulator" is the paper's author's public early simulator; "fitted" and
-    "measured": chosen because they bring the paper's tables closest.
+    "source": see `scenario.SOURCES`; the simulator is that of the paper's author. "fitted": chosen
+    because it brings the paper's tables closest. The simulator draws the noise of the heading and
+    the drop both once a step; that the one step is 0.06 s and the other 0.02 s is fitted.
     """
 
     error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
 
     diffusion: NonNegativeFloat = Field(
-        1.39, description="of the stored heading [rad^2/s]: U(+-0.5 rad) each 0.06 s; simulator"
+        1.39, description="of the stored heading [rad^2/s]: U(+-0.5 rad) a step; source: simulator"
     )
     avoidance_gain: NonNegativeFloat = Field(
         2.0, description="away from each near robot, in top speeds at distance 0; fitted"
     )
-    avoidance_range: NonNegativeFloat = Field(0.5, description="[m]; fitted")
+    avoidance_range: NonNegativeFloat = Field(0.5, description="where avoidance begins [m]; fitted")
     wall_distance: NonNegativeFloat = Field(
-        0.2, description="reflects the stored heading at a wall nearer than this [m]; measured"
+        0.2, description="reflects the stored heading at a wall nearer than this [m]; fitted"
     )
     taxis_gain: NonNegativeFloat = Field(
         0.75, description="towards the lowest timer heard, in top speeds; fitted"
     )
     drop_rate: NonNegativeFloat = Field(
-        1.5, description="of an item that is not requested [1/s]; simulator"
+        1.5, description="of an item that is not requested [1/s]: 3 % a step; source: simulator"
     )
     heading_follows: bool = Field(
-        False, description="whether avoidance and taxis turn the stored heading; inferred: no"
+        False, description="whether avoidance and taxis turn the stored heading; fitted"
     )
 
 

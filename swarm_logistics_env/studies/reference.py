@@ -14,7 +14,9 @@ from swarm_logistics_env.studies.comparisons import Comparison, Level, Question
 
 @dataclass(frozen=True)
 class Reference:
-    """Single runs and yes/no claims that somebody published.
+    """Performances and yes/no claims that somebody published, without a number of runs.
+
+    Each performance is treated as one run.
 
     Attributes:
         source: whose they are, for the report.
@@ -30,7 +32,7 @@ class Reference:
     claims: Mapping[Question, bool]
 
     def estimate(self, comparison: Comparison) -> Estimate | None:
-        """Return the published value of an indicator (one run: no interval), where there is one."""
+        """Return the published value of an indicator, without interval, where there is one."""
         if any(arm.level not in self.performance for arm in comparison.arms):
             return None
         return comparison.estimate(lambda arm: np.array([self.performance[arm.level]]))

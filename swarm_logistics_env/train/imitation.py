@@ -1,7 +1,7 @@
-"""A network that begins where a scripted policy is: imitation by DAgger (Ross et al. 2011).
+"""Imitation of the policy `homing` by DAgger (Ross et al. 2011), before PPO goes on.
 
-The student plays, the teacher says what it would have done in the student's place. The moments that
-matter are rare among the rest, which is therefore thinned out.
+The network plays; `homing` says what it would have commanded in the network's place. The moments
+that matter are rare among the rest, which is therefore thinned out.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import robot_memory
+from swarm_logistics_env.policies.homing import homing_commands
 from swarm_logistics_env.policies.motion_frame import INPUTS
 from swarm_logistics_env.streams import generator, key
 from swarm_logistics_env.train.learner import actor_parameters, outputs_of
@@ -21,15 +22,14 @@ from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.reporting import Report
 from swarm_logistics_env.train.settings import Imitation
 from swarm_logistics_env.train.specification import Training
-from swarm_logistics_env.train.teacher import taught
 from swarm_logistics_env.train.worlds import make_worlds
 
-Sample = tuple[NDArray[np.float32], NDArray[np.float32]]  # inputs, the teacher's outputs
+Sample = tuple[NDArray[np.float32], NDArray[np.float32]]  # inputs, the outputs that homing asks for
 SEEN = INPUTS.index("requested_present")
 
 
 def imitate(policy: Any, training: Training, asked: Imitation) -> None:
-    """Teach PPO's policy what the scripted teacher does; draws from torch's generator alone.
+    """Fit PPO's policy to what `homing` does; draws from torch's generator alone.
 
     Args:
         policy: of the learner; its network from inputs to outputs is changed.
@@ -51,7 +51,7 @@ def imitate(policy: Any, training: Training, asked: Imitation) -> None:
 def _collected(
     policy: Any, view: NetworkView, training: Training, asked: Imitation, number: int
 ) -> Sample:
-    """Return what the teacher says in one round of play."""
+    """Return what `homing` says in one round of play."""
     rng = generator(training.seed, "imitation", number)
     view.seed(key(training.seed, "imitation worlds", number))
     period = training.scenario.control_period
@@ -60,7 +60,7 @@ def _collected(
     inputs = view.reset()
     seen, said = [], []
     for _ in range(round(asked.seconds / period)):
-        commands = taught(view.frame, view.observations, period)
+        commands = homing_commands(view.frame, view.observations, period)
         wanted = view.frame.outputs_for(commands).astype(np.float32)
         rows = view.observations
         matters = rows[:, row.CARRYING_REQUESTED] > 0.5

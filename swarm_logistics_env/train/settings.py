@@ -97,7 +97,7 @@ class Indicators(Part):
 
 
 class Imitation(Part):
-    """A start from imitating the scripted teacher (`teacher.py`), by DAgger.
+    """A start from imitating the scripted policy `homing`, its teacher, by DAgger.
 
     Args:
         rounds: of play and fit.

@@ -17,7 +17,7 @@ import torch
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
-from swarm_logistics_env.observations import bounds
+from swarm_logistics_env.policies.homing import homing_commands
 from swarm_logistics_env.policies.motion_frame import INPUTS
 from swarm_logistics_env.studies.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
@@ -177,9 +177,8 @@ def test_a_checkpoint_that_is_cut_short_is_refused(small: Any, tmp_path: Path) -
         train(small(), tmp_path)
 
 
-def test_imitation_brings_the_network_towards_the_teacher(small: Any) -> None:
+def test_imitation_brings_the_network_towards_homing(small: Any) -> None:
     from swarm_logistics_env.train.imitation import imitate
-    from swarm_logistics_env.train.teacher import taught
 
     asked = Imitation(rounds=3, seconds=5.0, sizes=(4, 6), fit=150, last_fit=300, common_share=1.0)
     training: Training = small()
@@ -187,7 +186,7 @@ def test_imitation_brings_the_network_towards_the_teacher(small: Any) -> None:
     policy = make_learner(training, view, "cpu").policy
     view.seed(1)
     inputs = torch.from_numpy(view.reset())
-    commands = taught(view.frame, view.observations, training.scenario.control_period)
+    commands = homing_commands(view.frame, view.observations, training.scenario.control_period)
     wanted = torch.from_numpy(view.frame.outputs_for(commands).astype(np.float32))
 
     def error() -> float:
@@ -206,25 +205,6 @@ def test_the_value_network_may_learn_alone_at_first(small: Any, tmp_path: Path) 
     learner = make_learner(training, trainer._new_view(training), "cpu")
     begun = tensors_of(learner.policy)
     assert all((load_file(path)[name] == begun[name]).all() for name in begun)
-
-
-def test_the_teacher_is_a_policy_of_rows_alone() -> None:
-    teacher: Any = policies.load("swarm_logistics_env.train.teacher:Teacher")
-    low, high = bounds(Scenario())
-    rows = np.random.default_rng(0).uniform(low, high, (9, len(low))).astype(np.float32)
-    teacher.reset(9, 0)
-    commands = teacher.act(rows)
-    assert commands.shape == (9, 4)
-    assert (np.abs(commands) <= 1.0 + 1e-9).all()
-
-
-def test_the_teacher_delivers_more_than_swarm_dt() -> None:
-    scenario = Scenario(duration=60.0, restock=True)
-    delivered = {
-        name: run_episode(scenario, policies.load(name), seed=0).delivered
-        for name in ("swarm-dt", "swarm_logistics_env.train.teacher:Teacher")
-    }
-    assert delivered["swarm_logistics_env.train.teacher:Teacher"] > 2 * delivered["swarm-dt"]
 
 
 def test_checkpoints_hold_worlds_that_go_on(small: Any) -> None:

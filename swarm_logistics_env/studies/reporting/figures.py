@@ -172,7 +172,7 @@ def scaling_figure(findings: Findings, series: SizeSeries) -> Figure:
     seeds = (
         f"mean of {seeds_text(findings)}, bars: 95 % t-intervals"
         if series.policy
-        else ("one run each, so no intervals")
+        else ("number of runs not given, so no intervals")
     )
     return Figure(
         slug("P-N", series.policy or "published", series.table),

@@ -1,4 +1,4 @@
-"""Sections of a report: tables, claims, reproduction figures and the set-up, as plain text."""
+"""Sections of a report: tables, claims, published values and the set-up, as plain text."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from swarm_logistics_env.studies.agreement import Agreement, agreements
 from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
 from swarm_logistics_env.studies.reporting import wording
 from swarm_logistics_env.studies.reporting.figures import Figure
 from swarm_logistics_env.studies.reporting.sentences import Sentence
-from swarm_logistics_env.studies.reproduction import Reproduction, reproductions
 
 NOTHING = wording.NOTHING
 _MOST_MISSES = 8  # more are no list that anybody reads
@@ -50,13 +50,13 @@ def sections(findings: Findings) -> Iterator[Section]:
 def tables(findings: Findings) -> Iterator[Section]:
     """Yield the tables of a study's results, policy by policy."""
     policies = tuple(dict.fromkeys(cell.policy for cell in findings.cells))
-    figures = {figure.policy: figure for figure in reproductions(findings)}
+    figures = {figure.policy: figure for figure in agreements(findings)}
     for policy in policies:
         for table in dict.fromkeys(cell.table for cell in findings.cells if cell.policy == policy):
             yield from _tables(findings, policy, table)
         yield from _claims(findings, policy)
         if policy in figures:
-            yield _reproduction(figures[policy])
+            yield _agreement(figures[policy])
 
 
 def warnings(findings: Findings) -> tuple[str, ...]:
@@ -177,27 +177,30 @@ def _claims(findings: Findings, policy: str) -> Iterator[Section]:
     yield Section(f"{policy}: claims", columns, tuple(rows), lines)
 
 
-def _reproduction(figure: Reproduction) -> Section:
+def _agreement(figure: Agreement) -> Section:
     total = len(figure.cells)
     lines = []
-    if figure.misses is None or figure.mean_interval_width is None:
+    if figure.misses is None or figure.met is None or figure.mean_interval_width is None:
         lines.append("Cells inside the 95 % prediction interval: one seed gives no interval.")
     else:
         lines += [
             (
                 f"Cells whose published P lies inside the 95 % prediction interval of one of our "
-                f"runs: {total - len(figure.misses)} of {total}."
+                f"runs: {total - len(figure.misses)} of {total}; inside that of our mean: "
+                f"{len(figure.met)} of {total}."
             ),
             f"Mean width of those intervals: {figure.mean_interval_width:.1f} items.",
             f"Misses: {_misses(figure.misses)}.",
         ]
     lines.append(f"Mean relative error of our mean P: {figure.mean_relative_error:.1%}.")
+    if figure.mean_log_error is not None:
+        lines.append(f"Mean |log error| of our mean P: {figure.mean_log_error:.3f}.")
     pairs = [f"{a.arm.level} and {b.arm.level}" for a, b in figure.disorder]
     lines.append(
         f"Swarm sizes up to {figure.largest_ordered} in the opposite order to the published one, "
         f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
     )
-    return Section(f"{figure.policy}: reproduction", lines=tuple(lines))
+    return Section(f"{figure.policy}: agreement with the published values", lines=tuple(lines))
 
 
 def _misses(cells: tuple[Cell, ...]) -> str:

@@ -1,11 +1,17 @@
-"""The scripted policy that trainings begin by imitating.
+"""Homing: a scripted swarm whose robots remember in which direction the delivery area lies.
 
-A robot searches straight ahead, away from neighbours, and lifts nothing but the requested item.
-With it, it goes the way that it remembers to have entered the delivery area by, or to the lowest
-timer heard, in the freest of 32 directions; stuck, it follows its whim. Where it has met a failure
-of its own, it leaves requested items to others, and inside the area it lets go.
+SEARCH: straight ahead, away from neighbours; lifts nothing but the requested item. DELIVER: in the
+direction in which the robot itself entered the delivery area before, and towards the lowest timer
+heard as long as it has entered rarely; of 32 directions it takes the one that fits best and is
+free. A robot that stands still drives in a random direction for a moment. One that has met a
+failure of its own leaves requested items to others, and lets go inside the area.
 
-As a policy: `policies.load("swarm_logistics_env.train.teacher:Teacher")`.
+What it leans on: the remembered direction is kept in the robot's own frame and stays true only as
+long as that frame keeps its direction. Nothing in the simulation turns a robot that does not
+command a turn, and this policy never commands one, so its body frame acts as a compass that never
+drifts. No real robot has such a sensor. Swarm D-T remembers no direction and does not need it.
+
+The networks that `swarm-logistics train` makes begin by imitating this policy.
 """
 
 from __future__ import annotations
@@ -16,28 +22,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
+from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.policies import robot_memory as known
-from swarm_logistics_env.policies.motion_frame import WHIM_TIME, MotionFrame, whim_of
+from swarm_logistics_env.policies.motion_frame import (
+    RANDOM_HEADING_TIME,
+    MotionFrame,
+    random_heading,
+)
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-# Chosen by trying; gains in top speeds, ranges in m.
-SPREAD_GAIN, SPREAD_RANGE = 0.8, 2.0  # from neighbours, while searching
-AVOID_GAIN, AVOID_RANGE = 2.0, 0.5  # from near ones, always
+# All fitted: found by trying, for deliveries. Gains in top speeds, ranges in m.
+SPREAD_GAIN, SPREAD_RANGE = 0.8, 2.0  # away from neighbours, while searching
+AVOID_GAIN, AVOID_RANGE = 2.0, 0.5  # away from near neighbours, always
 WALL_GAIN, WALL_RANGE, MIRROR_RANGE = 1.5, 0.6, 0.2
 GRIP_RANGE = 0.4
 HOME_SHARE = 0.8  # of a laden robot's direction; the rest is its heading
-SURE = 3.0  # entries that make it stop listening to timers
+SURE = 3.0  # after so many entries, it no longer listens to timers
 CLEARANCE, OBSTACLE_RANGE = 0.28, 0.5
-N_WAYS = 32
+N_DIRECTIONS = 32
 
 
-class Teacher:
-    """The teacher as a policy; needs nothing but observation rows."""
+class Homing:
+    """The policy `homing`; reads observation rows only.
+
+    Example:
+        >>> policy = Homing()
+        >>> policy.reset(n_robots=3, seed=0)
+        >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
+        (3, 4)
+    """
 
     def __init__(self) -> None:
         self.configure(Scenario())
+        self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: the control period."""
@@ -45,36 +64,51 @@ class Teacher:
         self._frame = MotionFrame(scenario)
 
     def reset(self, n_robots: int, seed: int) -> None:
-        """Begin an episode."""
-        self._frame.begin(row_keys(seed, "teacher", n_robots))
+        """Begin an episode with random headings and empty memories."""
+        self._frame.begin(row_keys(seed, "homing", n_robots))
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return commands (N, 4) for observation rows (N, D)."""
+        """Return commands (N, 4) for observation rows (N, D).
+
+        Raises:
+            PolicyError: there are more or fewer rows than `reset` was told.
+        """
+        if len(observations) != len(self._frame.keys):
+            raise PolicyError(
+                f"observations of {len(observations)} robots: reset was told "
+                f"{len(self._frame.keys)}"
+            )
         self._frame.read(observations)
-        commands = taught(self._frame, observations, self._period)
+        commands = homing_commands(self._frame, observations, self._period)
         return self._frame.command(self._frame.outputs_for(commands))
 
 
-def taught(
+def homing_commands(
     frame: MotionFrame, observations: NDArray[np.float32], period: float
 ) -> NDArray[np.float64]:
-    """Return what the teacher would command (N, 4) upon the rows that `frame` read last."""
-    whims = ((frame.counts - 1) * period / WHIM_TIME + 1e-9).astype(np.int64)
+    """Return the policy's commands (N, 4) for the rows that `frame` read last; period in s.
+
+    Imitation asks this of the frame of the network that plays.
+    """
+    numbers = ((frame.counts - 1) * period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
     commands = np.zeros((len(observations), 4))
-    teach(observations, frame.memory, frame.keys, whims, period, commands)
+    decide_homing(observations, frame.memory, frame.keys, numbers, period, commands)
     return commands
 
 
 @kernel
-def teach(
+def decide_homing(
     rows: NDArray[np.float32],
     memory: NDArray[np.float64],
     keys: NDArray[np.uint64],
-    whims: NDArray[np.int64],
+    random_headings: NDArray[np.int64],
     period: float,
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the teacher's commands (N, 4)."""
+    """Fill the commands (N, 4) from rows (N, D) and memories (N, robot_memory.N_COLUMNS).
+
+    `random_headings` (N,) are the numbers of the random directions whose turn it is.
+    """
     for robot in range(rows.shape[0]):
         sensed, own = rows[robot], memory[robot]
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
@@ -87,11 +121,11 @@ def teach(
             if not is_inside:
                 gripper = 1.0
             if own[known.STUCK] > 0.0:
-                whim = whim_of(keys[robot], whims[robot])
-                x, y = math.cos(whim), math.sin(whim)
+                angle = random_heading(keys[robot], random_headings[robot])
+                x, y = math.cos(angle), math.sin(angle)
             elif not is_inside:
-                x, y = homewards(sensed, own, x, y)
-            x, y = freest_way(sensed, own, x + push_x, y + push_y)
+                x, y = home_direction(sensed, own, x, y)
+            x, y = freest_direction(sensed, own, x + push_x, y + push_y)
         else:
             item = requested_item(sensed, own, is_inside)
             if item >= 0:
@@ -102,7 +136,7 @@ def teach(
                 if away < GRIP_RANGE:
                     gripper = 1.0
             else:
-                x, y = searching(sensed, own, x, y, is_inside)
+                x, y = search_direction(sensed, own, x, y, is_inside)
                 x += push_x
                 y += push_y
                 speed = min(1.0, max(math.sqrt(x * x + y * y), 0.3))
@@ -127,7 +161,7 @@ def away_from_neighbours(sensed: NDArray[np.float32], reach: float) -> tuple[flo
 
 @kernel
 def requested_item(sensed: NDArray[np.float32], own: NDArray[np.float64], is_inside: bool) -> int:
-    """Return the column of the requested item that is there to be lifted; -1: none."""
+    """Return the column of the requested item if the robot may lift it; -1: none."""
     if sensed[row.CARRYING] > 0.5 or own[known.FAILED] > 0.5:
         return -1
     for place in range(row.N_ITEMS_IN_VIEW):
@@ -139,10 +173,10 @@ def requested_item(sensed: NDArray[np.float32], own: NDArray[np.float64], is_ins
 
 
 @kernel
-def searching(
+def search_direction(
     sensed: NDArray[np.float32], own: NDArray[np.float64], x: float, y: float, is_inside: bool
 ) -> tuple[float, float]:
-    """Return where to search, coming from direction (x, y)."""
+    """Return the direction in which a robot searches that drives in direction (x, y)."""
     walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
     nearest = np.argmin(walls)
     wall_x, wall_y = 0.0, 0.0
@@ -166,10 +200,10 @@ def searching(
 
 
 @kernel
-def homewards(
+def home_direction(
     sensed: NDArray[np.float32], own: NDArray[np.float64], x: float, y: float
 ) -> tuple[float, float]:
-    """Return where the delivery area may be, coming from direction (x, y)."""
+    """Return the direction in which a laden robot goes that drives in direction (x, y)."""
     home = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
     trust = 1.0
     if home > 0.5:
@@ -186,15 +220,15 @@ def homewards(
 
 
 @kernel
-def freest_way(
+def freest_direction(
     sensed: NDArray[np.float32], own: NDArray[np.float64], x: float, y: float
 ) -> tuple[float, float]:
-    """Return the direction that goes best with the wanted (x, y) and meets no item or wall."""
+    """Return the direction that is nearest to the wanted (x, y) and meets no item or wall."""
     length = max(math.sqrt(x * x + y * y), 1e-9)
     x, y = x / length, y / length
     most, best_x, best_y = -1e9, x, y
-    for way in range(N_WAYS):
-        angle = 2.0 * math.pi * way / N_WAYS
+    for number in range(N_DIRECTIONS):
+        angle = 2.0 * math.pi * number / N_DIRECTIONS
         go_x, go_y = math.cos(angle), math.sin(angle)
         worth = go_x * x + go_y * y
         worth += 0.3 * (go_x * own[known.HEADING_X] + go_y * own[known.HEADING_Y])
@@ -207,9 +241,9 @@ def freest_way(
             if aside < CLEARANCE and 0.0 < along < OBSTACLE_RANGE + 0.25:
                 near = 1.0 - max(0.0, along - 0.25) / OBSTACLE_RANGE
                 worth -= 2.0 * near * min(1.0, (CLEARANCE - aside) / 0.05)
-        wall = sensed[row.RANGE_WALLS + way // 2]
-        if way % 2:
-            wall = min(wall, sensed[row.RANGE_WALLS + (way // 2 + 1) % row.N_BEAMS])
+        wall = sensed[row.RANGE_WALLS + number // 2]
+        if number % 2:
+            wall = min(wall, sensed[row.RANGE_WALLS + (number // 2 + 1) % row.N_BEAMS])
         if wall < 0.35:
             worth -= 2.0 * (1.0 - max(0.0, wall - 0.13) / 0.22)
         if worth > most:

@@ -1,0 +1,219 @@
+"""The README's tables as Markdown, with the sentences that quote the same numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from record_tables import table
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.studies.agreement import agreement
+from swarm_logistics_env.studies.analysis.policies import judged_policies
+from swarm_logistics_env.studies.comparisons import Level
+from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
+from swarm_logistics_env.studies.reporting import wording
+
+_FAULTS = {
+    "removed": "robots removed",
+    "FM1": "FM1 (always tells timer 0)",
+    "FM2": "FM2 (never picks up)",
+    "FM3": "FM3 (neither sends nor hears)",
+    "FM4": "FM4 (delivers nothing)",
+}
+
+
+# -- the paper's table --------------------------------------------------------------------------
+
+
+def paper_block(parts: list[Findings]) -> str:
+    """Return the paper's table: P of the paper beside ours, and how well they agree."""
+    counted = [cell for part in parts for cell in part.cells if cell.counted]
+    counted.sort(key=lambda cell: ("size", "fault", "parameter").index(cell.arm.level.kind))
+    cells = {cell.arm.level: cell for cell in counted}
+    ablated = {
+        cell.arm.level: cell
+        for part in parts
+        for cell in part.cells
+        if cell.arm.level.kind == "policy"
+    }
+    figure = agreement("", tuple(cells.values()))
+    missed = {cell.arm.level for cell in figure.misses or ()}
+    rows = [
+        _row(label, [cells[level] for level in levels if level in cells], missed)
+        for label, levels in _paper_rows(cells)
+    ]
+    rows += [
+        (f"without taxis, N = {level.value:g}", "", _performance(cell), str(cell.performance.size))
+        for level, cell in ablated.items()
+        if level.name == "random-walk"
+    ]
+    lines = [
+        table(("", "paper's P", "ours, mean [95 %]", "seeds"), rows),
+        "",
+        f"Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.",
+    ]
+    if figure.mean_log_error is not None:
+        lines.append(
+            f"The mean of |ln(ours / paper's)| is {figure.mean_log_error:.3f} over the "
+            f"{len(figure.cells)} published values."
+        )
+    if figure.met is not None and figure.misses is not None:
+        inside = len(figure.cells) - len(figure.misses)
+        lines.append(
+            f"{len(figure.met)} of {len(figure.cells)} lie inside the 95 % interval of our mean; "
+            f"{inside} lie inside the 95 % prediction interval of one of our runs, whose mean "
+            f"width is {figure.mean_interval_width:.1f} items (the others are bold). The second "
+            "count is a weak test: quite different controllers pass it as well."
+        )
+    if any(cell.saturated for cell in cells.values()):
+        lines.append(
+            f"{wording.SATURATED}: in some run every item was delivered, so this P is capped and "
+            "what rests on it as well."
+        )
+    lines += ["", *_claims([judgement for part in parts for judgement in part.judgements])]
+    return "\n".join(lines)
+
+
+def _paper_rows(cells: Mapping[Level, Cell]) -> list[tuple[str, list[Level]]]:
+    """Return the rows: a label, and the levels that stand side by side in it."""
+    factors: dict[str, list[Level]] = {}
+    for level in cells:
+        factors.setdefault(level.name, []).append(level)
+    rows = []
+    for levels in factors.values():
+        width = len(levels) if len(levels) <= 4 else 3
+        for start in range(0, len(levels), width):
+            some = levels[start : start + width]
+            rows.append((_label(some, cells[some[0]].arm.condition.scenario.n_items), some))
+    return rows
+
+
+def _label(levels: list[Level], n_items: int) -> str:
+    values = ", ".join(f"{level.value:g}" for level in levels)
+    kind, name = levels[0].kind, levels[0].name
+    if kind == "size":
+        return f"N = {values} ({n_items} items)"
+    if kind == "parameter":
+        return f"{name} = {values}" + (" m" if name.endswith("_width") else "")
+    return f"{_FAULTS[name]}, m = {values}" if levels[0].value else "no fault"
+
+
+def _row(label: str, cells: list[Cell], missed: set[Level]) -> tuple[str, ...]:
+    published = [
+        f"**{cell.published:g}**" if cell.arm.level in missed else f"{cell.published:g}"
+        for cell in cells
+    ]
+    seeds = dict.fromkeys(str(cell.performance.size) for cell in cells)
+    ours = [_performance(cell) for cell in cells]
+    return label, ", ".join(published), ", ".join(ours), ", ".join(seeds)
+
+
+def _performance(cell: Cell) -> str:
+    return wording.items(cell.mean) + (wording.SATURATED if cell.saturated else "")
+
+
+def _claims(judgements: list[Judgement]) -> list[str]:
+    """Return how many claims of the paper's text are supported, and which are not."""
+    claims = [judgement for judgement in judgements if judgement.claim is not None]
+    if not claims:
+        return []
+    on_claim = [judgement.on_claim(judgement.adjusted_verdict) or "blocked" for judgement in claims]
+    counted = Counter[str](on_claim)
+    told = ", ".join(f"{counted[verdict]} {verdict}" for verdict in sorted(counted))
+    text = (
+        f"Of {len(claims)} claims (those of the paper's text, and that P falls without taxis), "
+        f"adjusted after Holm: {told}."
+    )
+    refuted = [
+        f"{wording.claimed(judgement)}, {judgement.comparison.label}"
+        for judgement, verdict in zip(claims, on_claim)
+        if verdict == "refuted"
+    ]
+    return [text, *([f"Refuted: {'; '.join(refuted)}."] if refuted else [])]
+
+
+# -- the table of policies ----------------------------------------------------------------------
+
+
+def policies_block(findings: Findings, skewed: Findings) -> str:
+    """Return P and the indicators of every policy, those of `skewed` in place of the others."""
+    names = judged_policies(findings)
+    rows: dict[str, dict[str, str]] = {}
+    for cell in findings.cells:
+        if cell.arm.level.kind == "size":
+            rows.setdefault(f"P, {cell.arm.level}", {})[cell.policy] = _performance(cell)
+    for judgement in (*findings.judgements, *skewed.judgements):
+        comparison = judgement.comparison
+        label = f"{comparison.indicator}, {comparison.label}"
+        rows.setdefault(label, {})[comparison.policy] = wording.ratio(judgement)
+    first, count, more = findings.plan.seeds[0], len(findings.plan.seeds), len(skewed.plan.seeds)
+    replaced = dict.fromkeys(
+        f"{j.comparison.indicator}, {j.comparison.label}" for j in skewed.judgements
+    )
+    fewer = [f"`{name}`" for name in judged_policies(skewed)]
+    text = (
+        f"{count} seeds from {first:,} on, on which nothing was fitted; {more} for "
+        f"{wording.listed(list(replaced))} of {wording.listed(fewer)}, whose P is skewed there."
+    )
+    head = ("", *(f"`{name}`" for name in names))
+    body = [(label, *(row.get(name, "") for name in names)) for label, row in rows.items()]
+    return "\n".join([table(head, body), "", text, *_shortfall(findings)])
+
+
+def _shortfall(findings: Findings) -> list[str]:
+    """Return a sentence: by how much the networks fall short of `homing`, which they imitate."""
+    unbroken = {
+        cell.policy: cell
+        for cell in findings.cells
+        if cell.arm.level.kind == "fault" and cell.arm.level.name == "none"
+    }
+    networks = [name for name in unbroken if name.startswith("ppo-")]
+    if "homing" not in unbroken or not networks:
+        return []
+    told, short = [], True
+    for name in networks:
+        change = spi.relative_change(unbroken["homing"].performance, unbroken[name].performance)
+        sign, word = (-1.0, "less") if change.value < 0.0 else (1.0, "more")
+        limits = ""
+        if change.low is not None and change.high is not None:
+            low, high = sorted((100 * sign * change.low, 100 * sign * change.high))
+            limits = f" [{low:.1f}, {high:.1f}]"
+            short = short and change.high < 0.0
+        told.append(f"`{name}` {100 * abs(change.value):.1f} %{limits} {word}")
+    robots = unbroken["homing"].arm.condition.scenario.n_robots
+    text = (
+        f"The networks imitate `homing`{' and fall short of it' if short else ''}: at N = {robots} "
+        f"without faults, paired by seed, {', '.join(told)}."
+    )
+    return ["", text]
+
+
+# -- the table of costs -------------------------------------------------------------------------
+
+
+def costs_block(found: Mapping[str, Any]) -> str:
+    """Return the table of what `make benchmark` measured: its benchmark.json."""
+    rows = [
+        (
+            f"{row['name']}: {row['includes']}",
+            f"{row['agent_steps_per_second']:,.0f}",
+            f"{row['microseconds_per_step']:,.0f}",
+            f"{row['cost_to_base']:.2f} x {row['base']}" if row["base"] else "",
+        )
+        for row in found["contestants"]
+    ]
+    machine = found["machine"]
+    lines = [
+        table(("", "agent-steps per s", "us per step", "cost per agent-step"), rows),
+        "",
+        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.",
+    ]
+    if found.get("bytes_per_robot"):
+        lines.append(f"A robot of 10,000 takes {found['bytes_per_robot'] / 1e3:.1f} kB.")
+    if "first_step" in found.get("seconds", {}):
+        lines.append(
+            f"A second process takes its first step after {found['seconds']['first_step']:.1f} s."
+        )
+    return "\n".join(lines)
