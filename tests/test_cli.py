@@ -298,6 +298,40 @@ def test_ctrl_c_stops_and_says_how_to_go_on(tmp_path: Path) -> None:
     )
 
 
+def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "mine.toml", tmp_path / "out"
+    file.write_text("seeds = 2\nscenario = { duration = 1 }\n[[sizes]]\nvalues = [2, 4]\n")
+    run = ["study", "run", str(file), "--processes", "1", "--out", str(out)]
+    for _ in range(2):
+        assert app.run(run) == 0
+        assert "xploratory" not in capsys.readouterr().out
+    assert app.run([*run, "--seeds", "4"]) == 0
+    printed = capsys.readouterr().out
+    # Before it plays: whoever reads it can still stop.
+    warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
+    assert warning < printed.index("## ")
+    assert "4 seeds (0 to 3) every verdict is exploratory." in printed
+    assert "Exploratory: seeds were added" in (out / "report.md").read_text()
+    assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
+    assert "holds the study 'mine'" in capsys.readouterr().err
+
+    # What it proposes is a study that can be run, and whose verdicts stand at every look.
+    (proposed,) = re.findall(r"(first_seed = \d+), (seeds = \d+), (looks = \[.*\])\.", printed)
+    assert proposed == ("first_seed = 4", "seeds = 10", "looks = [10, 20, 40]")
+    lines = [*proposed, *file.read_text().splitlines()[1:]]
+    file.write_text("\n".join(lines))
+    new = ["study", "run", str(file), "--processes", "1", "--out", str(tmp_path / "new")]
+    for arguments in ([], ["--seeds", "20"]):
+        assert app.run([*new, *arguments]) == 0
+        assert "xploratory" not in capsys.readouterr().out
+    assert app.run([*new, "--seeds", "20", "--first-seed", "24"]) == 0
+    printed = capsys.readouterr().out
+    assert "declared looks at 10, 20, 40 seeds from 4 on before its first run" in printed
+    assert "over 20 seeds (24 to 43) every verdict is exploratory." in printed
+
+
 def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
     script, out = short_paper(tmp_path, 0.5), tmp_path / "out"
     command = [sys.executable, str(script), "study"]
@@ -316,10 +350,11 @@ def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
 TABLE = "kind,name,value,n_robots,seed,delivered\n"
 
 
-def imported(path: Path, faulty: tuple[int, ...]) -> str:
+def imported(path: Path, faulty: tuple[int, ...], first: int = 0) -> str:
     """A study of four seeds of P_o, P_S and the P_F that are given."""
-    rows = [f"fault,none,0,25,{s},{40 + s}\nfault,removed,1,25,{s},{38 + s}\n" for s in range(4)]
-    rows += [f"fault,FM1,1,25,{seed},{p}\n" for seed, p in enumerate(faulty)]
+    seeds = range(first, first + 4)
+    rows = [f"fault,none,0,25,{s},{40 + s}\nfault,removed,1,25,{s},{38 + s}\n" for s in seeds]
+    rows += [f"fault,FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
     path.with_suffix(".csv").write_text(TABLE + "".join(rows))
     assert app.run(["study", "import", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
     return str(path)
@@ -341,6 +376,19 @@ def test_regression_gate_fails_with_exit_code_1(
         assert words in capsys.readouterr().out
     assert app.run(["study", "compare", old, new, "--fail-if", "S < 0"]) == 2
     assert "tests nothing" in capsys.readouterr().err
+
+
+def test_imported_runs_are_paired_by_the_seeds_of_their_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = imported(tmp_path / "old", (40, 42, 47, 44))
+    new = imported(tmp_path / "new", (48, 43, 41, 42), first=2)
+    capsys.readouterr()
+    assert app.run(["study", "compare", old, new, "--fail-if", "change < 0 at FM1"]) == 0
+    printed = capsys.readouterr().out
+    # Seeds 2 and 3: 48 + 43 instead of 47 + 44. By their places it would be a gain of 1.
+    assert "change, FM1, m = 1 (Fault tolerance and robustness) | 0.000 [" in printed
+    assert "Only in the old study, and left out: seeds 0 to 1." in printed
 
 
 def test_power_of_a_stored_study_and_of_a_pilot(

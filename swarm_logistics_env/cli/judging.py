@@ -101,9 +101,11 @@ def compare_command(
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.comparing import answers
     from swarm_logistics_env.studies.gate import Gate
+    from swarm_logistics_env.studies.matching import match
 
     gates = [Gate.parse(text) for text in fail_if or []]
     before, after = (Study.stored(directory).findings() for directory in (old, new))
+    left_out = match(before, after).notes
     failed = False
     # What is shown without a gate fails nothing.
     for gate in gates or [Gate.parse("change < 0")]:
@@ -111,7 +113,8 @@ def compare_command(
         fails = bool(gates) and any(answer.fails for answer in said)
         failed |= fails
         result = "fails" if fails else "passes"
-        _show_answers(f"Gate {gate.text!r} {result}" if gates else "Change of P", said)
+        title = f"Gate {gate.text!r} {result}" if gates else "Change of P"
+        _show_answers(title, said, left_out if gate.subject == "change" else ())
     raise typer.Exit(1 if failed else 0)
 
 
@@ -136,7 +139,7 @@ def _pilot(
     return pilot.findings()
 
 
-def _show_answers(title: str, said: tuple[Answer, ...]) -> None:
+def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
     from swarm_logistics_env.cli.tables import show
     from swarm_logistics_env.studies.reporting.sections import Section
 
@@ -144,9 +147,12 @@ def _show_answers(title: str, said: tuple[Answer, ...]) -> None:
     for answer in said:
         estimate = answer.estimate
         value, says = "–", answer.problem or ""
+        if answer.exact is not None:
+            value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
         if estimate is not None:
             value, says = f"{estimate.value:.3f}", f"above {estimate.threshold:g}: {answer.verdict}"
             if estimate.low is not None and estimate.high is not None:
                 value += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
         rows.append((answer.name, value, says))
-    show(Section(title, ("", "value [95 %]", "verdict under Holm"), tuple(rows)))
+    columns = ("", "value [95 %]", "verdict under Holm")
+    show(Section(title, columns, tuple(rows), left_out))

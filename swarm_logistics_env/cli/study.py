@@ -100,6 +100,8 @@ def run_command(
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
     typer.echo(f"{chosen.plan()}\n")
+    if warning := chosen.exploratory_because():
+        typer.echo(f"{warning}\n")
     tally = _run(chosen, player, part)
     if part is None:
         _show(chosen)

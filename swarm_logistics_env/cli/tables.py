@@ -21,7 +21,8 @@ def show(section: Section) -> None:
     if section.columns:
         table = Table(box=None, pad_edge=False, header_style="bold")
         for column in section.columns:
-            table.add_column(escape(column))
+            # Folded where a terminal is narrow: a number that is cut is another number.
+            table.add_column(escape(column), overflow="fold")
         for row in section.rows:
             table.add_row(*(escape(value) for value in row))
         console.print(table)

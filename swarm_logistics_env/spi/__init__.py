@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from .bootstrap import studentised_bootstrap
 from .efficiency import karp_flatt, marginal_gain, per_robot_efficiency
 from .errors import IndicatorError
 from .estimate import Estimate, Verdict
@@ -14,8 +13,13 @@ from .indicators import (
     robustness,
     scalability,
 )
-from .multiplicity import adjust, holm
-from .power import minimum_detectable_effect, no_plan_because, seeds_for_power
+from .multiplicity import adjust, adjusted_p_values, holm
+from .power import (
+    lower_decile_of_power,
+    minimum_detectable_effect,
+    no_plan_because,
+    seeds_for_power,
+)
 from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
@@ -43,6 +47,7 @@ __all__ = [
     "Verdict",
     "adaptability",
     "adjust",
+    "adjusted_p_values",
     "compare_scaling",
     "fault_budget",
     "fault_tolerance",
@@ -52,6 +57,7 @@ __all__ = [
     "kaplan_meier",
     "karp_flatt",
     "look_levels",
+    "lower_decile_of_power",
     "marginal_gain",
     "mean_interval",
     "minimum_detectable_effect",
@@ -67,7 +73,6 @@ __all__ = [
     "scalability",
     "seeds_for_power",
     "self_repair",
-    "studentised_bootstrap",
     "verdict_at_look",
     "worst_decile",
 ]

@@ -1,74 +1,66 @@
-"""Studentised paired bootstrap: a check of the interval that assumes no distribution."""
+"""The studentised bootstrap: the distribution of Fieller's pivot without assuming a normal one."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import functools
 
 import numpy as np
-
-from .errors import IndicatorError
-from .inputs import between_0_and_1
-from .ratio import ROUNDING, fieller_limits
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from numpy.typing import NDArray
 
 MIN_SEEDS = 10  # below, too few distinct resamples to studentise
+RESAMPLES = 9_999  # p is a whole number of ten-thousandths
+# A resample whose variance is this far below the largest square is flat: the rest is rounding.
+_FLAT = 1e-12
 
 
-def studentised_bootstrap(
-    num: NDArray[np.float64],
-    den: NDArray[np.float64],
-    generator: np.random.Generator,
-    *,
-    offset: float = 0.0,
-    level: float = 0.95,
-    resamples: int = 9_999,
-) -> tuple[float, float]:
-    """Interval of mean(num)/mean(den) + offset from resampled pairs of seeds.
+def resampled_pivots(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sqrt(n) mean / sd of resampled seeds, in ascending order.
 
-    Fieller's pivot mean(D)/se(D), D = num - theta den, with Student's quantiles replaced by those
-    of the resampled pivot (at theta = the estimate). Dividing by se(D) of each resample is what
-    keeps the coverage at ten seeds; percentile and BCa intervals lose it.
+    Dividing by the deviation of each resample is what keeps the error level at ten seeds;
+    percentile and BCa intervals lose it. The same seeds are drawn at every call, so that equal
+    data give equal verdicts.
 
     Args:
-        num: Numerators over seeds, shape (n,), n >= 10.
-        den: Denominators over the same seeds, mean > 0.
-        generator: The only source of randomness; equal states give equal limits.
-        offset: Added to both limits.
-        level: Confidence level, in (0, 1).
-        resamples: Number of resamples.
+        residual: num - value den over seeds, mean 0, shape (..., n), n >= MIN_SEEDS.
 
     Returns:
-        Lower and upper limit; -inf, inf where the mean denominator is not clear of 0.
-
-    Raises:
-        IndicatorError: Fewer than ten seeds, or level out of range.
+        Shape (RESAMPLES, ...); -inf or inf where a resample shows no spread but a mean.
     """
-    between_0_and_1("level", level)
-    n = num.size
-    if n < MIN_SEEDS:
-        raise IndicatorError(
-            f"{n} seeds: the studentised bootstrap should have at least {MIN_SEEDS}"
-        )
-    value = float(num.mean() / den.mean())
-    difference = num - value * den
-    rounding = ROUNDING * float(np.abs(num).max() + abs(value) * den.max())
-    if np.ptp(difference) <= rounding:
-        return value + offset, value + offset
-    drawn = difference[generator.integers(n, size=(resamples, n))]
-    mean, sd = drawn.mean(axis=1), drawn.std(axis=1, ddof=1)
+    n = residual.shape[-1]
+    drawn = _times_drawn(n)
+    flattened = residual.reshape(-1, n).T
+    mean = drawn @ flattened / n
+    variance = (drawn @ flattened**2 - n * mean**2) / (n - 1)
+    largest = np.abs(flattened).max(axis=0)
+    flat = variance <= _FLAT * largest**2
     # A resample without spread is as far out as its sign says: leaving it out would narrow.
-    flat = sd <= rounding
-    pivot = np.where(
-        flat,
-        np.where(np.abs(mean) <= rounding, 0.0, np.copysign(np.inf, mean)),
-        np.sqrt(n) * mean / np.where(flat, 1.0, sd),
-    )
-    tail = (1.0 - level) / 2
-    # method: an infinite pivot must not be averaged with a finite one
-    t_high, t_low = np.quantile(pivot, [tail, 1.0 - tail], method="inverted_cdf")
-    if not np.isfinite([t_low, t_high]).all():
-        return -np.inf, np.inf
-    low, high, _ = fieller_limits(num, den, float(t_low), -float(t_high))
-    return float(low) + offset, float(high) + offset
+    sign_alone = np.where(np.abs(mean) <= _FLAT * largest, 0.0, np.copysign(np.inf, mean))
+    pivots = np.where(flat, sign_alone, np.sqrt(n) * mean / np.sqrt(np.where(flat, 1.0, variance)))
+    return np.sort(pivots, axis=0).reshape(RESAMPLES, *residual.shape[:-1])
+
+
+def upper_p(pivots: NDArray[np.float64], statistic: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the one-sided p of a statistic (...), from pivots of shape (RESAMPLES, ...)."""
+    return np.asarray((1 + (pivots >= statistic).sum(axis=0)) / (RESAMPLES + 1))
+
+
+def critical_value(pivots: NDArray[np.float64], alpha: float) -> NDArray[np.float64]:
+    """Return the statistic above which `upper_p` is below alpha / 2; inf: no statistic is.
+
+    Args:
+        pivots: Ascending along the first axis, shape (RESAMPLES, ...).
+        alpha: Two-sided level of the test, in (0, 1).
+    """
+    # upper_p < alpha / 2 exactly where at most `most` pivots lie at or above the statistic.
+    most = int(np.ceil(alpha * (RESAMPLES + 1) / 2 - 1)) - 1
+    if most < 0:
+        return np.full(pivots.shape[1:], np.inf)
+    return np.asarray(pivots[RESAMPLES - 1 - most])
+
+
+@functools.lru_cache(maxsize=8)
+def _times_drawn(n: int) -> NDArray[np.float64]:
+    """Return how often each resample holds each of n seeds, shape (RESAMPLES, n)."""
+    generator = np.random.Generator(np.random.Philox(key=n))
+    drawn = generator.multinomial(n, np.full(n, 1 / n), size=RESAMPLES)
+    return np.asarray(drawn, dtype=np.float64)

@@ -26,7 +26,8 @@ def fault_budget(robustness_by_m: Mapping[int, Estimate]) -> FaultBudget:
     """Largest m with R > 0 supported at every m' <= m, for one failure mode.
 
     Tested in the order m = 1, 2, 3, ... and stopped at the first that is not supported, or not
-    there: a fixed sequence, so the unadjusted verdicts keep the family's error.
+    there: a fixed sequence, so the unadjusted verdicts keep the family's error. A swarm that a
+    fault does not reach (identical runs) is robust to it exactly: R = m/N.
 
     Args:
         robustness_by_m: Number of faulty robots m to its estimate of R.
@@ -43,7 +44,7 @@ def fault_budget(robustness_by_m: Mapping[int, Estimate]) -> FaultBudget:
             raise IndicatorError(f"indicator at m = {m} is {estimate.indicator}: should be R")
     robots = 0
     while robots + 1 in robustness_by_m:
-        if robustness_by_m[robots + 1].verdict != "supported":
+        if robustness_by_m[robots + 1].answer != "supported":
             return FaultBudget(robots, robots + 1)
         robots += 1
     untested = robots < max(robustness_by_m)

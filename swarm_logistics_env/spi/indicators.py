@@ -9,7 +9,8 @@ from .inputs import count, finite
 from .judgement import judge
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Collection
+
     from numpy.typing import ArrayLike
 
     from .estimate import Estimate
@@ -24,7 +25,8 @@ def scalability(
     threshold: float = 0.0,
     level: float = 0.95,
     paired: bool = True,
-    bootstrap: np.random.Generator | None = None,
+    saturated: Collection[str] = (),
+    identical: bool = False,
 ) -> Estimate:
     """Scalability S = ((P_{N+m} - P_N) / P_N) / (m/N), from N to N + m robots (paper, eq. S).
 
@@ -38,7 +40,8 @@ def scalability(
         threshold: What S is tested against.
         level: Confidence level of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
-        bootstrap: Random source for the studentised bootstrap, run from ten paired seeds on.
+        saturated: Names of the performances above that are capped, every item delivered in a run.
+        identical: Whether both runs of every seed are the same run: the value is then exact.
 
     Raises:
         IndicatorError: Input from which S is undefined: n or m below 1, performance empty, negative
@@ -55,7 +58,8 @@ def scalability(
         threshold=threshold,
         level=level,
         paired=paired,
-        bootstrap=bootstrap,
+        saturated=saturated,
+        identical=identical,
     )
 
 
@@ -69,7 +73,7 @@ def fault_tolerance(
     threshold: float = 0.0,
     level: float = 0.95,
     paired: bool = True,
-    bootstrap: np.random.Generator | None = None,
+    saturated: Collection[str] = (),
 ) -> Estimate:
     """Fault tolerance FT = (P_F - P_S) / P_o: m faulty robots against m removed (paper, eq. FT).
 
@@ -84,7 +88,7 @@ def fault_tolerance(
         threshold: What FT is tested against.
         level: Confidence level of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
-        bootstrap: Random source for the studentised bootstrap, run from ten paired seeds on.
+        saturated: Names of the performances above that are capped, every item delivered in a run.
 
     Raises:
         IndicatorError: Input from which FT is undefined: only one of n and m, m < 1, m >= N,
@@ -105,7 +109,7 @@ def fault_tolerance(
         threshold=threshold,
         level=level,
         paired=paired,
-        bootstrap=bootstrap,
+        saturated=saturated,
     )
 
 
@@ -118,7 +122,8 @@ def robustness(
     threshold: float = 0.0,
     level: float = 0.95,
     paired: bool = True,
-    bootstrap: np.random.Generator | None = None,
+    saturated: Collection[str] = (),
+    identical: bool = False,
 ) -> Estimate:
     """Robustness R = (P_F - P_o) / P_o + m/N (paper, eq. R).
 
@@ -132,7 +137,8 @@ def robustness(
         threshold: What R is tested against.
         level: Confidence level of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
-        bootstrap: Random source for the studentised bootstrap, run from ten paired seeds on.
+        saturated: Names of the performances above that are capped, every item delivered in a run.
+        identical: Whether both runs of every seed are the same run: the value is then exact.
 
     Raises:
         IndicatorError: Input from which R is undefined: m < 1, m > N, performance empty, negative
@@ -151,7 +157,8 @@ def robustness(
         threshold=threshold,
         level=level,
         paired=paired,
-        bootstrap=bootstrap,
+        saturated=saturated,
+        identical=identical,
     )
 
 
@@ -164,7 +171,8 @@ def adaptability(
     threshold: float = 0.0,
     level: float = 0.95,
     paired: bool = True,
-    bootstrap: np.random.Generator | None = None,
+    saturated: Collection[str] = (),
+    identical: bool = False,
 ) -> Estimate:
     """Adaptability A = ((P_new - P_o) / P_o) / |(x_new - x_o) / x_o| + 1 (paper, eq. A).
 
@@ -178,7 +186,8 @@ def adaptability(
         threshold: What A is tested against.
         level: Confidence level of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
-        bootstrap: Random source for the studentised bootstrap, run from ten paired seeds on.
+        saturated: Names of the performances above that are capped, every item delivered in a run.
+        identical: Whether both runs of every seed are the same run: the value is then exact.
 
     Raises:
         IndicatorError: Input from which A is undefined: x_o = 0, x_new = x_o, performance empty,
@@ -199,7 +208,8 @@ def adaptability(
         threshold=threshold,
         level=level,
         paired=paired,
-        bootstrap=bootstrap,
+        saturated=saturated,
+        identical=identical,
     )
 
 
@@ -210,7 +220,8 @@ def relative_change(
     threshold: float = 0.0,
     level: float = 0.95,
     paired: bool = True,
-    bootstrap: np.random.Generator | None = None,
+    saturated: Collection[str] = (),
+    identical: bool = False,
 ) -> Estimate:
     """Relative change (P_new - P_o) / P_o, for ablations and regressions (paper, eq. SdP).
 
@@ -222,7 +233,8 @@ def relative_change(
         threshold: What the change is tested against.
         level: Confidence level of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
-        bootstrap: Random source for the studentised bootstrap, run from ten paired seeds on.
+        saturated: Names of the performances above that are capped, every item delivered in a run.
+        identical: Whether both runs of every seed are the same run: the value is then exact.
 
     Raises:
         IndicatorError: Performance empty, negative or not finite, mean P_o = 0, unequal seed sets
@@ -238,5 +250,6 @@ def relative_change(
         threshold=threshold,
         level=level,
         paired=paired,
-        bootstrap=bootstrap,
+        saturated=saturated,
+        identical=identical,
     )

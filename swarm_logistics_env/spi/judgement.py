@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .bootstrap import MIN_SEEDS, studentised_bootstrap
+from .bootstrap import MIN_SEEDS
 from .errors import IndicatorError
 from .estimate import Estimate, verdict_at
 from .inputs import between_0_and_1, finite, performance, positive_mean, same_seeds
@@ -16,11 +16,15 @@ from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
-    from .estimate import Indicator
+    from .estimate import Indicator, Verdict
+
+# The two differences of two seeds are close to each other by chance so often, counts being whole
+# numbers, that their spread says nothing.
+LEAST_SEEDS = 3
 
 
 def judge(
@@ -31,7 +35,8 @@ def judge(
     threshold: float,
     level: float,
     paired: bool,
-    bootstrap: np.random.Generator | None,
+    saturated: Collection[str] = (),
+    identical: bool = False,
 ) -> Estimate:
     """Estimate one ratio of means and judge it against `threshold`.
 
@@ -44,11 +49,15 @@ def judge(
         threshold: What theta is tested against, finite.
         level: Confidence level, in (0, 1).
         paired: Whether row i of every sample is the same seed.
-        bootstrap: Source of the studentised bootstrap, run from ten paired seeds on; None: not run.
+        saturated: Names of the terms whose P is capped (every item delivered in a run). The true P
+            is then larger: a reference that is capped blocks "supported", a changed condition that
+            is capped blocks "refuted".
+        identical: Whether the runs compared are the same runs, seed by seed.
 
     Raises:
         IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
-            reference 0, threshold or level out of range.
+            reference 0, threshold or level out of range, an unknown name in `saturated`, or
+            `identical` with performances that differ.
     """
     weighted = {
         name: Term(performance(name, sample), in_num, in_den)
@@ -59,19 +68,23 @@ def judge(
     samples = {name: term.sample for name, term in weighted.items()}
     if paired:
         same_seeds(**samples)
-    elif bootstrap is not None:
-        raise IndicatorError("bootstrap with paired=False: only paired seeds can be resampled")
+    for name in saturated:
+        if name not in samples:
+            raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
+    if identical:
+        _refuse_differing(samples, paired=paired)
     *_, (reference_name, reference) = samples.items()
     positive_mean(reference_name, reference)
     n_seeds = min(sample.size for sample in samples.values())
-    if n_seeds == 1:
+    if identical or n_seeds == 1:
         mean_den = float(reference.mean())
         mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
+        value = mean_num / mean_den + offset
         return Estimate(
             indicator=indicator,
-            value=mean_num / mean_den + offset,
-            low=None,
-            high=None,
+            value=value,
+            low=value if identical else None,
+            high=value if identical else None,
             probability=None,
             verdict="inconclusive",
             threshold=threshold,
@@ -83,11 +96,11 @@ def judge(
             difference_sd=None,
             mean_denominator=mean_den,
             degrees_of_freedom=None,
-            flags=("single_seed",),
+            flags=("identical",) if identical else ("single_seed",),
         )
 
     flags = []
-    correlation, bootstrap_low, bootstrap_high = None, None, None
+    correlation = None
     if paired:
         num, den = _numerator(weighted), reference
         test = paired_ratio(num, den, offset=offset, threshold=threshold, level=level)
@@ -95,24 +108,29 @@ def judge(
         # Where D has no spread there is nothing but rounding to be skewed.
         if not test.degenerate and _skewed(num - (threshold - offset) * den):
             flags.append("skewed")
-        if bootstrap is not None and n_seeds >= MIN_SEEDS:
-            bootstrap_low, bootstrap_high = studentised_bootstrap(
-                num, den, bootstrap, offset=offset, level=level
-            )
     else:
         test = unpaired_ratio(
             list(weighted.values()), offset=offset, threshold=threshold, level=level
         )
+    p_value, probability = float(test.p_value), float(test.probability)
+    capped_side = _capped_side(weighted, saturated)
+    if n_seeds < LEAST_SEEDS:
+        flags.append("too_few_seeds")
     if test.degenerate:
         flags.append("degenerate")
+    if ("supported" if probability > 0.5 else "refuted") in capped_side:
+        flags.append("capped")
+    if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
+        p_value, probability = 1.0, 0.5
+    elif not paired or n_seeds < MIN_SEEDS:
+        flags.append("assumes_normal")
     if test.unbounded:
         flags.append("unbounded")
-    p_value, probability = float(test.p_value), float(test.probability)
     return Estimate(
         indicator=indicator,
         value=float(test.value),
-        low=float(test.low),
-        high=float(test.high),
+        low=None if test.degenerate else float(test.low),
+        high=None if test.degenerate else float(test.high),
         probability=probability,
         verdict=verdict_at(1.0 - level, p_value, probability),
         threshold=threshold,
@@ -124,10 +142,22 @@ def judge(
         difference_sd=float(test.difference_sd),
         mean_denominator=float(test.mean_denominator),
         degrees_of_freedom=test.degrees_of_freedom,
-        bootstrap_low=bootstrap_low,
-        bootstrap_high=bootstrap_high,
         flags=tuple(flags),
     )
+
+
+def _refuse_differing(samples: Mapping[str, NDArray[np.float64]], *, paired: bool) -> None:
+    (name, first), *others = samples.items()
+    for other_name, other in others:
+        if not paired or not np.array_equal(first, other):
+            raise IndicatorError(
+                f"identical = True, but {name} and {other_name} differ: should be paired and equal"
+            )
+
+
+def _capped_side(terms: Mapping[str, Term], saturated: Collection[str]) -> set[Verdict]:
+    """Return the verdicts that a capped P may have brought about: the true P is larger."""
+    return {"refuted" if terms[name].in_num > 0.0 else "supported" for name in saturated}
 
 
 def _numerator(terms: Mapping[str, Term]) -> NDArray[np.float64]:

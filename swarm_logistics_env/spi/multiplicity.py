@@ -44,7 +44,8 @@ def adjust(estimates: Sequence[Estimate]) -> tuple[Verdict, ...]:
     """Verdicts of one declared family (all modes x m of one indicator, say) under Holm.
 
     In the order given. An estimate without a p (one seed) counts in the family and stays
-    inconclusive. The family-wise error is 1 - level.
+    inconclusive. One of identical runs is no evidence: it stays inconclusive and outside the
+    family. The family-wise error is 1 - level.
 
     Raises:
         IndicatorError: The estimates' levels differ.
@@ -52,8 +53,15 @@ def adjust(estimates: Sequence[Estimate]) -> tuple[Verdict, ...]:
     levels = sorted({estimate.level for estimate in estimates})
     if len(levels) > 1:
         raise IndicatorError(f"levels {levels} in one family: should be one level")
-    adjusted = holm([1.0 if e.p_value is None else e.p_value for e in estimates])
     return tuple(
         verdict_at(1.0 - estimate.level, p, estimate.probability)
-        for estimate, p in zip(estimates, adjusted.tolist(), strict=True)
+        for estimate, p in zip(estimates, adjusted_p_values(estimates), strict=True)
     )
+
+
+def adjusted_p_values(estimates: Sequence[Estimate]) -> tuple[float | None, ...]:
+    """Holm-adjusted p of every estimate, in the order given; None for identical runs."""
+    adjusted = iter(
+        holm([1.0 if e.p_value is None else e.p_value for e in estimates if not e.identical])
+    )
+    return tuple(None if e.identical else float(next(adjusted)) for e in estimates)

@@ -24,7 +24,6 @@ def resilience_index(
     onset: float,
     threshold: float = 1.0,
     level: float = 0.95,
-    bootstrap: np.random.Generator | None = None,
 ) -> Estimate:
     """Deliveries after the onset over the paired reference's, as a ratio of means over seeds.
 
@@ -37,7 +36,6 @@ def resilience_index(
         onset: When the faults begin [s]; later deliveries count.
         threshold: What the index is tested against.
         level: Confidence level, in (0, 1).
-        bootstrap: Random source for the studentised bootstrap, run from ten seeds on.
 
     Raises:
         IndicatorError: No seeds, unequal numbers of seeds, a time negative or not finite, or no
@@ -59,5 +57,4 @@ def resilience_index(
         threshold=threshold,
         level=level,
         paired=True,
-        bootstrap=bootstrap,
     )

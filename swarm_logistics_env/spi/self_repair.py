@@ -1,55 +1,52 @@
-"""How long a swarm takes to repair itself, beside what the same measure makes of no fault."""
+"""How long a swarm takes to repair itself: the change point of its delivery rate after a fault."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from .errors import IndicatorError
 from .inputs import between_0_and_1, delivery_times
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import ArrayLike, NDArray
-
-# Pooled curves scatter: asked for the whole reference, no swarm would ever be repaired. Of 20 seeds
-# of 0.08 deliveries/s over 1333 s, simulated: the null's limit is about 230 s, a loss of a quarter
-# that lasts is always seen as such, an outage to 40 % for 500 s in seven studies of eight. A share
-# of 0.8 brings the limit to 0 s, but calls the lasting loss repaired in half of the studies.
-RECOVERED = 0.9
-_STEP = 1.0  # s, grid on which the rates are compared
+SWAPS = 999  # of the test that there is any loss
+SIMULATIONS = 400  # of each candidate time: the 95 % limit of its likelihood ratio is then +-1 %
+_CANDIDATES = 16  # times at which that limit is simulated; between them it is interpolated
+_FAR_OFF = 25.0  # likelihood ratio that no candidate's limit comes near
+_MOST_BINS = 400
+_ONE_DELIVERY = math.log(2.0)  # what one delivery of the reference more says for a loss
+_BLOCK = 100.0  # s, over which the null pair's counts are compared to find their dispersion
 
 
 @dataclass(frozen=True, slots=True)
 class SelfRepair:
-    """Self-repair time over seeds, beside what the same statistic makes of no fault at all.
+    """Self-repair time over seeds.
 
     Attributes:
-        seconds: From the onset until the rate is back [s]; None: censored, it was not back with a
-            whole window left to show it.
-        low: Lower limit of the bootstrap interval over seeds [s]; inf: resamples never recover.
-        high: Upper limit [s]; inf where the interval reaches into censoring.
-        followed: Longest self-repair time that the runs could have shown [s].
-        null_seconds: The same statistic of the pair without faults [s]; None: censored.
-        null_limit: 95 % quantile of the null over resampled seeds [s]; inf where censored.
-        distinguishable: Whether the time exceeds `null_limit`; where not, it measures noise.
+        seconds: From the onset until the rate is back, the likeliest time [s]; 0: no loss; None:
+            censored, something is lost and that it was so to the end is not excluded.
+        low: Lower limit of its interval [s].
+        high: Upper limit [s]; inf where a loss that lasts to the end is not excluded.
+        followed: How long the runs were followed after the onset [s].
+        p_value: Of "nothing is lost", one-sided: pairs swapped at random lose as much.
+        null_seconds: The likeliest time of the pair without faults [s]: noise.
+        distinguishable: Whether p_value < 1 - level; where not, the time measures noise.
     """
 
     seconds: float | None
     low: float
     high: float
     followed: float
-    null_seconds: float | None
-    null_limit: float
+    p_value: float
+    null_seconds: float
     distinguishable: bool
 
     @property
     def censored(self) -> bool:
-        """Whether the rate never came back within the runs."""
+        """Whether the runs show a loss and not that the rate came back."""
         return self.seconds is None
 
 
@@ -61,18 +58,17 @@ def self_repair(
     onset: float,
     end: float,
     generator: np.random.Generator,
-    window: float = 100.0,
     level: float = 0.95,
-    resamples: int = 2_000,
 ) -> SelfRepair:
-    """Self-repair time of delivery rates pooled over seeds, against the paired reference.
+    """Estimate the self-repair time from counts pooled over seeds, against the paired reference.
 
-    The time after the onset that parts what is behind from what is back: from it on, the rate in
-    the trailing window averages at least `RECOVERED` times the reference's over every stretch; up
-    to it, less over every stretch that ends there. It is where the running sum of the difference
-    has its minimum, the estimate of a change point (Page 1954), so neither a fault whose loss
-    begins late nor a dip of chance decides alone; 0 where nothing is lost. The trailing window
-    delays every recovery by up to its own length, in the null as well.
+    The model: from the onset to the change point the faulty runs deliver a share r < 1 of what the
+    reference delivers, afterwards as much. Given how many both deliver in a moment, the faulty
+    runs' part is binomial, so the rate itself may vary. The estimate maximises the likelihood. The
+    interval holds every time whose likelihood ratio is below the 95 % limit of runs simulated with
+    that time (a bootstrap of change points is inconsistent). The ratio is divided by the
+    dispersion that the pair without faults shows. No window smooths the counts: it would delay
+    every recovery by nearly its own length.
 
     Args:
         faulty: Delivery times [s] of each seed's run with faults.
@@ -80,41 +76,45 @@ def self_repair(
         null_pair: Two sets of runs without faults, of shared seeds but for the behaviour.
         onset: When the faults begin [s].
         end: When all runs end [s]; they must not run out of items before.
-        generator: Only source of randomness: resamples whole seeds.
-        window: Length of the trailing window [s].
-        level: Confidence level of the bootstrap interval, in (0, 1).
-        resamples: Number of resamples.
+        generator: Only source of randomness: swaps pairs and simulates counts.
+        level: Confidence level of interval and test, in (0, 1).
 
     Raises:
-        IndicatorError: Unequal numbers of seeds within a pair, no seeds, no window's time between
-            onset + window and end, or no delivery at all in a reference.
+        IndicatorError: Unequal numbers of seeds within a pair, no seeds, not 0 <= onset < end, a
+            delivery after the end, or no delivery after the onset in a reference.
     """
     between_0_and_1("level", level)
-    followed = _followed(onset, end, window)
+    followed, bin_seconds = _followed(onset, end)
+    counts = [
+        _counts(name, runs, onset, end)
+        for name, runs in (
+            ("faulty", faulty),
+            ("reference", reference),
+            ("null_pair[0]", null_pair[0]),
+            ("null_pair[1]", null_pair[1]),
+        )
+    ]
+    lead, other, null_lead, null_other = counts
+    _check_pair(("faulty", "reference"), lead, other)
+    _check_pair(("null_pair[0]", "null_pair[1]"), null_lead, null_other)
+    curve = _log_likelihood(lead.sum(axis=0), other.sum(axis=0))
+    best = int(curve.argmax())
+    p_value = _swapped_p(lead, other, float(curve[best]), generator)
+    dispersion = _dispersion(null_lead, null_other, bin_seconds)
+    kept = _kept(lead.sum(axis=0), other.sum(axis=0), curve, dispersion, level, generator)
+    null_best = int(_log_likelihood(null_lead.sum(axis=0), null_other.sum(axis=0)).argmax())
 
-    def observed_and_resampled(
-        runs: Sequence[ArrayLike], others: Sequence[ArrayLike], names: tuple[str, str]
-    ) -> tuple[float, NDArray[np.float64]]:
-        behind = _behind({names[0]: runs, names[1]: others}, onset, end, window)
-        n = len(behind)
-        drawn = generator.integers(n, size=(resamples, n))
-        times_drawn = (drawn[:, :, np.newaxis] == np.arange(n)).sum(axis=1)
-        observed = float(_back_after(behind.sum(axis=0)[np.newaxis], followed)[0])
-        return observed, _back_after(times_drawn @ behind, followed)
-
-    repair, resampled = observed_and_resampled(faulty, reference, ("faulty", "reference"))
-    null, null_resampled = observed_and_resampled(*null_pair, ("null_pair[0]", "null_pair[1]"))
-    tail = (1.0 - level) / 2
-    low, high = _quantiles(resampled, tail, 1.0 - tail)
-    (null_limit,) = _quantiles(null_resampled, 0.95)
+    distinguishable = p_value < 1.0 - level
+    to_the_end = bool(kept[-1] == curve.size - 1)
+    # A change inside a bin shows at one of its edges: the interval reaches a bin further.
     return SelfRepair(
-        seconds=None if math.isinf(repair) else repair,
-        low=low,
-        high=high,
+        seconds=None if distinguishable and to_the_end else best * bin_seconds,
+        low=max(0.0, float(kept[0] - 1) * bin_seconds),
+        high=math.inf if to_the_end else float(kept[-1] + 1) * bin_seconds,
         followed=followed,
-        null_seconds=None if math.isinf(null) else null,
-        null_limit=null_limit,
-        distinguishable=repair > null_limit,
+        p_value=p_value,
+        null_seconds=null_best * bin_seconds,
+        distinguishable=distinguishable,
     )
 
 
@@ -124,95 +124,139 @@ def repair_times(
     *,
     onset: float,
     end: float,
-    window: float = 100.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Self-repair time of every seed's own run, for `kaplan_meier`; see `self_repair`.
 
-    A single run's rate scatters: most of such a time is noise, and it says little without the same
-    of a pair without faults beside it.
+    A single run delivers too little to place a change: most of such a time is noise, and it says
+    little without the same of a pair without faults beside it.
 
     Args:
         faulty: Delivery times [s] of each seed's run with faults.
         reference: Delivery times [s] of the same seeds' reference runs.
         onset: When the faults begin [s].
         end: When all runs end [s]; they must not run out of items before.
-        window: Length of the trailing window [s].
 
     Returns:
-        Seconds from the onset and whether the rate came back, shapes (n_seeds,); where it did not,
-        the longest time that the run could have shown.
+        Seconds from the onset and whether the rate came back, shapes (n_seeds,); where that rests
+        on one delivery or less, how long the run was followed, as censored.
 
     Raises:
         IndicatorError: As for `self_repair`.
     """
-    followed = _followed(onset, end, window)
-    behind = _behind({"faulty": faulty, "reference": reference}, onset, end, window)
-    seconds = _back_after(behind, followed)
-    back = np.isfinite(seconds)
-    return np.where(back, seconds, followed), back
+    followed, bin_seconds = _followed(onset, end)
+    lead = _counts("faulty", faulty, onset, end)
+    other = _counts("reference", reference, onset, end)
+    _check_pair(("faulty", "reference"), lead, other)
+    curves = _log_likelihood(lead, other)
+    back = curves[:, -1] < curves.max(axis=1) - _ONE_DELIVERY
+    back |= curves.max(axis=1) == 0.0
+    return np.where(back, curves.argmax(axis=1) * bin_seconds, followed), back
 
 
-def _followed(onset: float, end: float, window: float) -> float:
-    """Longest self-repair time that runs can show [s]: a window has to fit in behind it."""
-    if not (window > 0.0 and onset >= 0.0 and onset + window < end < math.inf):
-        raise IndicatorError(
-            f"onset = {onset}, window = {window}, end = {end}: should leave more than one window "
-            "between onset and end"
-        )
-    return (_grid(onset, end).size - 1 - math.ceil(window / _STEP)) * _STEP
+def _followed(onset: float, end: float) -> tuple[float, float]:
+    """Return how long runs are followed after the onset and the width of a bin [s]."""
+    if not 0.0 <= onset < end < math.inf:
+        raise IndicatorError(f"onset = {onset}, end = {end}: should be 0 <= onset < end")
+    followed = end - onset
+    return followed, followed / min(_MOST_BINS, max(1, math.floor(followed)))
 
 
-def _grid(onset: float, end: float) -> NDArray[np.float64]:
-    return np.arange(onset, end + _STEP / 2, _STEP)
-
-
-def _behind(
-    pair: Mapping[str, Sequence[ArrayLike]], onset: float, end: float, window: float
-) -> NDArray[np.float64]:
-    """Deliveries in the window less the share of the reference's that counts as back.
-
-    Args:
-        pair: Name and runs of the led, then of the reference.
-
-    Returns:
-        One row per seed on the grid from onset to end, shape (seeds, points); below 0: not back.
-    """
-    grid = _grid(onset, end)
-    lead, other = (_windowed(name, runs, grid, window, end) for name, runs in pair.items())
-    if len(lead) != len(other):
-        counts = ", ".join(f"{name} has {len(runs)}" for name, runs in pair.items())
-        raise IndicatorError(
-            f"unequal seed sets ({counts}): should be the same seeds in the same order"
-        )
-    if not other.any():
-        raise IndicatorError(f"{list(pair)[1]}: should deliver something after the onset")
-    return lead - RECOVERED * other
-
-
-def _windowed(
-    name: str, runs: Sequence[ArrayLike], grid: NDArray[np.float64], window: float, end: float
-) -> NDArray[np.float64]:
-    """Deliveries in the window that trails each point of the grid, shape (seeds, points)."""
+def _counts(name: str, runs: Sequence[ArrayLike], onset: float, end: float) -> NDArray[np.float64]:
+    """Return the deliveries of each seed in bins from onset to end, shape (seeds, bins)."""
+    followed, bin_seconds = _followed(onset, end)
+    edges = onset + bin_seconds * np.arange(round(followed / bin_seconds) + 1)
     rows = []
     for seed, times in enumerate(delivery_times(name, runs)):
         if times.size and times[-1] > end:
             raise IndicatorError(
                 f"{name}[{seed}] delivers at {times[-1]:g} s: should not be after end = {end:g} s"
             )
-        until = np.searchsorted(times, grid, side="right")
-        rows.append(until - np.searchsorted(times, grid - window, side="right"))
+        # A delivery at the onset was before the fault, one at an edge belongs to the bin before.
+        rows.append(np.diff(np.searchsorted(times, edges, side="right")))
     return np.array(rows, dtype=np.float64)
 
 
-def _back_after(behind: NDArray[np.float64], followed: float) -> NDArray[np.float64]:
-    """Seconds to the minimum of each row's running sum, rows of (rows, points); inf: censored."""
-    total = np.cumsum(behind, axis=1)
-    start = np.zeros((len(total), 1))
-    # Rounded: of equal sums the first counts, and rounding is no difference.
-    seconds = np.concatenate([start, total], axis=1).round(6).argmin(axis=1) * _STEP
-    return np.where(seconds > followed, np.inf, seconds)
+def _check_pair(
+    names: tuple[str, str], lead: NDArray[np.float64], other: NDArray[np.float64]
+) -> None:
+    if len(lead) != len(other):
+        raise IndicatorError(
+            f"unequal seed sets ({names[0]} has {len(lead)}, {names[1]} has {len(other)}): should "
+            "be the same seeds in the same order"
+        )
+    if not other.any():
+        raise IndicatorError(f"{names[1]}: should deliver something after the onset")
 
 
-def _quantiles(seconds: NDArray[np.float64], *shares: float) -> list[float]:
-    # method: no average of a time and an infinite (censored) one
-    return [float(q) for q in np.quantile(seconds, shares, method="inverted_cdf")]
+def _log_likelihood(lead: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how much likelier a loss up to each bin's start is than none.
+
+    Args:
+        lead: Counts of the faulty runs, shape (..., bins).
+        other: Counts of the reference.
+
+    Returns:
+        Shape (..., bins + 1): entry k is of a loss through the first k bins, the last of one that
+        lasts to the end; entry 0 is 0.
+    """
+    from scipy.special import xlogy
+
+    zero = np.zeros((*lead.shape[:-1], 1))
+    delivered = np.concatenate([zero, np.cumsum(lead, axis=-1)], axis=-1)
+    expected = np.concatenate([zero, np.cumsum(other, axis=-1)], axis=-1)
+    both = delivered + expected
+    share = np.minimum(0.5, delivered / np.where(both > 0.0, both, 1.0))
+    return np.asarray(xlogy(delivered, 2.0 * share) + xlogy(expected, 2.0 * (1.0 - share)))
+
+
+def _swapped_p(
+    lead: NDArray[np.float64],
+    other: NDArray[np.float64],
+    observed: float,
+    generator: np.random.Generator,
+) -> float:
+    """Return the p of no loss: without one, the runs of a seed could as well be swapped."""
+    difference, reference = lead - other, other.sum(axis=0)
+    kept = generator.integers(2, size=(SWAPS, len(lead))).astype(np.float64)
+    pooled = reference + kept @ difference
+    swapped = _log_likelihood(pooled, lead.sum(axis=0) + reference - pooled).max(axis=-1)
+    # Sums of the same counts in another order differ by rounding.
+    return float(1 + (swapped >= observed - 1e-9).sum()) / (SWAPS + 1)
+
+
+def _dispersion(lead: NDArray[np.float64], other: NDArray[np.float64], bin_seconds: float) -> float:
+    """Return the variance of the pair's difference over a Poisson one's, at least 1."""
+    width = max(1, min(lead.shape[1], round(_BLOCK / bin_seconds)))
+    starts = np.arange(0, lead.shape[1], width)
+    difference = np.add.reduceat(lead - other, starts, axis=1)
+    return max(1.0, float(np.square(difference).sum() / (lead + other).sum()))
+
+
+def _kept(
+    lead: NDArray[np.float64],
+    other: NDArray[np.float64],
+    curve: NDArray[np.float64],
+    dispersion: float,
+    level: float,
+    generator: np.random.Generator,
+) -> NDArray[np.intp]:
+    """Return the change points that the likelihood ratio does not reject, ascending."""
+    ratio = 2.0 * (curve.max() - curve) / dispersion
+    near = np.flatnonzero(ratio <= _FAR_OFF)
+    places = np.linspace(0, near.size - 1, min(near.size, _CANDIDATES)).round().astype(np.intp)
+    candidates = near[np.unique(places)]
+    both = (lead + other).astype(np.int64)
+    limits = []
+    for change in candidates:
+        delivered, expected = lead[:change].sum(), other[:change].sum()
+        share = np.full(both.size, 0.5)
+        if expected > 0.0:
+            share[:change] = min(0.5, delivered / (delivered + expected))
+        drawn = generator.binomial(both, share, size=(SIMULATIONS, both.size))
+        simulated = drawn.astype(np.float64)
+        curves = _log_likelihood(simulated, both - simulated)
+        ratios = 2.0 * (curves.max(axis=1) - curves[:, change])
+        limits.append(float(np.quantile(ratios, level, method="higher")))
+    inside = ratio <= np.interp(np.arange(curve.size), candidates, limits)
+    inside[int(curve.argmax())] = True
+    return np.flatnonzero(inside)

@@ -22,23 +22,24 @@ class Interval(NamedTuple):
 
 
 def mean_interval(p: ArrayLike, level: float = 0.95) -> Interval:
-    """Mean performance with its t-interval [items], n - 1 degrees of freedom.
+    """Mean performance with its t-interval [items], n - 1 degrees of freedom, cut off at 0.
 
     Raises:
         IndicatorError: p empty, negative or not finite; level outside (0, 1).
     """
-    return t_interval(performance("p", p), level)
+    return _not_negative(t_interval(performance("p", p), level))
 
 
 def prediction_interval(p: ArrayLike, level: float = 0.95) -> Interval:
     """Mean performance with the interval of one further run [items]: mean -+ t sd sqrt(1 + 1/n).
 
+    Cut off at 0: no run delivers less.
     A single published run is to be compared with this one, not with `mean_interval`.
 
     Raises:
         IndicatorError: p empty, negative or not finite; level outside (0, 1).
     """
-    return t_interval(performance("p", p), level, of_one_run=True)
+    return _not_negative(t_interval(performance("p", p), level, of_one_run=True))
 
 
 def interquartile_mean(p: ArrayLike) -> float:
@@ -117,3 +118,9 @@ def t_interval(
     spread = float(sample.std(ddof=1)) * math.sqrt(1 / n + of_one_run)
     half = float(stdtrit(n - 1, 0.5 + level / 2)) * spread
     return Interval(mean, mean - half, mean + half)
+
+
+def _not_negative(interval: Interval) -> Interval:
+    if interval.low is None or interval.high is None:
+        return interval
+    return Interval(interval.value, max(0.0, interval.low), interval.high)

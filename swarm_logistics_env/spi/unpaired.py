@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .ratio import ROUNDING, RatioTest
+from .ratio import ROUNDING, RatioTest, probability_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,27 +56,25 @@ def unpaired_ratio(
     )
     degenerate = math.sqrt(at_null.variance) <= ROUNDING * scale
     if degenerate:
-        difference = 0.0 if abs(at_null.mean) <= ROUNDING * scale else at_null.mean
-        statistic = math.copysign(math.inf, difference) if difference else 0.0
-        low, high = value, value
+        p_value, low, high = 1.0, -math.inf, math.inf
         # No spread leaves no Welch formula; the smallest sample bounds it from below.
         df = float(min(term.sample.size for term in terms) - 1)
     else:
-        statistic = at_null.mean / math.sqrt(at_null.variance)
         df = at_null.degrees_of_freedom
+        p_value = 2.0 * float(stdtr(df, -abs(at_null.mean) / math.sqrt(at_null.variance)))
         low, high = _limits(terms, value, mean_den, 0.5 + level / 2)
     n = min(term.sample.size for term in terms)
     return RatioTest(
         value=np.asarray(value + offset),
         low=np.asarray(low + offset),
         high=np.asarray(high + offset),
-        probability=np.asarray(stdtr(df, statistic)),
-        p_value=np.asarray(2.0 * stdtr(df, -abs(statistic))),
+        probability=probability_of(np.asarray(p_value), np.asarray(at_null.mean)),
+        p_value=np.asarray(p_value),
         difference_sd=np.asarray(0.0 if degenerate else math.sqrt(at_null.variance * n)),
         mean_denominator=np.asarray(mean_den),
         degrees_of_freedom=df,
         degenerate=np.asarray(degenerate),
-        unbounded=np.asarray(math.isinf(low)),
+        unbounded=np.asarray(math.isinf(low) and not degenerate),
     )
 
 

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.gate import Gate
-from swarm_logistics_env.studies.judgement import Cell, Findings
+from swarm_logistics_env.studies.judgement import Findings
+from swarm_logistics_env.studies.matching import Match, match, outcomes
+from swarm_logistics_env.studies.seeds import seeds_in_words
+
+# An estimate; a number that is exact, as the runs are the same runs; or why it cannot be judged.
+_Found = Estimate | float | str
 
 
 @dataclass(frozen=True)
@@ -19,43 +27,70 @@ class Answer:
 
     Attributes:
         name: policy, subject and comparison.
-        estimate: against the gate's number; None: it cannot be judged.
-        verdict: on "above the number", Holm-adjusted over the gate's answers.
-        problem: why it cannot be judged.
         fails: whether it makes the gate fail; what cannot be judged does.
+        estimate: against the gate's number; None: it is exact, or cannot be judged.
+        verdict: on "above the number", Holm-adjusted over the gate's estimates.
+        exact: the value where the runs compared are the same runs, so that nothing is estimated.
+        problem: why it cannot be judged.
     """
 
     name: str
-    estimate: Estimate | None
-    verdict: Verdict | None
-    problem: str | None
     fails: bool
+    estimate: Estimate | None = None
+    verdict: Verdict | None = None
+    exact: float | None = None
+    problem: str | None = None
 
 
 def answers(gate: Gate, old: Findings, new: Findings) -> tuple[Answer, ...]:
     """Return what everything that a gate is about says to it.
 
+    A change is asked of every judged policy: one that the other study gives nothing to compare
+    with answers that it cannot be judged.
+
     Raises:
-        StudyError: it is about nothing that the studies hold.
+        StudyError: the gate is about nothing that the studies hold.
     """
     found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
-    asked = [(name, answer) for name, answer in found if gate.at in name]
+    asked = list(found)
     if not asked:
         where = f" at {gate.at!r}" if gate.at else ""
         raise StudyError(
             f"gate {gate.text!r}: the studies hold no {gate.subject}{where}, so it tests nothing"
         )
-    judged = [estimate for _, estimate in asked if isinstance(estimate, Estimate)]
-    verdicts = iter(spi.adjust(judged))
-    return tuple(
-        Answer(name, None, None, estimate, fails=True)
-        if isinstance(estimate, str)
-        else Answer(name, estimate, verdict := next(verdicts), None, gate.fails_on(verdict))
-        for name, estimate in asked
+    verdicts = iter(spi.adjust([value for _, value in asked if isinstance(value, Estimate)]))
+    return tuple(_answer(gate, name, value, verdicts) for name, value in asked)
+
+
+def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -> Answer:
+    if isinstance(value, str):
+        return Answer(name, fails=True, problem=value)
+    if isinstance(value, float):
+        return Answer(name, gate.holds_for(value), exact=value)
+    verdict = next(verdicts)
+    return Answer(name, gate.fails_on(verdict), estimate=value, verdict=verdict)
+
+
+def identical(old: Sequence[Outcome], new: Sequence[Outcome]) -> bool:
+    """Return whether two lists of outcomes, seed by seed, are those of the same runs.
+
+    Runs of one key are the same where they gave the same. Under other keys (the code or the
+    policy's source has changed) equal times of all deliveries tell it, and no delivery tells
+    nothing.
+    """
+    return all(_same(a, b) for a, b in zip(old, new, strict=True))
+
+
+def _same(a: Outcome, b: Outcome) -> bool:
+    return (
+        (a.run == b.run or (a.untimed is None and len(a.delivery_times) > 0))
+        and a.untimed == b.untimed
+        and np.array_equal(a.delivery_times, b.delivery_times)
+        and (a.ended_at, a.anchoring_seconds) == (b.ended_at, b.anchoring_seconds)
     )
 
 
-def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, Estimate | str]]:
+def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, _Found]]:
     performance = {(cell.policy, cell.table, cell.arm): cell for cell in new.cells}
     # Once each, however many thresholds it was asked against.
     comparisons = dict.fromkeys(
@@ -68,6 +103,8 @@ def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, Estimate | str
         name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
         if labels[comparison.policy, comparison.label] > 1:
             name += f" ({comparison.table})"
+        if gate.at not in name:
+            continue
         used = {
             arm: performance[comparison.policy, comparison.table, arm] for arm in comparison.arms
         }
@@ -87,44 +124,35 @@ def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, Estimate | str
             yield name, estimate
 
 
-def _changes(gate: Gate, old: Findings, new: Findings) -> Iterator[tuple[str, Estimate | str]]:
-    before, after = _by_content(old), _by_content(new)
-    # One policy in each: they are compared whatever they are called.
-    (theirs, *more), ours = {policy for policy, _ in before}, {policy for policy, _ in after}
-    renamed = not more and len(ours) == 1
-    for (policy, content), cell in after.items():
-        label = theirs if renamed else policy
-        match = before.get((label, content))
-        if match is None:
-            continue
-        named = policy if label == policy else f"{label} -> {policy}"
-        name = f"{named}: change, {cell.arm.level} ({cell.table})"
-        paired = old.plan.paired and new.plan.paired
-        yield name, match.problem or cell.problem or _change(gate, match, cell, paired=paired)
+def _changes(gate: Gate, old: Findings, new: Findings) -> Iterator[tuple[str, _Found]]:
+    matching = match(old, new)
+    for unmatched in matching.unmatched:
+        if any(gate.at in name for name in unmatched.names):
+            yield f"{unmatched.policy}: change", unmatched.problem
+    for matched in matching.matches:
+        if gate.at in matched.name:
+            yield matched.name, _change(gate, old, new, matched, matching.seeds)
 
 
-def _change(gate: Gate, before: Cell, after: Cell, *, paired: bool) -> Estimate | str:
-    # Seeds are 0, 1, ...: the shared ones come first in both.
-    shared = min(len(before.performance), len(after.performance)) if paired else None
+def _change(
+    gate: Gate, old: Findings, new: Findings, matched: Match, seeds: Sequence[int] | None
+) -> _Found:
+    before, after = matched.before, matched.after
+    if problem := before.problem or after.problem:
+        return problem
+    p_o, p_new = before.performance, after.performance
+    if seeds is not None:
+        if not seeds:
+            return (
+                f"the studies share no seed: the old one has {seeds_in_words(old.plan.seeds)}, "
+                f"the new one {seeds_in_words(new.plan.seeds)}; play one of them on the other's "
+                "seeds"
+            )
+        pair = outcomes(old, before, seeds), outcomes(new, after, seeds)
+        if identical(*pair):
+            return 0.0
+        p_o, p_new = (np.array([o.delivered for o in side], dtype=np.float64) for side in pair)
     try:
-        return spi.relative_change(
-            before.performance[:shared],
-            after.performance[:shared],
-            threshold=gate.number,
-            paired=paired,
-        )
+        return spi.relative_change(p_o, p_new, threshold=gate.number, paired=seeds is not None)
     except spi.IndicatorError as error:
         return str(error)
-
-
-def _by_content(findings: Findings) -> dict[tuple[str, tuple[object, ...]], Cell]:
-    """Return each condition's cell, by the label of its policy and by all but the policy."""
-    # Imported tables may differ in P at one condition.
-    imported = findings.plan.imported_from is not None
-    found: dict[tuple[str, tuple[object, ...]], Cell] = {}
-    for cell in findings.cells:
-        condition = cell.arm.condition
-        content = (condition.scenario, condition.faults, condition.behaviour)
-        table = cell.table if imported else ""
-        found.setdefault((condition.policy.label, (*content, table)), cell)
-    return found

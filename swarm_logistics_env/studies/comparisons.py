@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypedDict
 
@@ -138,7 +138,8 @@ class Comparison:
         *,
         level: float = 0.95,
         paired: bool = True,
-        bootstrap: np.random.Generator | None = None,
+        saturated: Collection[Arm] = (),
+        identical: bool = False,
     ) -> Estimate:
         """Return the indicator over seeds.
 
@@ -146,7 +147,8 @@ class Comparison:
             performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
             level: confidence level of interval and verdict, in (0, 1).
             paired: whether the arms share their seeds, row by row.
-            bootstrap: random source for the studentised bootstrap, run from ten paired seeds on.
+            saturated: arms whose P is capped, every item delivered in a run.
+            identical: whether the runs of the original and the changed arm are the same runs.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
@@ -158,23 +160,45 @@ class Comparison:
             "threshold": self.threshold,
             "level": level,
             "paired": paired,
-            "bootstrap": bootstrap,
+            "saturated": [
+                name
+                for name, arm in zip(_NAMES[self.indicator], self._named_arms())
+                if arm in saturated
+            ],
         }
         if self.indicator == "S":
-            return spi.scalability(p_o, p_new, n=int(before), m=int(after - before), **asked)
+            return spi.scalability(
+                p_o, p_new, n=int(before), m=int(after - before), identical=identical, **asked
+            )
         if self.indicator == "FT":
             assert self.removed is not None
             p_s = performance(self.removed)
             return spi.fault_tolerance(p_o, p_new, p_s, n=swarm, m=int(after), **asked)
         if self.indicator == "R":
-            return spi.robustness(p_o, p_new, n=swarm, m=int(after), **asked)
+            return spi.robustness(p_o, p_new, n=swarm, m=int(after), identical=identical, **asked)
         if self.indicator == "A":
-            return spi.adaptability(p_o, p_new, x_o=before, x_new=after, **asked)
-        return spi.relative_change(p_o, p_new, **asked)
+            return spi.adaptability(
+                p_o, p_new, x_o=before, x_new=after, identical=identical, **asked
+            )
+        return spi.relative_change(p_o, p_new, identical=identical, **asked)
+
+    def _named_arms(self) -> tuple[Arm, ...]:
+        """Return the arms in the order of `_NAMES`."""
+        return (self.original, self.changed, *([self.removed] if self.removed else []))
+
+
+# What each indicator calls the P of the original, the changed and the removed arm.
+_NAMES = {
+    "S": ("p_n", "p_nm"),
+    "FT": ("p_o", "p_f", "p_s"),
+    "R": ("p_o", "p_f"),
+    "A": ("p_o", "p_new"),
+    "change": ("p_o", "p_new"),
+}
 
 
 class _Asked(TypedDict):
     threshold: float
     level: float
     paired: bool
-    bootstrap: np.random.Generator | None
+    saturated: list[str]

@@ -27,6 +27,7 @@ class Outcome:
         all_delivered: whether no item was left, so that more robots could not have delivered more.
         failed_robots: numbers of the robots that any fault names.
         anchoring_seconds: robot-seconds that working robots spent in contact range of failed ones.
+        digest: of the trajectory and the deliveries (`Episode.digest`); None: not known.
         error: traceback; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
         untimed: items delivered, where only their number is known; None: the times tell it.
@@ -38,6 +39,7 @@ class Outcome:
     all_delivered: bool = False
     failed_robots: tuple[int, ...] = ()
     anchoring_seconds: float = 0.0
+    digest: str | None = None
     error: str | None = None
     wall_seconds: float = 0.0
     untimed: int | None = None
@@ -74,5 +76,6 @@ def execute(run: Run) -> Outcome:
         all_delivered=bool(episode.all_delivered),
         failed_robots=tuple(int(robot) for robot in episode.failed_robots),
         anchoring_seconds=float(episode.anchoring_seconds),
+        digest=episode.digest,
         wall_seconds=time.perf_counter() - start,
     )

@@ -4,9 +4,12 @@
     subject  := "S" | "FT" | "R" | "A" | "change"
 
 S, FT, R and A are those of the newer study; `change` is (P_new - P_old) / P_old of every condition
-that both studies hold. "R < 0" fails where R lies below 0 beyond chance, "possibly R < 0" wherever
-that is not ruled out, for want of seeds as well. `at` keeps the comparisons and conditions whose
-name holds the text, e.g. "R < 0 at FM4, m = 1". Verdicts are Holm-adjusted over what is kept.
+under which both studies judge a policy, over the seeds that they share. "R < 0" fails where R lies
+below 0 beyond chance, "possibly R < 0" wherever that is not ruled out, for want of seeds as well.
+`at` keeps the comparisons and conditions whose name holds the text, e.g. "R < 0 at FM4, m = 1".
+Verdicts are Holm-adjusted over what is kept. What cannot be judged fails: a policy without a match
+in the other study, failed runs, studies that share no seed. Where the runs of both studies are the
+same the change is exactly 0, and the gate fails where "0 < number" (or ">") is true.
 """
 
 from __future__ import annotations
@@ -72,6 +75,10 @@ class Gate:
             number,
             (match["at"] or "").strip(),
         )
+
+    def holds_for(self, value: float) -> bool:
+        """Return whether an exact value, which leaves nothing to chance, makes the gate fail."""
+        return value < self.number if self.below else value > self.number
 
     def fails_on(self, verdict: Verdict) -> bool:
         """Return whether a verdict on "above the number" makes the gate fail."""

@@ -31,11 +31,14 @@ class Origin:
 
     Attributes:
         file: its name; digest: of its content; paired: whether its rows name their seeds.
+        seeds: those that they name; empty: none, or the store was made when seeds were numbered
+            anew from 0 on.
     """
 
     file: str
     digest: str
     paired: bool
+    seeds: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -83,15 +86,15 @@ def import_results(file: Path, out: Path) -> int:
     if not rows:
         raise StudyError(f"{file} holds no run")
     cells = _cells(file, rows)
-    paired = rows[0].seed is not None
+    seeds = tuple(sorted({row.seed for row in rows if row.seed is not None}))
     specification = _specification(file, rows, max(map(len, cells.values())))
-    origin = Origin(file.name, hashlib.sha256(content).hexdigest()[:16], paired)
+    origin = Origin(file.name, hashlib.sha256(content).hexdigest()[:16], bool(seeds), seeds)
     plan = imported_plan(specification, origin)
     with new_store(out) as store:
         for policy, title, arm in plan.cells:
             found = cells.get((policy, title, arm.level), [])
-            for seed, row in enumerate(sorted(found, key=lambda row: row.seed or 0)):
-                run = arm.condition.run(CODE, seed)
+            for number, row in enumerate(found):
+                run = arm.condition.run(CODE, number if row.seed is None else row.seed)
                 store.add(run, Outcome(run.key, untimed=row.delivered))
         store.set_note(notes.SPECIFICATION, specification.to_json())
         store.set_note(notes.CODE, CODE)
@@ -127,6 +130,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         {},
         paired=origin.paired,
         imported_from=origin.file,
+        imported_seeds=tuple(origin.seeds),
     )
 
 

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import spi, streams
+from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.conditions import Condition
+from swarm_logistics_env.studies.declaring import Declaration
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.reference import Reference, load_reference
@@ -70,7 +71,7 @@ class Judgement:
 
     Attributes:
         estimate: with the unadjusted verdict; None: blocked.
-        adjusted_p, adjusted_verdict: under Holm within the family; None: blocked.
+        adjusted_p, adjusted_verdict: under Holm within the family; None: blocked, or unaffected.
         problem: why it is blocked, e.g. a failed run.
         saturated: it rests on a cell whose P is capped.
         claim: what is claimed: above the threshold (True), not above (False), nothing (None).
@@ -88,6 +89,11 @@ class Judgement:
     no_plan: str | None = None
     adjusted_p: float | None = None
     adjusted_verdict: Verdict | None = None
+
+    @property
+    def unaffected(self) -> bool:
+        """Whether both conditions gave the same runs: the value is exact, and no evidence."""
+        return self.estimate is not None and self.estimate.identical
 
     def on_claim(self, verdict: Verdict | None) -> Verdict | None:
         """Turn a verdict on "above the threshold" into one on what is claimed."""
@@ -148,7 +154,7 @@ def judge(
         for policy, table, arm in plan.cells
     )
     declared = range(declared_first_seed, declared_first_seed + declared_seeds)
-    level, exploratory = _level(plan, declared, declared_looks)
+    level, exploratory = _level(plan, Declaration(declared, declared_looks))
     judgements = [
         _judgement(comparison, results, reference, level=level, paired=plan.paired)
         for comparison in plan.comparisons
@@ -165,19 +171,13 @@ def judge(
     )
 
 
-def _level(plan: Plan, declared: range, declared_looks: tuple[int, ...]) -> tuple[float, bool]:
-    n_seeds = len(plan.seeds)
-    if not declared_looks:
-        return LEVEL, plan.seeds[0] not in declared or plan.seeds[-1] not in declared
-    as_declared = (
-        n_seeds in declared_looks
-        and plan.specification.looks == declared_looks
-        and plan.seeds.start == declared.start
-    )
-    if not as_declared:
+def _level(plan: Plan, declared: Declaration) -> tuple[float, bool]:
+    if not declared.covers(plan):
         return LEVEL, True
-    alphas = spi.look_levels(declared_looks, 1 - LEVEL)
-    return 1 - max(alphas[declared_looks.index(n_seeds)], _LEAST_ALPHA), False
+    if not declared.looks:
+        return LEVEL, False
+    alphas = spi.look_levels(declared.looks, 1 - LEVEL)
+    return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False
 
 
 @dataclass(frozen=True)
@@ -185,6 +185,7 @@ class _Result:
     performance: NDArray[np.float64]
     problem: str | None
     saturated: bool
+    digests: tuple[str | None, ...]
 
 
 def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -> _Result:
@@ -203,7 +204,14 @@ def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -
         np.array([outcome.delivered for outcome in succeeded], dtype=np.float64),
         ", ".join(parts) or None,
         any(outcome.all_delivered for outcome in succeeded),
+        tuple(outcome.digest for outcome in succeeded),
     )
+
+
+def _identical(comparison: Comparison, used: Mapping[Arm, _Result]) -> bool:
+    """Return whether what was changed changed no run: equal digests, seed by seed."""
+    before, after = used[comparison.original].digests, used[comparison.changed].digests
+    return comparison.removed is None and before == after and None not in before
 
 
 def _cell(policy: str, table: str, arm: Arm, result: _Result, reference: Reference | None) -> Cell:
@@ -236,8 +244,8 @@ def _judgement(
                 lambda arm: used[arm].performance,
                 level=level,
                 paired=paired,
-                # The same stream for each: a verdict does not hang on the order of the questions.
-                bootstrap=streams.generator(0, "bootstrap") if paired else None,
+                saturated=[arm for arm in used if used[arm].saturated],
+                identical=_identical(comparison, used),
             )
         except spi.IndicatorError as error:
             problems = [str(error)]
@@ -271,7 +279,8 @@ def _adjusted(judgements: list[Judgement]) -> tuple[Judgement, ...]:
         estimates = [e for e in (judgements[index].estimate for index in members) if e is not None]
         if len(estimates) < len(members):
             continue
-        p_values = spi.holm([1.0 if e.p_value is None else e.p_value for e in estimates])
-        for index, p, verdict in zip(members, p_values.tolist(), spi.adjust(estimates)):
-            adjusted[index] = replace(judgements[index], adjusted_p=p, adjusted_verdict=verdict)
+        p_values = spi.adjusted_p_values(estimates)
+        for index, p, verdict in zip(members, p_values, spi.adjust(estimates)):
+            if not judgements[index].unaffected:
+                adjusted[index] = replace(judgements[index], adjusted_p=p, adjusted_verdict=verdict)
     return tuple(adjusted)

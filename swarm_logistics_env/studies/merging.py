@@ -69,9 +69,7 @@ def _united(planned: dict[Path, dict[str, str]]) -> dict[str, str]:
 
 
 def _seeds(planned: dict[str, str]) -> range:
-    specification = Specification.from_json(planned[notes.SPECIFICATION])
-    first = specification.first_seed
-    return range(first, first + specification.seeds)
+    return Specification.from_json(planned[notes.SPECIFICATION]).seed_numbers
 
 
 def _declared(ours: dict[str, str], theirs: dict[str, str]) -> range:

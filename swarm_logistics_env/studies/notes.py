@@ -33,6 +33,7 @@ class _Origin(Record):
     file: str
     digest: str
     paired: bool
+    seeds: tuple[int, ...] = ()
 
 
 # What is read as JSON; the specification says itself what is wrong with it.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -43,6 +43,7 @@ class Plan:
         twins: pairs without fault, one for the faults of each policy that begin during the run.
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.
+        imported_seeds: those that the file names; empty: it names none, or results are run here.
     """
 
     specification: Specification
@@ -52,12 +53,12 @@ class Plan:
     twins: tuple[Twins, ...] = ()
     paired: bool = True
     imported_from: str | None = None
+    imported_seeds: tuple[int, ...] = ()
 
     @property
-    def seeds(self) -> range:
-        """The seeds of every condition."""
-        first = self.specification.first_seed
-        return range(first, first + self.specification.seeds)
+    def seeds(self) -> Sequence[int]:
+        """The seeds of every condition, ascending."""
+        return self.imported_seeds or self.specification.seed_numbers
 
     @cached_property
     def cells(self) -> tuple[tuple[str, str, Arm], ...]:
@@ -84,7 +85,8 @@ class Plan:
 
     def __str__(self) -> str:
         asked, run = len(self.cells), len(self.conditions)
-        first = f" from {self.seeds.start} on" if self.seeds.start else ""
+        start = self.specification.first_seed
+        first = f" from {start} on" if start else ""
         return (
             f"{self.specification.name}: {len(self.comparisons)} comparisons of {asked} cells; "
             f"{run} conditions ({asked - run} shared) x {len(self.seeds)} seeds{first} = "

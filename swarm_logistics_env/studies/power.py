@@ -15,7 +15,9 @@ class Demand:
     Attributes:
         judgement: of the pilot.
         effect: assumed true value of the indicator: the one named, or the published one.
-        seeds: for a verdict at that effect with the wanted power; None: `problem` says why.
+        seeds: for a verdict at that effect with the wanted power on average; None: `problem` says
+            why.
+        least_power: that so many seeds have in nine pilots of ten; None as `seeds`.
         detectable: distance from the threshold that the pilot's own seeds would find.
         problem: why there is no number of seeds.
     """
@@ -23,6 +25,7 @@ class Demand:
     judgement: Judgement
     effect: float | None
     seeds: int | None
+    least_power: float | None
     detectable: float | None
     problem: str | None
 
@@ -50,14 +53,16 @@ def _demand(judgement: Judgement, effect: float | None, power: float) -> Demand:
     assumed = judgement.published if effect is None else effect
     estimate = judgement.estimate
     if estimate is None:
-        return Demand(judgement, assumed, None, None, judgement.problem)
+        return Demand(judgement, assumed, None, None, None, judgement.problem)
     detectable = spi.minimum_detectable_effect(estimate, power)
     if assumed is None:
-        return Demand(judgement, None, None, detectable, "no effect is named")
+        return Demand(judgement, None, None, None, detectable, "no effect is named")
+    seeds = spi.seeds_for_power(estimate, assumed, power)
     return Demand(
         judgement,
         assumed,
-        spi.seeds_for_power(estimate, assumed, power),
+        seeds,
+        None if seeds is None else spi.lower_decile_of_power(estimate, assumed, seeds),
         detectable,
         spi.no_plan_because(estimate, assumed),
     )

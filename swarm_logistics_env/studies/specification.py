@@ -199,6 +199,11 @@ class Specification(_Part):
     looks: tuple[PositiveInt, ...] = ()
     reference: str | None = None
 
+    @property
+    def seed_numbers(self) -> range:
+        """The seeds of every condition."""
+        return range(self.first_seed, self.first_seed + self.seeds)
+
     @field_validator("indicators")
     @classmethod
     def _distinct(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -21,7 +21,7 @@ from swarm_logistics_env.studies.conditions import Run
 from swarm_logistics_env.studies.execution import Outcome
 
 FILE_NAME = "study.sqlite"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 TIMEOUT = 60.0  # s, for other processes that write
 APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
 
@@ -46,16 +46,16 @@ CREATE TABLE runs (
     all_delivered INTEGER,
     failed_robots TEXT,          -- JSON
     anchoring_seconds REAL,
+    digest TEXT,                 -- of the trajectory; equal: the same run
     error TEXT,                  -- traceback
     wall_seconds REAL NOT NULL,
     UNIQUE (condition, code, seed)
 ) WITHOUT ROWID;
 """
 
-# Statements that turn a store of each older schema into one of the next.
-_MIGRATIONS = {1: "ALTER TABLE conditions ADD COLUMN behaviour INTEGER NOT NULL DEFAULT 0"}
-
-_RESULT = "delivered, delivery_times, ended_at, all_delivered, failed_robots, anchoring_seconds"
+_RESULT = (
+    "delivered, delivery_times, ended_at, all_delivered, failed_robots, anchoring_seconds, digest"
+)
 _CLASH = f"""
 SELECT run, seed FROM main.runs JOIN (SELECT run, {_RESULT} FROM other.runs WHERE error IS NULL)
     AS theirs USING (run)
@@ -71,7 +71,7 @@ _ABSORB = (
 
 _ROWS = """
 SELECT run, condition, policy, policy_identity, code, seed, delivered, ended_at, all_delivered,
-       anchoring_seconds, failed_robots, delivery_times, scenario, faults, behaviour, error
+       anchoring_seconds, digest, failed_robots, delivery_times, scenario, faults, behaviour, error
 FROM runs JOIN conditions USING (condition) ORDER BY run
 """
 
@@ -145,6 +145,7 @@ class Store:
             int(outcome.all_delivered),
             json.dumps(outcome.failed_robots),
             outcome.anchoring_seconds,
+            outcome.digest,
         )
         if outcome.untimed is not None:
             result = (outcome.untimed, *(None,) * (len(result) - 1))
@@ -164,7 +165,7 @@ class Store:
                 "DELETE FROM runs WHERE run = ? AND error IS NOT NULL", (run.key,)
             )
             self._database.execute(
-                "INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                "INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (
                     run.key,
                     condition.key,
@@ -214,13 +215,11 @@ class Store:
         wanted = {run.key for run in runs}
         found = {}
         with self._explained(), self._sound():
-            rows = self._database.execute(
-                "SELECT run, delivered, delivery_times, ended_at, all_delivered, failed_robots,"
-                " anchoring_seconds, error, wall_seconds FROM runs"
-            )
-            for run, count, times, ended_at, all_delivered, robots, anchoring, error, wall in rows:
+            rows = self._database.execute(f"SELECT run, {_RESULT}, error, wall_seconds FROM runs")
+            for run, *result, error, wall in rows:
                 if run not in wanted:
                     continue
+                count, times, ended_at, all_delivered, robots, anchoring, digest = result
                 if error is not None:
                     found[run] = Outcome(run, error=str(error), wall_seconds=float(wall))
                     continue
@@ -234,6 +233,7 @@ class Store:
                     all_delivered=bool(all_delivered),
                     failed_robots=tuple(json.loads(robots)),
                     anchoring_seconds=float(anchoring),
+                    digest=None if digest is None else str(digest),
                     wall_seconds=float(wall),
                 )
         return found
@@ -280,10 +280,10 @@ class Store:
             self._database.execute("ROLLBACK")
         if application != APPLICATION_ID and tables:
             raise StudyError(f"{self.path} is a database, but not the store of a study")
-        if application == APPLICATION_ID and not 1 <= version <= SCHEMA_VERSION:
+        if application == APPLICATION_ID and version != SCHEMA_VERSION:
             raise StudyError(
                 f"{self.path} has store schema {version}, this version of the package reads "
-                f"schemas 1 to {SCHEMA_VERSION}: export it with the version that wrote it"
+                f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
             )
         if self._read_only:
             if (application, version) != (APPLICATION_ID, SCHEMA_VERSION):
@@ -296,8 +296,6 @@ class Store:
         self._change_to_wal()
         self._database.execute("PRAGMA synchronous = NORMAL")
         if application == APPLICATION_ID:
-            if version < SCHEMA_VERSION:
-                self._migrate()
             return
         with self._transaction():
             # Another process may have made the tables since: two shards start at once.
@@ -321,14 +319,6 @@ class Store:
                 time.sleep(0.01)
             else:
                 return
-
-    def _migrate(self) -> None:
-        with self._transaction():
-            # Asked again: another process may have migrated it since.
-            (version,) = self._database.execute("PRAGMA user_version").fetchone()
-            for older in range(version, SCHEMA_VERSION):
-                self._database.execute(_MIGRATIONS[older])
-            self._database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

@@ -13,6 +13,7 @@ from weakref import finalize
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import notes
 from swarm_logistics_env.studies.code_version import code_version
+from swarm_logistics_env.studies.declaring import Declaration
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import Origin, imported_plan
 from swarm_logistics_env.studies.judgement import Findings, judge
@@ -168,14 +169,9 @@ class Study:
             engine = engine_named(engine, processes, address)
         whole = list(shard.of(plan.runs()) if shard else plan.runs())
         with self._store() as store:
-            if store.note(notes.IMPORTED) is not None:
-                raise StudyError(f"the study in {self.out} was imported: run into a new directory")
             self._refuse_another(store)
-            if store.note(notes.DECLARED_SEEDS) is None:
-                store.set_note(notes.DECLARED_FIRST_SEED, str(plan.seeds.start))
-                store.set_note(notes.DECLARED_LOOKS, json.dumps(self.specification.looks))
-                # Last: where it is noted, the others are.
-                store.set_note(notes.DECLARED_SEEDS, str(len(plan.seeds)))
+            if Declaration.noted(store) is None:
+                Declaration(self.specification.seed_numbers, self.specification.looks).note(store)
             store.set_note(notes.SPECIFICATION, self.specification.to_json())
             store.set_note(notes.CODE, plan.code)
             store.set_note(notes.IDENTITIES, json.dumps(dict(plan.identities)))
@@ -209,6 +205,20 @@ class Study:
         except StudyError:  # nothing has been run
             return 0, len(asked)
 
+    def exploratory_because(self) -> str | None:
+        """Return why verdicts over the asked seeds are exploratory; None: they are not.
+
+        Raises:
+            StudyError: the store cannot be read, or is another study's.
+        """
+        if self._memory is None and (self.out is None or not (self.out / FILE_NAME).is_file()):
+            return None  # nothing has been run: what is asked now will be declared
+        plan = self.plan()
+        with self._store(existing=True) as store:
+            self._refuse_another(store)
+            declared = Declaration.noted(store)
+        return None if declared is None or declared.covers(plan) else declared.warning(plan)
+
     def findings(self) -> Findings:
         """Return every cell and every verdict, from the runs that are there.
 
@@ -217,12 +227,13 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
+            declared = Declaration.noted(store) or Declaration(self.specification.seed_numbers)
             return judge(
                 plan,
                 store.outcomes(plan.runs()),
-                int(store.note(notes.DECLARED_SEEDS) or len(plan.seeds)),
-                tuple(json.loads(store.note(notes.DECLARED_LOOKS) or "[]")),
-                int(store.note(notes.DECLARED_FIRST_SEED) or 0),
+                len(declared.seeds),
+                declared.looks,
+                declared.seeds.start,
             )
 
     def results(self) -> pd.DataFrame:
@@ -260,7 +271,9 @@ class Study:
         return write_report(self.findings(), directory)
 
     def _refuse_another(self, store: Store) -> None:
-        # The report and the declared number of seeds are one study's.
+        if store.note(notes.IMPORTED) is not None:
+            raise StudyError(f"the study in {self.out} was imported: run into a new directory")
+        # The report and the declared seeds are one study's.
         noted = store.note(notes.SPECIFICATION)
         name = self.specification.name
         if noted is not None and (there := Specification.from_json(noted).name) != name:

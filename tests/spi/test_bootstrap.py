@@ -4,100 +4,71 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import ttest_1samp
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi import IndicatorError
+from swarm_logistics_env.spi.bootstrap import (
+    RESAMPLES,
+    critical_value,
+    resampled_pivots,
+    upper_p,
+)
 
 rng = np.random.default_rng(2)
 P_O = rng.poisson(39, 12).astype(float)
 P_F = np.round(P_O * 0.9 + rng.normal(0, 2, 12))
+RESIDUAL = P_F - P_F.mean() / P_O.mean() * P_O
 
 
-def interval(seed: int) -> tuple[float, float]:
-    return spi.studentised_bootstrap(P_F - P_O, P_O, np.random.default_rng(seed), offset=0.08)
-
-
-def test_its_generator_is_its_only_randomness() -> None:
+def test_equal_data_give_equal_pivots_whatever_the_global_state() -> None:
     np.random.seed(0)  # noqa: NPY002 - the global state must not matter
-    first = interval(1)
+    first = resampled_pivots(RESIDUAL)
     np.random.seed(1)  # noqa: NPY002
-    assert interval(1) == first
-    assert interval(2) != first
+    assert (resampled_pivots(RESIDUAL) == first).all()
 
 
-def test_a_generator_is_used_up_not_restarted() -> None:
-    generator = np.random.default_rng(1)
-    first = spi.studentised_bootstrap(P_F - P_O, P_O, generator)
-    assert spi.studentised_bootstrap(P_F - P_O, P_O, generator) != first
+def test_pivots_are_students_statistic_of_resampled_seeds() -> None:
+    pivots = resampled_pivots(RESIDUAL)
+    assert pivots.shape == (RESAMPLES,)
+    assert (np.diff(pivots) >= 0).all()
+    again = RESIDUAL[np.random.default_rng(0).integers(12, size=(20_000, 12))]
+    by_hand = np.sqrt(12) * again.mean(axis=1) / again.std(axis=1, ddof=1)
+    for share in (0.025, 0.25, 0.5, 0.75, 0.975):
+        assert np.quantile(pivots, share) == pytest.approx(np.quantile(by_hand, share), abs=0.12)
 
 
-def test_it_checks_the_default_interval() -> None:
-    r = spi.robustness(P_O, P_F, n=25, m=2, bootstrap=np.random.default_rng(1))
-    assert (r.bootstrap_low, r.bootstrap_high) == interval(1)
-    assert r.bootstrap_low == pytest.approx(r.low, abs=0.02)
-    assert r.bootstrap_high == pytest.approx(r.high, abs=0.02)
+def test_many_studies_at_once_are_the_studies_one_by_one() -> None:
+    together = resampled_pivots(np.stack([RESIDUAL, RESIDUAL**3]))
+    assert together.shape == (RESAMPLES, 2)
+    assert together[:, 1] == pytest.approx(resampled_pivots(RESIDUAL**3))
 
 
-def test_with_equal_denominators_by_hand() -> None:
-    low, high = spi.studentised_bootstrap(P_F, np.ones(12), np.random.default_rng(3), resamples=999)
-    pivots = []
-    for drawn in np.random.default_rng(3).integers(12, size=(999, 12)):
-        again = P_F[drawn]
-        error = math.sqrt(((again - again.mean()) ** 2).sum() / 11 / 12)
-        pivots.append((again.mean() - P_F.mean()) / error)
-    pivots.sort()
-    error = math.sqrt(((P_F - P_F.mean()) ** 2).sum() / 11 / 12)
-    # The 25th and the 975th of 999: the 2.5 % and 97.5 % quantiles.
-    assert low == pytest.approx(P_F.mean() - pivots[974] * error, rel=1e-9)
-    assert high == pytest.approx(P_F.mean() - pivots[24] * error, rel=1e-9)
+@pytest.mark.parametrize("alpha", [0.05, 0.0005, 0.3])
+def test_the_critical_value_is_the_largest_statistic_that_is_kept(alpha: float) -> None:
+    pivots = resampled_pivots(RESIDUAL)
+    critical = critical_value(pivots, alpha)
+    assert upper_p(pivots, critical) >= alpha / 2
+    assert upper_p(pivots, np.nextafter(critical, np.inf)) < alpha / 2
 
 
-def test_normal_pivots_give_students_interval() -> None:
-    sample = rng.normal(0, 1, 400) + 10
-    low, high = spi.studentised_bootstrap(sample, np.ones(400), np.random.default_rng(0))
-    expected = spi.mean_interval(sample)
-    assert low == pytest.approx(expected.low, abs=0.02)
-    assert high == pytest.approx(expected.high, abs=0.02)
-
-
-def test_skewness_shifts_it_where_fieller_stays_symmetric() -> None:
-    sample = np.random.default_rng(8).exponential(10, 30)
-    low, high = spi.studentised_bootstrap(sample, np.ones(30), np.random.default_rng(0))
-    assert high - sample.mean() > 1.2 * (sample.mean() - low)
-
-
-def test_ten_seeds_are_the_least() -> None:
-    with pytest.raises(IndicatorError, match="9 seeds"):
-        spi.studentised_bootstrap(P_F[:9], P_O[:9], np.random.default_rng(0))
-    few = spi.robustness(P_O[:9], P_F[:9], n=25, m=2, bootstrap=np.random.default_rng(0))
-    assert (few.bootstrap_low, few.bootstrap_high) == (None, None)
-    ten = spi.robustness(P_O[:10], P_F[:10], n=25, m=2, bootstrap=np.random.default_rng(0))
-    assert ten.bootstrap_low is not None
-
-
-def test_unpaired_seeds_cannot_be_resampled_in_pairs() -> None:
-    with pytest.raises(IndicatorError, match="bootstrap with paired=False"):
-        spi.robustness(P_O, P_F, n=25, m=2, paired=False, bootstrap=np.random.default_rng(0))
-
-
-def test_level_out_of_range() -> None:
-    with pytest.raises(IndicatorError, match="level"):
-        spi.studentised_bootstrap(P_F, P_O, np.random.default_rng(0), level=1.0)
-
-
-def test_no_spread_is_the_point() -> None:
-    low, high = spi.studentised_bootstrap(P_O / 2, P_O, np.random.default_rng(0), offset=1.0)
-    assert low == high == pytest.approx(1.5)
-
-
-def test_an_unclear_denominator_bounds_nothing() -> None:
-    scattered = np.array([0.0] * 11 + [50.0])
-    limits = spi.studentised_bootstrap(P_F, scattered, np.random.default_rng(0))
-    assert limits == (-math.inf, math.inf)
+def test_a_level_beyond_its_resamples_rejects_nothing() -> None:
+    assert critical_value(resampled_pivots(RESIDUAL), 1e-6) == math.inf
 
 
 def test_resamples_without_spread_are_not_left_out() -> None:
     # All but one seed alike: a third of the resamples are flat, beyond any finite quantile.
-    num = np.array([1.0] * 11 + [30.0])
-    limits = spi.studentised_bootstrap(num, np.full(12, 40.0), np.random.default_rng(0))
-    assert limits == (-math.inf, math.inf)
+    pivots = resampled_pivots(np.array([-1.0] * 11 + [11.0]))
+    assert 0.3 < np.isneginf(pivots).mean() < 0.4
+
+
+def test_from_ten_seeds_on_the_larger_p_counts() -> None:
+    p_o = np.array([39.0, 41, 38, 40, 42, 37, 40, 39, 41, 38, 40, 39])
+    lucky = np.array([2.0, 1, 0, 3, 1, 0, 2, 1, 0, 1, 30, 35])
+    r = spi.robustness(p_o, lucky, n=25, m=2, threshold=-0.6)
+    difference = lucky - p_o * (1 - 0.6 - 0.08)
+    assert r.p_value is not None
+    assert r.p_value > 1.1 * ttest_1samp(difference, 0.0).pvalue
+    assert "assumes_normal" not in r.flags
+    nine = spi.robustness(p_o[:9], lucky[:9], n=25, m=2, threshold=-0.6)
+    assert nine.p_value == pytest.approx(ttest_1samp(difference[:9], 0.0).pvalue)
+    assert "assumes_normal" in nine.flags

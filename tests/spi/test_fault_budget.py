@@ -39,3 +39,8 @@ def test_bad_input_is_named() -> None:
     change = spi.relative_change(P_O, P_O)
     with pytest.raises(IndicatorError, match="indicator at m = 1 is change"):
         spi.fault_budget({1: change})
+
+
+def test_a_fault_that_changes_no_run_is_within_the_budget_exactly() -> None:
+    same = spi.robustness(P_O, P_O, n=25, m=1, identical=True)
+    assert spi.fault_budget({1: same, 2: ROBUST, 3: BROKEN}) == (2, 3)

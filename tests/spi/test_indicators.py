@@ -240,10 +240,61 @@ def test_nothing_is_nan(p_o: list[int], data: st.DataObject) -> None:
         return
     for paired in (True, False):
         r = spi.robustness(p_o, p_f, n=25, m=2, paired=paired)
+        if "degenerate" in r.flags:
+            assert (r.low, r.high, r.p_value) == (None, None, 1.0)
+            continue
         assert r.low is not None
         assert r.high is not None
         assert r.low <= r.value <= r.high
+        if "too_few_seeds" in r.flags:
+            assert r.p_value == 1.0
+            continue
         assert r.p_value is not None
         assert 0 <= r.p_value <= 1
         assert r.probability is not None
         assert min(r.probability, 1 - r.probability) == pytest.approx(r.p_value / 2, abs=1e-12)
+
+
+P_O = np.array([60.0, 60, 58, 60, 59])
+HALF = np.array([30.0, 28, 33, 31, 29])
+
+
+@pytest.mark.parametrize(
+    ("p_o", "p_f", "saturated", "verdict"),
+    [
+        (P_O, HALF, ("p_o",), "refuted"),  # the true P_o is larger still
+        (P_O, HALF, ("p_f",), "inconclusive"),  # the true P_F may be as large as P_o
+        (HALF, P_O, ("p_f",), "supported"),
+        (HALF, P_O, ("p_o",), "inconclusive"),
+        (HALF, P_O, ("p_o", "p_f"), "inconclusive"),
+        (P_O, HALF, ("p_o", "p_f"), "inconclusive"),
+    ],
+)
+def test_a_capped_p_blocks_the_side_it_leans_to(
+    p_o: np.ndarray, p_f: np.ndarray, saturated: tuple[str, ...], verdict: str
+) -> None:
+    r = spi.robustness(p_o, p_f, n=25, m=2, saturated=saturated)
+    assert r.verdict == verdict
+    if verdict == "inconclusive":
+        assert r.p_value == 1.0
+        assert "capped" in r.flags
+        assert spi.adjust([r]) == ("inconclusive",)
+
+
+def test_capped_removed_runs_cannot_show_tolerance() -> None:
+    ft = spi.fault_tolerance(P_O, P_O + np.array([10, 11, 9, 10, 12]), P_O, saturated=["p_s"])
+    assert ft.verdict == "inconclusive"
+    assert spi.fault_tolerance(P_O, HALF, P_O, saturated=["p_s"]).verdict == "refuted"
+    with pytest.raises(IndicatorError, match="saturated = 'p_new': should be among p_f, p_s, p_o"):
+        spi.fault_tolerance(P_O, HALF, P_O, saturated=["p_new"])
+
+
+def test_the_same_runs_have_an_exact_value_that_is_no_evidence() -> None:
+    r = spi.robustness(P_O, P_O, n=25, m=2, identical=True)
+    assert (r.value, r.low, r.high) == (0.08, 0.08, 0.08)
+    assert (r.verdict, r.answer, r.p_value) == ("inconclusive", "supported", None)
+    assert r.flags == ("identical",)
+    assert spi.relative_change(P_O, P_O, identical=True).answer == "refuted"  # 0 is not above 0
+    assert spi.relative_change(P_O, P_O, identical=True, threshold=-0.1).answer == "supported"
+    with pytest.raises(IndicatorError, match="identical = True, but p_f and p_o differ"):
+        spi.robustness(P_O, HALF, n=25, m=2, identical=True)

@@ -5,25 +5,32 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2, nct, t, ttest_1samp
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import IndicatorError
-from swarm_logistics_env.spi.ratio import paired_ratio
 
 rng = np.random.default_rng(11)
 P_O = rng.poisson(39, 10)
 PILOT = spi.robustness(P_O, rng.poisson(36, 10), n=25, m=2)
 
 
-def share_supported(pilot: spi.Estimate, effect: float, n: int) -> float:
-    """Share of simulated studies of n seeds, with the pilot's spread, that find the effect."""
+def planned_spread(pilot: spi.Estimate) -> float:
+    """60 % upper confidence limit of the pilot's spread."""
     assert pilot.difference_sd is not None
+    assert pilot.degrees_of_freedom is not None
+    df = pilot.degrees_of_freedom
+    return float(pilot.difference_sd * math.sqrt(df / chi2.ppf(0.4, df)))
+
+
+def share_supported(pilot: spi.Estimate, effect: float, n: int) -> float:
+    """Share of simulated studies of n seeds, with the planned spread, that find the effect."""
     draws = np.random.default_rng(1).normal(
-        (effect - pilot.threshold) * pilot.mean_denominator, pilot.difference_sd, (20_000, n)
+        (effect - pilot.threshold) * pilot.mean_denominator, planned_spread(pilot), (20_000, n)
     )
-    test = paired_ratio(draws, np.full_like(draws, pilot.mean_denominator))
-    supported = (test.p_value < 0.05) & (test.probability > 0.5)
-    return float(supported.mean())
+    # The t test alone: of normal differences the bootstrap takes little.
+    test = ttest_1samp(draws, 0.0, axis=1, alternative="greater")
+    return float(np.mean(test.pvalue < 0.025))
 
 
 @pytest.mark.parametrize("effect", [0.08, 0.146, 0.3, 0.6])
@@ -50,10 +57,12 @@ def test_levels_of_early_looks_have_a_minimum_detectable_effect() -> None:
     assert few.difference_sd is not None
     # By the noncentral t itself, of 4 degrees of freedom, at its critical value 1565.05.
     noncentrality = effect * few.mean_denominator / few.difference_sd * math.sqrt(5)
-    assert noncentrality == pytest.approx(1915.05, rel=1e-3)
+    spread = planned_spread(few) / few.difference_sd
+    assert noncentrality == pytest.approx(1915.05 * spread, rel=1e-3)
     two = dataclasses.replace(few, n_seeds=2, degrees_of_freedom=1.0)
     assert (spi.minimum_detectable_effect(two) or 0.0) > effect
-    assert spi.seeds_for_power(two, 0.5) == spi.seeds_for_power(few, 0.5)
+    # Two seeds say less of the spread, so the plan is more careful.
+    assert (spi.seeds_for_power(two, 0.5) or 0) > (spi.seeds_for_power(few, 0.5) or 0)
 
 
 def test_effects_are_counted_from_the_threshold() -> None:
@@ -74,14 +83,16 @@ def test_two_seeds_are_the_least() -> None:
 
 
 def test_textbook_sample_size() -> None:
-    # d = 0.5, two-sided .05, power .8: 34 pairs (Cohen 1988; G*Power)
+    # d = 0.5, two-sided .05, power .8: 34 pairs (Cohen 1988; G*Power), of a spread that is known
     pilot = dataclasses.replace(PILOT, difference_sd=1.0, mean_denominator=1.0)
+    pilot = dataclasses.replace(pilot, difference_sd=1.0 / planned_spread(pilot))
     assert spi.seeds_for_power(pilot, 0.5) == 34
 
 
 def test_a_small_effect_is_planned_for_too() -> None:
     # Large samples: (1.960 + 0.842)^2 / d^2 pairs.
     pilot = dataclasses.replace(PILOT, difference_sd=1.0, mean_denominator=1.0)
+    pilot = dataclasses.replace(pilot, difference_sd=1.0 / planned_spread(pilot))
     assert spi.no_plan_because(pilot, 0.01) is None
     assert spi.seeds_for_power(pilot, 0.01) == pytest.approx(78_489, rel=1e-3)
 
@@ -94,6 +105,7 @@ def test_a_small_effect_is_planned_for_too() -> None:
         (PILOT, 1e-6, "more than 1,000,000 seeds"),
         (spi.robustness([39], [38], n=25, m=1), 0.1, "one seed"),
         (spi.robustness([39, 39], [38, 38], n=25, m=1), 0.1, "no spread"),
+        (spi.robustness([39], [39], n=25, m=1, identical=True), 0.1, "the same runs"),
     ],
 )
 def test_no_number_comes_with_a_reason(pilot: spi.Estimate, effect: float, reason: str) -> None:
@@ -116,7 +128,7 @@ def test_unpaired_plan_reaches_80_percent() -> None:
     assert n is not None
     assert pilot.difference_sd is not None
     # Large-sample check: (1.96 + 0.84)^2 sd^2 / distance^2, a little more for Student's t.
-    normal = 7.849 * (pilot.difference_sd / (0.15 * pilot.mean_denominator)) ** 2
+    normal = 7.849 * (planned_spread(pilot) / (0.15 * pilot.mean_denominator)) ** 2
     assert normal < n < normal + 4
 
 
@@ -131,3 +143,24 @@ def test_power_out_of_range(power: float) -> None:
 def test_effect_must_be_finite() -> None:
     with pytest.raises(IndicatorError, match="effect = nan"):
         spi.seeds_for_power(PILOT, float("nan"))
+
+
+@pytest.mark.parametrize("n_pilot", [5, 10, 20])
+def test_a_promised_power_of_80_percent_is_kept_on_average(n_pilot: int) -> None:
+    mean, sd, effect = 40.0, 6.0, 0.08
+    draws = np.random.default_rng(n_pilot).normal(0.0, sd, (400, n_pilot))
+    achieved, least = [], list[float]()
+    for difference in draws:
+        pilot = spi.relative_change(np.full(n_pilot, mean), mean + difference)
+        n = spi.seeds_for_power(pilot, effect)
+        assert n is not None
+        achieved.append(nct.sf(t.ppf(0.975, n - 1), n - 1, effect * mean / sd * math.sqrt(n)))
+        least.append(spi.lower_decile_of_power(pilot, effect, n) or 0.0)
+    assert 0.76 < np.mean(achieved) < 0.86
+    assert np.median(least) == pytest.approx(np.quantile(achieved, 0.1), abs=0.06)
+
+
+def test_power_of_an_unlucky_pilot_needs_seeds_and_an_effect() -> None:
+    with pytest.raises(IndicatorError, match="n_seeds = 1"):
+        spi.lower_decile_of_power(PILOT, 0.1, 1)
+    assert spi.lower_decile_of_power(PILOT, PILOT.threshold, 20) is None

@@ -82,9 +82,9 @@ def test_a_single_run_in_any_sample_gives_the_value_only() -> None:
 
 
 def test_unclear_denominator_gives_no_interval_but_a_verdict() -> None:
-    r = spi.robustness([0.0, 40.0], [100.0, 101.0, 99.0], n=25, m=1, paired=False)
+    r = spi.robustness([0.0, 0.0, 40.0], [100.0, 101.0, 99.0], n=25, m=1, paired=False)
     assert (r.low, r.high) == (-math.inf, math.inf)
-    assert r.flags == ("unbounded",)
+    assert r.flags == ("assumes_normal", "unbounded")
 
 
 def test_one_constant_sample_is_not_degenerate() -> None:

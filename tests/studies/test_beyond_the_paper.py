@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.analysis.bootstrap import bootstrap_check, bootstrap_verdict
 from swarm_logistics_env.studies.analysis.faulty_runs import anchoring_loads, fault_budgets
 from swarm_logistics_env.studies.analysis.paired import jackknife_interval
 from swarm_logistics_env.studies.analysis.policies import cell_contests, indicator_contests
@@ -91,13 +90,10 @@ def test_swarm_that_comes_back_has_a_self_repair_time(repaired: Findings) -> Non
     one = only(repaired)
     assert one.repair is not None
     assert one.repair.distinguishable
-    # 600 s of loss; the trailing window of 100 s is clean, and seen to be, within 100 s more.
-    assert one.repair.seconds == pytest.approx(600, abs=105)
-    assert one.repair.seconds is not None
-    assert one.repair.low <= one.repair.seconds <= one.repair.high
-    assert one.repair.null_limit < 400
+    assert one.repair.seconds == pytest.approx(600, abs=30)
+    assert one.repair.low <= 600 <= one.repair.high < 660
     ((*_, reading),) = table(repaired, "Self-repair time")
-    assert reading == "longer than chance makes it"
+    assert reading == "a loss, and back"
     assert one.single is not None
     fault, null = one.single
     assert (fault.runs, null.runs) == (SEEDS, SEEDS)
@@ -116,11 +112,12 @@ def test_swarm_that_never_comes_back_is_censored() -> None:
     assert one.against_removed is not None
     assert one.against_removed.value == pytest.approx(0.3, abs=0.03)
     assert one.against_removed.verdict == "refuted"
-    ((*_, repair, null, _, longest, reading),) = table(found, "Self-repair time")
-    assert repair == "∞ [∞, ∞]"
-    assert float(null) < 400
-    assert longest == "1300"
-    assert reading == "censored: not back within the run"
+    ((*_, repair, p, followed, _, reading),) = table(found, "Self-repair time")
+    assert repair.startswith("∞ [13")
+    assert repair.endswith(", ∞]")
+    assert float(p) < 0.01
+    assert followed == "1400"
+    assert reading == "censored: a loss to the end is not excluded"
     ((_, _, median, censored, *_),) = table(found, "Self-repair run by run")
     assert (median, censored) == ("not reached", f"{SEEDS} of {SEEDS} runs")
 
@@ -187,7 +184,7 @@ def test_fault_budget_stops_at_what_was_not_tested(repaired: Findings) -> None:
     ("delivered", "answer"),
     [
         # One robot of ten may be lost, and R = 0 lies at a tenth of the deliveries.
-        ([10, 10, 10, 10], "at least 2"),
+        ([10, 11, 10, 11], "at least 2"),
         ([5, 6, 5, 6], "0; m = 1 refuted"),
         ([2, 14, 2, 14], "0; m = 1 inconclusive"),
         ([9], "0; m = 1 inconclusive"),
@@ -351,35 +348,3 @@ def test_no_law_is_fitted_to_a_flat_series() -> None:
     found = judged(study, lambda *_: Outcome("", np.arange(60.0)))
     assert table(found, "Scaling laws") == []
     assert "no law is fitted: P is 60.0 at every size" in markdown(document(found))
-
-
-def test_bootstrap_stands_beside_fieller_where_they_disagree() -> None:
-    # Two seeds in three gain nothing and none loses: the t-test sees a symmetric spread.
-    study = Study(seeds=12, sizes=[{"values": [5, 10]}])
-    p = {5: [10] * 12, 10: [10] * 8 + [12, 13, 14, 16]}
-    found = judged(
-        study, lambda _, level, seed: Outcome("", np.arange(float(p[int(level.value)][seed])))
-    )
-    check = bootstrap_check(found)
-    assert check.checked == 1
-    (judgement,) = found.judgements
-    estimate = judgement.estimate
-    assert estimate is not None
-    assert estimate.bootstrap_low is not None
-    assert estimate.bootstrap_high is not None
-    says = bootstrap_verdict(estimate)
-    assert (estimate.verdict, says) == ("inconclusive", "supported")
-    assert estimate.bootstrap_low > 0
-    assert check.differing == (judgement,)
-    ((policy, _, _, fieller, _, bootstrap),) = table(found, "Studentised bootstrap")
-    assert (policy, fieller, bootstrap) == ("swarm-dt", "inconclusive", "supported")
-    assert "The studentised bootstrap says otherwise" in markdown(document(found))
-
-
-def test_nine_seeds_have_no_bootstrap() -> None:
-    assert bootstrap_check(two_policies(9, 2.0)).checked == 0
-    agreed = bootstrap_check(two_policies(10, 2.0))
-    assert agreed.checked > 0
-    assert agreed.width is not None
-    least, median, most = agreed.width
-    assert least <= median <= most

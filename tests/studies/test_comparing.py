@@ -2,27 +2,27 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparing import answers
+from swarm_logistics_env.studies.comparing import answers, identical
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.gate import Gate
 from swarm_logistics_env.studies.judgement import Findings, judge
+from swarm_logistics_env.studies.matching import match
 from swarm_logistics_env.studies.plan import Plan
 
 SPREAD = (0, 2, -1, 1, 3, -2)
 
 
-def findings(
-    performance: dict[tuple[int, int], int], shifts: dict[int, int] | None = None, **fields: Any
-) -> Findings:
+def findings(performance: dict[tuple[int, int], int], **fields: Any) -> Findings:
     """Findings of a study of sizes 10 and 20 and one faulty robot of 10.
 
     Args:
         performance: mean P by (N, m); every seed adds its own, the same everywhere.
-        shifts: added to P of N by a tenth of the seed's number, so that differences scatter.
+        fields: of the study that differ.
     """
     plan = Study(
         **{
@@ -41,7 +41,8 @@ def outcomes(plan: Plan, performance: dict[tuple[int, int], int]) -> Any:
         condition = run.condition
         removed = any(fault.mode == "removed" for fault in condition.faults)
         key = (condition.scenario.n_robots, -1 if removed else len(condition.faults))
-        delivered = performance[key] + SPREAD[run.seed] + number % 3 % 2
+        spread = SPREAD[run.seed % len(SPREAD)]
+        delivered = performance[key] + spread + number % 3 % 2
         yield run.key, Outcome(run.key, untimed=delivered)
 
 
@@ -62,10 +63,6 @@ def test_regression_is_found_and_nothing_else() -> None:
     assert fails("change < -0.1 at FM1", well, worse)
     assert not fails("change < -0.1 at N = 20", well, worse)
     assert not fails("possibly change < -0.1", well, well)
-    # Whether P fell at all cannot be told from equal runs.
-    (answer, *_) = answers(Gate.parse("change < 0"), well, well)
-    assert answer.estimate is not None
-    assert answer.estimate.value == 0
 
 
 def test_every_shared_condition_is_compared_once() -> None:
@@ -99,6 +96,136 @@ def test_other_seeds_and_another_policy_are_compared_where_they_can_be() -> None
     assert answer.name.startswith("swarm-dt -> random-walk")
     assert answer.estimate is not None
     assert answer.estimate.n_seeds == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "failing"),
+    [
+        ("change < 0", False),
+        ("possibly change < 0", False),
+        ("possibly change > 0", False),
+        ("possibly change < -0.1", False),
+        ("change < 0.1", True),
+        ("possibly change < 0.1", True),
+        ("change > -0.1", True),
+    ],
+)
+def test_the_same_runs_answer_a_gate_exactly(text: str, failing: bool) -> None:
+    plan = findings(WELL).plan
+    # Where nothing is delivered no change could be estimated.
+    nothing = judge(plan, {run.key: Outcome(run.key, untimed=0) for run in plan.runs()}, 6)
+    for same in (findings(WELL), findings(WORSE, seeds=2), nothing):
+        said = answers(Gate.parse(text), same, same)
+        assert {(answer.fails, answer.exact) for answer in said} == {(failing, 0.0)}
+
+
+def played(**fields: Any) -> Outcome:
+    return Outcome(
+        **{
+            "run": "a",
+            "delivery_times": np.array([3.0, 4.5]),
+            "ended_at": 20.0,
+            "anchoring_seconds": 1.5,
+            **fields,
+        }
+    )
+
+
+def test_runs_of_other_code_are_the_same_where_every_delivery_is() -> None:
+    assert identical([played()], [played(run="b")])
+    for other in (
+        played(delivery_times=np.array([3.0, 4.6])),
+        played(delivery_times=np.array([3.0])),
+        played(ended_at=19.0),
+        played(anchoring_seconds=1.4),
+    ):
+        assert not identical([played(), played()], [played(), other])
+    none = np.empty(0)
+    assert identical([played(delivery_times=none)], [played(delivery_times=none)])
+    # That neither delivered anything tells nothing of two policies.
+    assert not identical([played(delivery_times=none)], [played(delivery_times=none, run="b")])
+    assert not identical([Outcome("a", untimed=3)], [Outcome("b", untimed=3)])
+    assert identical([Outcome("a", untimed=3)], [Outcome("a", untimed=3)])
+
+
+def test_runs_are_paired_by_their_seeds_and_not_by_their_place() -> None:
+    old = findings(WELL, seeds=6, first_seed=0)
+    new = findings({key: p - 4 for key, p in WELL.items()}, seeds=6, first_seed=2)
+    said = answers(Gate.parse("change < 0"), old, new)
+    for answer in said:
+        assert answer.estimate is not None
+        assert answer.estimate.n_seeds == 4
+        assert answer.estimate.pairing_correlation is not None
+        assert answer.estimate.pairing_correlation > 0.9
+        assert answer.fails
+    paired = "Runs are paired over the shared seeds, 2 to 5."
+    assert match(old, new).notes == (
+        f"Only in the old study, and left out: seeds 0 to 1. {paired}",
+        f"Only in the new study, and left out: seeds 6 to 7. {paired}",
+    )
+
+
+def test_studies_that_share_no_seed_cannot_be_judged() -> None:
+    old, new = findings(WELL, seeds=3), findings(WELL, seeds=3, first_seed=1000)
+    for answer in answers(Gate.parse("change < 0"), old, new):
+        assert answer.fails
+        assert answer.problem == (
+            "the studies share no seed: the old one has 0 to 2, the new one 1000 to 1002; play "
+            "one of them on the other's seeds"
+        )
+
+
+ABLATION: dict[str, Any] = {"ablations": [{"policy": "random-walk"}]}
+
+
+def test_an_ablation_s_policy_is_not_compared() -> None:
+    # The random walk of both studies is the same, and judged in neither.
+    old = findings(WELL, **ABLATION)
+    new = findings(WORSE, policies=["swarm-dt-follow"], **ABLATION)
+    said = answers(Gate.parse("change < 0"), old, new)
+    assert len(said) == 4
+    assert all(answer.name.startswith("swarm-dt -> swarm-dt-follow: ") for answer in said)
+    assert any(answer.fails for answer in said)
+    # Judged, it is compared with what was judged, and not with the old ablation.
+    judged = findings(WORSE, policies=["random-walk"], **ABLATION)
+    names = [answer.name for answer in answers(Gate.parse("change < 0"), old, judged)]
+    assert len(names) == 4
+    assert all(name.startswith("swarm-dt -> random-walk: ") for name in names)
+
+
+def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
+    one = findings(WELL)
+    two = findings(WELL, policies=["swarm-dt", "random-walk"])
+    for old, new, study, other in ((one, two, "new", "old"), (two, one, "old", "new")):
+        said = answers(Gate.parse("change < 0"), old, new)
+        (failing,) = (answer for answer in said if answer.fails)
+        assert failing.problem == (
+            f"policy 'random-walk' of the {study} study has no match: the {other} study judges "
+            "'swarm-dt'"
+        )
+        # Whoever asks about the other policy alone gets an answer.
+        assert not fails("change < 0 at swarm-dt", old, new)
+        assert fails("change < 0 at random-walk", old, new)
+        assert fails("change < 0 at FM1", old, new)
+
+
+def test_conditions_of_one_study_alone_are_listed() -> None:
+    old = findings(WELL)
+    new = findings({**WELL, (30, 0): 90}, sizes=[{"values": [10, 30]}])
+    assert len(answers(Gate.parse("change < 0"), old, new)) == 3
+    assert match(old, new).notes == (
+        "Only in the old study, and not compared: swarm-dt, N = 20 (Scalability).",
+        "Only in the new study, and not compared: swarm-dt, N = 30 (Scalability).",
+    )
+
+
+def test_a_policy_under_no_common_condition_cannot_be_judged() -> None:
+    old = findings(WELL, scenario={"n_robots": 10, "n_items": 70})
+    (answer,) = answers(Gate.parse("change < 0"), old, findings(WELL))
+    assert answer.fails
+    assert answer.problem == (
+        "policy 'swarm-dt' is judged in both studies, but under no common condition"
+    )
 
 
 def test_what_cannot_be_judged_fails() -> None:

@@ -87,6 +87,12 @@ def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
     assert judgement.estimate.paired
     cells = {cell.arm.level.value: cell.performance.tolist() for cell in study.findings().cells}
     assert cells == {5: [20, 10], 10: [40, 21]}
+    # The file's own seeds, so that it can be compared with another file by them.
+    assert list(study.plan().seeds) == [3, 7]
+    assert set(study.results()["seed"]) == {3, 7}
+    assert not study.findings().exploratory
+    study.report()
+    assert "2 paired seeds (3, 7)" in (tmp_path / "out" / "report.md").read_text()
 
 
 HEAD = "kind,name,value,n_robots,delivered\n"

@@ -10,30 +10,49 @@ import pytest
 
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.agreement import agreement, agreements
-from swarm_logistics_env.studies.comparisons import Level
+from swarm_logistics_env.studies.analysis.faulty_runs import fault_budgets
+from swarm_logistics_env.studies.comparisons import NO_FAULT, Level
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.judgement import Findings, judge
 from swarm_logistics_env.studies.paper import PAPER
 from swarm_logistics_env.studies.reporting.document import document
+from swarm_logistics_env.studies.reporting.files import judgement_record
 from swarm_logistics_env.studies.reporting.markdown import markdown
 from swarm_logistics_env.studies.reporting.sections import sections
 
 SEEDS = 10
 
 
-def findings(p: Callable[[Level], float], *, full: Level | None = None) -> Findings:
-    """The paper's study if the cell at a level gave p(level) plus noise of one item."""
-    plan = Study.preset("paper", seeds=SEEDS).plan()
+def findings(
+    p: Callable[[Level], float],
+    *,
+    full: Level | None = None,
+    seeds: int = SEEDS,
+    same: frozenset[str] = frozenset(),
+) -> Findings:
+    """The paper's study if the cell at a level gave p(level) plus noise of one item.
+
+    Args:
+        full: The level whose runs deliver every item, on one seed.
+        same: Failure modes whose runs are those without a fault.
+    """
+    plan = Study.preset("paper", seeds=seeds).plan()
     levels = {arm.condition.key: arm.level for _, _, arm in reversed(plan.cells)}
     noise = np.random.default_rng(0)
     outcomes = {}
     for run in plan.runs():
         level = levels[run.condition.key]
         delivered = max(0, round(p(level) + float(noise.normal(0, 1))))
+        original = level.name in same or level == NO_FAULT
+        if original:
+            delivered = 39 + run.seed % 3
         outcomes[run.key] = Outcome(
-            run.key, np.arange(float(delivered)), all_delivered=level == full and run.seed == 3
+            run.key,
+            np.arange(float(delivered)),
+            all_delivered=level == full and run.seed == 0,
+            digest=f"no fault {run.seed}" if original else run.key,
         )
-    return judge(plan, outcomes, declared_seeds=SEEDS)
+    return judge(plan, outcomes, declared_seeds=seeds)
 
 
 def as_published(level: Level) -> float:
@@ -167,3 +186,57 @@ def test_ablation_that_falls_is_supported(published: Findings) -> None:
     assert [j.on_claim(j.adjusted_verdict) for j in changes] == ["supported", "supported"]
     titles = [section.title for section in sections(published)]
     assert "swarm-dt: Ablation: without taxis" in titles
+
+
+def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
+    found = findings(as_published, same=frozenset({"FM2"}))
+    unaffected = [j for j in found.judgements if j.unaffected]
+    assert {(j.comparison.indicator, j.comparison.changed.level.name) for j in unaffected} == {
+        ("R", "FM2")
+    }
+    for judgement in unaffected:
+        assert judgement.estimate is not None
+        assert judgement.estimate.value == judgement.comparison.changed.level.value / 25
+        assert (judgement.adjusted_p, judgement.adjusted_verdict) == (None, None)
+        record = judgement_record(judgement)
+        assert (record["verdict"], record["claim_verdict_holm"]) == ("unaffected", "unaffected")
+    # Holm's family of R has nine members left, so the smallest p counts nine times.
+    rest = [j for j in found.judgements if j.comparison.family == ("swarm-dt", "R")]
+    p_values = [j.estimate.p_value for j in rest if j.estimate and not j.unaffected]
+    assert len(p_values) == 9
+    assert min(j.adjusted_p for j in rest if j.adjusted_p is not None) == pytest.approx(
+        9 * min(p for p in p_values if p is not None)
+    )
+    budgets = {b.comparison.changed.level.name: b.budget for b in fault_budgets(found)}
+    assert budgets["FM2"] == (3, None)
+    text = markdown(document(found))
+    assert "R = 0.080 exactly, over 10 paired seeds (0 to 9): unaffected by construction" in text
+    assert "3 unaffected by construction" in text
+
+
+def test_two_seeds_of_the_paper_give_no_verdict() -> None:
+    found = findings(as_published, seeds=2)
+    assert {j.estimate.verdict for j in found.judgements if j.estimate} == {"inconclusive"}
+    assert {j.adjusted_verdict for j in found.judgements} == {"inconclusive"}
+
+
+def test_below_ten_seeds_no_verdict_is_counted() -> None:
+    text = markdown(document(findings(as_published, seeds=5)))
+    assert "Unadjusted: " in text
+    (line,) = {
+        line for line in text.splitlines() if "Unadjusted: " in line and "not counted" in line
+    }
+    assert " supported" not in line
+    assert " refuted" not in line
+    assert "The verdict assumes normal differences." in text
+
+
+def test_a_study_at_its_cap_everywhere_decides_nothing() -> None:
+    plan = Study.preset("paper", seeds=SEEDS).plan()
+    outcomes = {
+        run.key: Outcome(run.key, np.arange(60.0), all_delivered=True, digest=run.key)
+        for run in plan.runs()
+    }
+    found = judge(plan, outcomes, declared_seeds=SEEDS)
+    assert {j.estimate.verdict for j in found.judgements if j.estimate} == {"inconclusive"}
+    assert {j.adjusted_verdict for j in found.judgements} == {"inconclusive"}

@@ -87,46 +87,6 @@ def spoil_version(path: Path) -> None:
     database.close()
 
 
-SCHEMA_1 = """
-CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE conditions (
-    condition TEXT PRIMARY KEY, policy TEXT NOT NULL, policy_identity TEXT NOT NULL,
-    scenario TEXT NOT NULL, faults TEXT NOT NULL
-) WITHOUT ROWID;
-CREATE TABLE runs (
-    run TEXT PRIMARY KEY, condition TEXT NOT NULL REFERENCES conditions, code TEXT NOT NULL,
-    seed INTEGER NOT NULL, delivered INTEGER, delivery_times BLOB, ended_at REAL,
-    all_delivered INTEGER, failed_robots TEXT, anchoring_seconds REAL, error TEXT,
-    wall_seconds REAL NOT NULL, UNIQUE (condition, code, seed)
-) WITHOUT ROWID;
-PRAGMA application_id = 1398230087;
-PRAGMA user_version = 1;
-"""
-
-
-def test_store_of_schema_1_is_migrated(tmp_path: Path) -> None:
-    path, condition = tmp_path / FILE_NAME, run(0).condition
-    database = sqlite3.connect(path)
-    database.executescript(SCHEMA_1)
-    database.execute(
-        "INSERT INTO conditions VALUES (?, 'mine', 'identity', ?, '[]')",
-        (condition.key, condition.scenario_json),
-    )
-    database.execute(
-        "INSERT INTO runs VALUES (?, ?, 'code', 0, 1, ?, 500.0, 0, '[]', 0.0, NULL, 0.1)",
-        (run(0).key, condition.key, np.array([2.5]).tobytes()),
-    )
-    database.commit()
-    database.close()
-    for _ in range(2):
-        with Store.existing(tmp_path) as store:
-            store.add(run(1), outcome(run(1), [1.0]))
-            kept = store.outcomes([run(0), run(1)])
-            assert {row["behaviour"] for row in store.rows()} == {0}
-        assert kept[run(0).key].delivery_times.tolist() == [2.5]
-        assert len(kept) == 2
-
-
 def spoil_stranger(path: Path) -> None:
     database = sqlite3.connect(path)
     database.execute("CREATE TABLE runs (x)")

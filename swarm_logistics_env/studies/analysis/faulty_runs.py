@@ -66,7 +66,7 @@ def fault_budgets(findings: Findings) -> Iterator[ModeBudget]:
         complete = len(estimates) == len(judgements)
         budget = spi.fault_budget(estimates) if complete else None
         last = estimates.get(budget.limit) if budget and budget.limit else None
-        yield ModeBudget(judgements[0].comparison, tested, budget, last.verdict if last else None)
+        yield ModeBudget(judgements[0].comparison, tested, budget, last.answer if last else None)
 
 
 def anchoring_loads(findings: Findings) -> Iterator[AnchoringLoad]:

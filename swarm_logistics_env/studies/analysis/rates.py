@@ -33,9 +33,9 @@ class RateCurve:
 
 
 def window_of(comparison: Comparison) -> float:
-    """Return the trailing window [s]: 100, or a third of what is left after the onset."""
+    """Return the trailing window [s]: 100, or a third of what is left after the onset, rounded."""
     left = comparison.original.condition.scenario.duration - comparison.changed.level.onset
-    return min(_LONGEST_WINDOW, left / 3)
+    return min(_LONGEST_WINDOW, float(round(left / 3)) or left / 3)
 
 
 def rate_curves(findings: Findings, comparison: Comparison) -> tuple[RateCurve, ...]:

@@ -13,7 +13,6 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.survival import SurvivalCurve
-from swarm_logistics_env.studies.analysis.rates import window_of
 from swarm_logistics_env.studies.analysis.runs import Times, outcomes_of, times_of
 from swarm_logistics_env.studies.comparisons import Comparison
 from swarm_logistics_env.studies.judgement import Findings
@@ -142,11 +141,11 @@ def _null(findings: Findings, comparison: Comparison) -> Pair:
 def _self_repair(
     comparison: Comparison, pair: Pair, null: Pair
 ) -> tuple[SelfRepair, SingleRepairs]:
-    onset, window = comparison.changed.level.onset, window_of(comparison)
+    onset = comparison.changed.level.onset
     end = comparison.original.condition.scenario.duration
     generator = streams.generator(0, "self-repair")
-    pooled = spi.self_repair(*pair, null, onset=onset, end=end, generator=generator, window=window)
-    times = [spi.repair_times(*runs, onset=onset, end=end, window=window) for runs in (pair, null)]
+    pooled = spi.self_repair(*pair, null, onset=onset, end=end, generator=generator)
+    times = [spi.repair_times(*runs, onset=onset, end=end) for runs in (pair, null)]
     fault, without = (
         RepairCurve(
             label,

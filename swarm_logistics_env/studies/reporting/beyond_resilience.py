@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.self_repair import RECOVERED, SelfRepair
+from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.analysis.rates import rate_curves, window_of
 from swarm_logistics_env.studies.analysis.resilience import (
@@ -33,7 +33,7 @@ def beyond_resilience(findings: Findings) -> Iterator[Section]:
         who = one.comparison.policy, str(one.comparison.changed.level)
         rows.append((*who, *_index(one.against_removed), *_index(one.against_whole)))
         if one.repair is not None:
-            repairs.append((*who, *_repair(one.repair, window_of(one.comparison))))
+            repairs.append((*who, *_repair(one.repair)))
         if one.single is not None:
             singles.append((*who, *_single(one.single.fault), *_single(one.single.null)))
         if one.problem:
@@ -54,17 +54,18 @@ def beyond_resilience(findings: Findings) -> Iterator[Section]:
     yield Section(
         "Self-repair time",
         (
-            "policy", "fault", "window [s]", "self-repair [s, 95 %]", "no-fault null [s]",
-            "95 % of the null below [s]", "longest that could show [s]", "reading",
+            "policy", "fault", "self-repair [s, 95 %]", "p of no loss", "followed for [s]",
+            "without a fault [s]", "reading",
         ),
         tuple(repairs),
         (
-            ("From the onset until the delivery rate, pooled over seeds in a trailing window, is "
-            f"back at {100 * RECOVERED:g} % of that with the robots removed: from then on it "
-            "averages as much over every stretch, up to then less. "
-            "The null is the same statistic of a pair without fault that differs in behaviour "
-            "seeds alone: a time that does not exceed 95 % of its resamples measures noise. "
-            "Intervals: bootstrap over seeds; ∞ and \"censored\": not back within the run."),
+            ("From the onset to the change point of the delivery counts, pooled over seeds: before "
+            "it the swarm delivers a share of what the paired runs with the robots removed do, "
+            "after it as much. Interval: every time that an inverted simulated likelihood ratio "
+            "keeps. p: pairs swapped at random lose as much; where it is not below 5 %, the time "
+            "measures noise, as does that of a pair without a fault that differs in behaviour "
+            "seeds alone. ∞ and \"censored\": that the loss lasted to the end of the run is not "
+            "excluded."),
             *problems,
         ),
     )  # fmt: skip
@@ -99,23 +100,19 @@ def _index(estimate: Estimate | None) -> tuple[str, str]:
     return wording.bracketed(interval, 3), estimate.verdict
 
 
-def _repair(repair: SelfRepair, window: float) -> tuple[str, ...]:
+def _repair(repair: SelfRepair) -> tuple[str, ...]:
     seconds = math.inf if repair.seconds is None else repair.seconds
-    null = math.inf if repair.null_seconds is None else repair.null_seconds
     if not repair.distinguishable:
         reading = "not distinguishable from no fault"
     elif repair.censored:
-        reading = "censored: not back within the run"
-    elif repair.low <= repair.null_limit:
-        reading = "longer than chance makes it, its interval is not"
+        reading = "censored: a loss to the end is not excluded"
     else:
-        reading = "longer than chance makes it"
+        reading = "a loss, and back"
     return (
-        f"{window:g}",
         wording.bracketed(Interval(seconds, repair.low, repair.high), 0),
-        wording.bracketed(Interval(null, None, None), 0),
-        wording.bracketed(Interval(repair.null_limit, None, None), 0),
-        f"{repair.followed:g}",
+        wording.p_text(repair.p_value),
+        f"{repair.followed:.0f}",
+        f"{repair.null_seconds:.0f}",
         reading,
     )
 

@@ -59,7 +59,7 @@ def _matrix(findings: Findings, policies: tuple[str, ...]) -> Section:
         row = [policy]
         for name in properties:
             verdicts = Counter[str](
-                j.adjusted_verdict or "blocked"
+                wording.counted_as(j, j.adjusted_verdict)
                 for j in findings.judgements
                 if j.comparison.policy == policy and wording.property_name(j) == name
             )

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
+from swarm_logistics_env.spi import Verdict
 from swarm_logistics_env.studies.analysis.scaling import SizeSeries
 from swarm_logistics_env.studies.judgement import Findings, Judgement
 from swarm_logistics_env.studies.reporting import drawing
@@ -207,8 +208,8 @@ def _intervals(
                 estimate.value if estimate else None,
                 estimate.low if estimate else None,
                 estimate.high if estimate else None,
-                estimate.verdict if estimate else None,
-                judgement.adjusted_verdict,
+                _verdict(judgement, estimate.verdict if estimate else None),
+                _verdict(judgement, judgement.adjusted_verdict),
                 judgement.published,
                 judgement.saturated,
             )
@@ -224,6 +225,10 @@ def _intervals(
         0.5 + 2.5 * len(panels),
         lambda canvas: drawing.intervals(canvas, panels),
     )
+
+
+def _verdict(judgement: Judgement, verdict: Verdict | None) -> str | None:
+    return "unaffected" if judgement.unaffected else verdict
 
 
 def _saturation(saturated: bool) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi import Verdict
 from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
 from swarm_logistics_env.studies.reporting import wording
 from swarm_logistics_env.studies.reporting.document import document, figures_of
@@ -87,6 +88,7 @@ def cell_record(cell: Cell) -> dict[str, Value]:
 def judgement_record(judgement: Judgement) -> dict[str, Value]:
     """Return one judged comparison as a flat record."""
     comparison, estimate, claim = judgement.comparison, judgement.estimate, judgement.claim
+    unaffected = "unaffected" if judgement.unaffected else None
     return {
         "policy": comparison.policy,
         "table": comparison.table,
@@ -96,26 +98,30 @@ def judgement_record(judgement: Judgement) -> dict[str, Value]:
         "value": estimate.value if estimate else None,
         "low": estimate.low if estimate else None,
         "high": estimate.high if estimate else None,
-        "bootstrap_low": estimate.bootstrap_low if estimate else None,
-        "bootstrap_high": estimate.bootstrap_high if estimate else None,
         "level": estimate.level if estimate else None,
         "probability": estimate.probability if estimate else None,
         "p_value": estimate.p_value if estimate else None,
         "p_holm": judgement.adjusted_p,
-        "verdict": estimate.verdict if estimate else None,
-        "verdict_holm": judgement.adjusted_verdict,
+        "verdict": unaffected or (estimate.verdict if estimate else None),
+        "verdict_holm": unaffected or judgement.adjusted_verdict,
         "n_seeds": estimate.n_seeds if estimate else None,
         "pairing_correlation": estimate.pairing_correlation if estimate else None,
         "flags": " ".join(estimate.flags) if estimate else None,
         "saturated": judgement.saturated,
         "claim": None if claim is None else wording.claimed(judgement),
         "published": judgement.published,
-        "claim_verdict": judgement.on_claim(estimate.verdict) if estimate else None,
-        "claim_verdict_holm": judgement.on_claim(judgement.adjusted_verdict),
+        "claim_verdict": _on_claim(judgement, estimate.verdict if estimate else None),
+        "claim_verdict_holm": _on_claim(judgement, judgement.adjusted_verdict),
         "seeds_for_power_80": judgement.seeds_needed,
         "no_plan": judgement.no_plan,
         "problem": judgement.problem,
     }
+
+
+def _on_claim(judgement: Judgement, verdict: Verdict | None) -> str | None:
+    if judgement.claim is not None and judgement.unaffected:
+        return "unaffected"
+    return judgement.on_claim(verdict)
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Value]]) -> None:

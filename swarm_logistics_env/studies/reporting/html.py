@@ -7,7 +7,13 @@ from collections.abc import Mapping
 
 from swarm_logistics_env.studies.reporting.document import Document
 
-_MARKS = {"supported": "✓", "refuted": "✗", "inconclusive": "?", "blocked": "!"}
+_MARKS = {
+    "supported": "✓",
+    "refuted": "✗",
+    "inconclusive": "?",
+    "unaffected": "=",
+    "blocked": "!",
+}
 
 
 def html(document: Document, drawings: Mapping[str, str]) -> str:

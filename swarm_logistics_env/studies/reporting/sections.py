@@ -16,10 +16,15 @@ NOTHING = wording.NOTHING
 _MOST_MISSES = 8  # more are no list that anybody reads
 _FLAGS = {
     "single_seed": "one seed gives a value, no interval and no verdict",
-    "degenerate": "no spread between seeds, so the interval is the point",
+    "identical": "unaffected by construction: both conditions gave the same runs, so the value is "
+    "exact and no evidence; it stands outside Holm's family",
+    "too_few_seeds": "two seeds give no verdict, as counts agree by chance",
+    "degenerate": "no spread between seeds, so no interval and no verdict",
+    "capped": "inconclusive, because P is capped on the side that the verdict leans to",
     "unbounded": "mean P_o is not distinguishable from 0 at so few seeds, so the interval is "
     "infinite; the verdict comes from the test",
-    "skewed": "so skewed that the interval covers less than 95 % at so few seeds",
+    "assumes_normal": "below ten paired seeds, or unpaired, the verdict assumes normal differences",
+    "skewed": "so skewed that at so few seeds the verdict errs more often than its level",
 }
 
 
@@ -143,18 +148,19 @@ def _claims(findings: Findings, policy: str) -> Iterator[Section]:
     rows, plain, adjusted = [], Counter[str](), Counter[str]()
     for judgement in claims:
         estimate = judgement.estimate
-        on_claim = judgement.on_claim(estimate.verdict if estimate else None) or "blocked"
-        on_claim_adjusted = judgement.on_claim(judgement.adjusted_verdict) or "blocked"
-        plain[on_claim] += 1
-        adjusted[on_claim_adjusted] += 1
+        says = judgement.on_claim(estimate.verdict if estimate else None)
+        says_adjusted = judgement.on_claim(judgement.adjusted_verdict)
+        plain[wording.counted_as(judgement, says)] += 1
+        adjusted[wording.counted_as(judgement, says_adjusted)] += 1
+        unaffected = wording.UNAFFECTED if judgement.unaffected else None
         rows.append(
             (
                 f"{judgement.comparison.indicator}, {judgement.comparison.label}",
                 wording.claimed(judgement),
                 wording.number(judgement.published),
                 wording.ratio(judgement),
-                on_claim,
-                on_claim_adjusted,
+                unaffected or says or "blocked",
+                unaffected or says_adjusted or "blocked",
                 wording.power(judgement),
             )
         )
@@ -212,7 +218,9 @@ def _warnings(findings: Findings) -> Iterator[str]:
     if any(cell.saturated for cell in findings.cells):
         yield (
             f"{wording.SATURATED} saturated: in at least one run every item was delivered, so P is "
-            "capped; indicators that rest on it are marked as well."
+            "capped; indicators that rest on it are marked as well. A capped reference cannot "
+            "support that an indicator lies above its threshold, a capped changed condition cannot "
+            "refute it."
         )
     if findings.exploratory:
         since = "it is judged at a look that was not declared before its first run"

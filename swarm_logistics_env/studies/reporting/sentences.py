@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.analysis.bootstrap import bootstrap_verdict, differs
 from swarm_logistics_env.studies.judgement import POWER, Findings, Judgement
 from swarm_logistics_env.studies.reporting import wording
 
 
 @dataclass(frozen=True)
 class Sentence:
-    """One verdict in words; `verdict` is the Holm-adjusted one on the property, or "blocked"."""
+    """One verdict in words; `verdict`: Holm's on the property, "unaffected" or "blocked"."""
 
     head: str
     text: str
@@ -26,6 +25,13 @@ def sentence(findings: Findings, judgement: Judgement) -> Sentence:
     head = f"{comparison.policy}, {wording.property_name(judgement)}? {_conditions(judgement)}."
     if estimate is None:
         return Sentence(head, f"Blocked: {judgement.problem}.", "blocked")
+    if judgement.unaffected:
+        text = (
+            f"{comparison.indicator} = {estimate.value:.3f} exactly, over "
+            f"{_seeds(findings, estimate)}: {wording.UNAFFECTED}. Both conditions gave the same "
+            "runs, so there is nothing to test."
+        )
+        return Sentence(head, text, "unaffected")
     plain = wording.on_property(judgement, estimate.verdict)
     adjusted = wording.on_property(judgement, judgement.adjusted_verdict) or "blocked"
     # One seed gives no p, and Holm's placeholder of 1 says nothing.
@@ -39,11 +45,10 @@ def sentence(findings: Findings, judgement: Judgement) -> Sentence:
     ]
     if estimate.pairing_correlation is not None:
         parts.append(f"Pairing correlation {estimate.pairing_correlation:.2f}.")
+    if "assumes_normal" in estimate.flags:
+        parts.append("The verdict assumes normal differences.")
     if "skewed" in estimate.flags:
-        parts.append("Skewed: the interval covers less than 95 % at so few seeds.")
-    if differs(estimate):
-        other = wording.on_property(judgement, bootstrap_verdict(estimate))
-        parts.append(f"The studentised bootstrap says otherwise, unadjusted: {other}.")
+        parts.append("Skewed: at so few seeds the verdict errs more often than its level.")
     if findings.exploratory:
         parts.append("Exploratory.")
     return Sentence(head, " ".join(parts), adjusted)
@@ -80,7 +85,8 @@ def _seeds(findings: Findings, estimate: Estimate) -> str:
 def _p(p: float | None) -> str:
     if p is None:
         return ""
-    return " (p < 0.001)" if p < 0.001 else f" (p = {p:.3f})"
+    text = wording.p_text(p)
+    return f" (p {text})" if text.startswith("<") else f" (p = {text})"
 
 
 def _claim(judgement: Judgement, estimate: Estimate) -> list[str]:
@@ -106,6 +112,14 @@ def _what_it_takes(judgement: Judgement, estimate: Estimate, adjusted: str) -> l
         )
     if judgement.published is not None and judgement.seeds_needed is not None:
         parts.append(
-            f"The published value {judgement.published:.3f} needs {judgement.seeds_needed} seeds."
+            f"The published value {judgement.published:.3f} needs {judgement.seeds_needed} seeds"
+            f"{_least_power(judgement, estimate)}."
         )
     return parts
+
+
+def _least_power(judgement: Judgement, estimate: Estimate) -> str:
+    assert judgement.published is not None
+    assert judgement.seeds_needed is not None
+    least = spi.lower_decile_of_power(estimate, judgement.published, judgement.seeds_needed)
+    return "" if least is None else f" ({least:.0%} power or more in nine pilots of ten)"

@@ -56,8 +56,9 @@ def _study(plan: Plan) -> tuple[str, ...]:
         ),
         (
             "Performance P is the number of items delivered in the order requested. Intervals of "
-            "P are t-intervals over seeds; those of indicators are Fieller's, paired by seed. A "
-            "verdict is a paired t-test against the threshold, one-sided "
+            "P are t-intervals over seeds; those of indicators invert the test, paired by seed. A "
+            "verdict is a paired test against the threshold, from ten seeds on the larger p of "
+            "Student's t and the studentised bootstrap, below them t alone, one-sided "
             + (
                 "at the levels of the declared looks."
                 if plan.specification.looks

@@ -9,8 +9,11 @@ from collections.abc import Sequence
 from swarm_logistics_env.spi.estimate import Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.judgement import Findings, Judgement
+from swarm_logistics_env.studies.seeds import seeds_in_words
 
 SATURATED = "†"
+UNAFFECTED = "unaffected by construction"
+_NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 NOTHING = "–"
 
 _PROPERTIES = {
@@ -97,6 +100,8 @@ def verdict(judgement: Judgement) -> str:
     """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
     if judgement.estimate is None:
         return "blocked"
+    if judgement.unaffected:
+        return UNAFFECTED
     plain = on_property(judgement, judgement.estimate.verdict)
     adjusted = on_property(judgement, judgement.adjusted_verdict)
     return f"{plain}" if adjusted == plain else f"{plain} ({adjusted or 'blocked'})"
@@ -105,6 +110,25 @@ def verdict(judgement: Judgement) -> str:
 def on_property(judgement: Judgement, verdict: Verdict | None) -> Verdict | None:
     """Turn a verdict on "above the threshold" into one on the property that is named."""
     return judgement.on_claim(verdict) if _is_fall(judgement) else verdict
+
+
+def counted_as(judgement: Judgement, verdict: Verdict | None) -> str:
+    """Return what a verdict on this judgement counts as in `counted`.
+
+    A count is a headline: a verdict that assumes normal differences does not stand in it.
+    """
+    if judgement.unaffected:
+        return UNAFFECTED
+    if judgement.estimate is None or verdict is None:
+        return "blocked"
+    if verdict != "inconclusive" and "assumes_normal" in judgement.estimate.flags:
+        return _NOT_COUNTED
+    return verdict
+
+
+def p_text(p: float) -> str:
+    """Return a p-value, e.g. "0.013" or "< 0.001"."""
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
 def power(judgement: Judgement) -> str:
@@ -132,12 +156,11 @@ def seeds_text(findings: Findings) -> str:
     seeds = findings.plan.seeds
     if not findings.plan.paired:
         return f"{len(seeds)} unpaired {'run' if len(seeds) == 1 else 'runs'} a condition"
-    if len(seeds) == 1:
-        return f"one seed ({seeds[0]})"
-    return f"{len(seeds)} paired seeds ({seeds[0]} to {seeds[-1]})"
+    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
+    return f"{count} ({seeds_in_words(seeds)})"
 
 
 def counted(verdicts: Counter[str]) -> str:
     """Return how many of each verdict, e.g. "7 supported, 1 refuted"."""
-    order = ("supported", "refuted", "inconclusive", "blocked")
+    order = ("supported", "refuted", "inconclusive", _NOT_COUNTED, UNAFFECTED, "blocked")
     return ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in order if verdicts[verdict])
