@@ -64,6 +64,7 @@ def power_command(
                 name,
                 "–" if demand.effect is None else f"{demand.effect:.3f}",
                 demand.problem or str(demand.seeds),
+                "–" if demand.least_power is None else f"{demand.least_power:.0%}",
                 "–" if demand.detectable is None else f"{demand.detectable:.3f}",
             )
         )
@@ -77,7 +78,8 @@ def power_command(
         )
     n_seeds = len(findings.plan.seeds)
     columns = (
-        "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power",
+        "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power on average",
+        "power in nine pilots of ten at least",
         f"distance that {n_seeds} seeds find",
     )  # fmt: skip
     show(Section(f"Seeds needed, from {n_seeds} seeds", columns, tuple(rows)))

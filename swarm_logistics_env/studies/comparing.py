@@ -11,9 +11,8 @@ import numpy as np
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
-from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.gate import Gate
-from swarm_logistics_env.studies.judgement import Findings
+from swarm_logistics_env.studies.judgement import Findings, same_runs
 from swarm_logistics_env.studies.matching import Match, match, outcomes
 from swarm_logistics_env.studies.seeds import seeds_in_words
 
@@ -71,35 +70,16 @@ def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -
     return Answer(name, gate.fails_on(verdict), estimate=value, verdict=verdict)
 
 
-def identical(old: Sequence[Outcome], new: Sequence[Outcome]) -> bool:
-    """Return whether two lists of outcomes, seed by seed, are those of the same runs.
-
-    Runs of one key are the same where they gave the same. Under other keys (the code or the
-    policy's source has changed) equal times of all deliveries tell it, and no delivery tells
-    nothing.
-    """
-    return all(_same(a, b) for a, b in zip(old, new, strict=True))
-
-
-def _same(a: Outcome, b: Outcome) -> bool:
-    return (
-        (a.run == b.run or (a.untimed is None and len(a.delivery_times) > 0))
-        and a.untimed == b.untimed
-        and np.array_equal(a.delivery_times, b.delivery_times)
-        and (a.ended_at, a.anchoring_seconds) == (b.ended_at, b.anchoring_seconds)
-    )
-
-
 def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, _Found]]:
     performance = {(cell.policy, cell.table, cell.arm): cell for cell in new.cells}
     # Once each, however many thresholds it was asked against.
-    comparisons = dict.fromkeys(
-        replace(judgement.comparison, threshold=gate.number)
+    comparisons = {
+        replace(judgement.comparison, threshold=gate.number): judgement.unaffected
         for judgement in new.judgements
         if judgement.comparison.indicator == gate.subject
-    )
+    }
     labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
-    for comparison in comparisons:
+    for comparison, unaffected in comparisons.items():
         name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
         if labels[comparison.policy, comparison.label] > 1:
             name += f" ({comparison.table})"
@@ -117,11 +97,13 @@ def _indicators(gate: Gate, new: Findings) -> Iterator[tuple[str, _Found]]:
                 # No type can be given to a lambda's default.
                 lambda arm, used=used: used[arm].performance,  # type: ignore[misc]
                 paired=new.plan.paired,
+                saturated=[arm for arm, cell in used.items() if cell.saturated],
+                identical=unaffected,
             )
         except spi.IndicatorError as error:
             yield name, str(error)
         else:
-            yield name, estimate
+            yield name, estimate.value if unaffected else estimate
 
 
 def _changes(gate: Gate, old: Findings, new: Findings) -> Iterator[tuple[str, _Found]]:
@@ -149,10 +131,18 @@ def _change(
                 "seeds"
             )
         pair = outcomes(old, before, seeds), outcomes(new, after, seeds)
-        if identical(*pair):
+        if same_runs(*([outcome.digest for outcome in side] for side in pair)):
             return 0.0
         p_o, p_new = (np.array([o.delivered for o in side], dtype=np.float64) for side in pair)
     try:
-        return spi.relative_change(p_o, p_new, threshold=gate.number, paired=seeds is not None)
+        return spi.relative_change(
+            p_o,
+            p_new,
+            threshold=gate.number,
+            paired=seeds is not None,
+            saturated=[
+                name for name, cell in (("p_o", before), ("p_new", after)) if cell.saturated
+            ],
+        )
     except spi.IndicatorError as error:
         return str(error)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -211,7 +211,12 @@ def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -
 def _identical(comparison: Comparison, used: Mapping[Arm, _Result]) -> bool:
     """Return whether what was changed changed no run: equal digests, seed by seed."""
     before, after = used[comparison.original].digests, used[comparison.changed].digests
-    return comparison.removed is None and before == after and None not in before
+    return comparison.removed is None and same_runs(before, after)
+
+
+def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool:
+    """Return whether two conditions gave the same run at every seed, by the digests of the runs."""
+    return list(before) == list(after) and None not in before
 
 
 def _cell(policy: str, table: str, arm: Arm, result: _Result, reference: Reference | None) -> Cell:

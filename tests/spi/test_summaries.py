@@ -107,3 +107,11 @@ def test_level_out_of_range() -> None:
         spi.mean_interval(P, level=95)
     with pytest.raises(IndicatorError, match="level = 95"):
         spi.probability_of_improvement(P, P, level=95)
+
+
+def test_no_interval_of_p_reaches_below_0() -> None:
+    few = [0.0, 0.0, 12.0, 1.0]
+    mean, run = spi.mean_interval(few), spi.prediction_interval(few)
+    assert (mean.low, run.low) == (0.0, 0.0)
+    assert mean.high is not None
+    assert mean.high == pytest.approx(3.25 + 3.1824 * np.std(few, ddof=1) / 2, rel=1e-4)

@@ -7,10 +7,10 @@ import pytest
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparing import answers, identical
+from swarm_logistics_env.studies.comparing import answers
 from swarm_logistics_env.studies.execution import Outcome
 from swarm_logistics_env.studies.gate import Gate
-from swarm_logistics_env.studies.judgement import Findings, judge
+from swarm_logistics_env.studies.judgement import Findings, judge, same_runs
 from swarm_logistics_env.studies.matching import match
 from swarm_logistics_env.studies.plan import Plan
 
@@ -21,7 +21,7 @@ def findings(performance: dict[tuple[int, int], int], **fields: Any) -> Findings
     """Findings of a study of sizes 10 and 20 and one faulty robot of 10.
 
     Args:
-        performance: mean P by (N, m); every seed adds its own, the same everywhere.
+        performance: mean P by (N, m); every seed adds its own share.
         fields: of the study that differ.
     """
     plan = Study(
@@ -41,9 +41,10 @@ def outcomes(plan: Plan, performance: dict[tuple[int, int], int]) -> Any:
         condition = run.condition
         removed = any(fault.mode == "removed" for fault in condition.faults)
         key = (condition.scenario.n_robots, -1 if removed else len(condition.faults))
-        spread = SPREAD[run.seed % len(SPREAD)]
-        delivered = performance[key] + spread + number % 3 % 2
-        yield run.key, Outcome(run.key, untimed=delivered)
+        # In proportion, so that differences scatter too.
+        spread = SPREAD[run.seed % len(SPREAD)] * performance[key] // 20
+        delivered = float(performance[key] + spread + number % 3 % 2)
+        yield run.key, Outcome(run.key, np.arange(delivered), digest=f"{run.key} {delivered}")
 
 
 WELL = {(10, 0): 40, (20, 0): 70, (10, 1): 39, (10, -1): 36}
@@ -113,39 +114,18 @@ def test_other_seeds_and_another_policy_are_compared_where_they_can_be() -> None
 def test_the_same_runs_answer_a_gate_exactly(text: str, failing: bool) -> None:
     plan = findings(WELL).plan
     # Where nothing is delivered no change could be estimated.
-    nothing = judge(plan, {run.key: Outcome(run.key, untimed=0) for run in plan.runs()}, 6)
+    nothing = judge(plan, {run.key: Outcome(run.key, digest=run.key) for run in plan.runs()}, 6)
     for same in (findings(WELL), findings(WORSE, seeds=2), nothing):
         said = answers(Gate.parse(text), same, same)
         assert {(answer.fails, answer.exact) for answer in said} == {(failing, 0.0)}
 
 
-def played(**fields: Any) -> Outcome:
-    return Outcome(
-        **{
-            "run": "a",
-            "delivery_times": np.array([3.0, 4.5]),
-            "ended_at": 20.0,
-            "anchoring_seconds": 1.5,
-            **fields,
-        }
-    )
-
-
-def test_runs_of_other_code_are_the_same_where_every_delivery_is() -> None:
-    assert identical([played()], [played(run="b")])
-    for other in (
-        played(delivery_times=np.array([3.0, 4.6])),
-        played(delivery_times=np.array([3.0])),
-        played(ended_at=19.0),
-        played(anchoring_seconds=1.4),
-    ):
-        assert not identical([played(), played()], [played(), other])
-    none = np.empty(0)
-    assert identical([played(delivery_times=none)], [played(delivery_times=none)])
-    # That neither delivered anything tells nothing of two policies.
-    assert not identical([played(delivery_times=none)], [played(delivery_times=none, run="b")])
-    assert not identical([Outcome("a", untimed=3)], [Outcome("b", untimed=3)])
-    assert identical([Outcome("a", untimed=3)], [Outcome("a", untimed=3)])
+def test_runs_are_the_same_where_their_digests_are() -> None:
+    assert same_runs(["a", "b"], ["a", "b"])
+    assert not same_runs(["a", "b"], ["a", "c"])
+    assert not same_runs(["a"], ["a", "b"])
+    # Of results that come from elsewhere nothing tells it, however equal they are.
+    assert not same_runs(["a", None], ["a", None])
 
 
 def test_runs_are_paired_by_their_seeds_and_not_by_their_place() -> None:
