@@ -15,6 +15,7 @@ from swarm_logistics_env.studies.comparisons import Level
 from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
 from swarm_logistics_env.studies.reporting import wording
 
+_EXACT = " ="
 _FAULTS = {
     "removed": "robots removed",
     "FM1": "FM1 (always tells timer 0)",
@@ -119,16 +120,17 @@ def _claims(judgements: list[Judgement]) -> list[str]:
     claims = [judgement for judgement in judgements if judgement.claim is not None]
     if not claims:
         return []
-    on_claim = [judgement.on_claim(judgement.adjusted_verdict) or "blocked" for judgement in claims]
-    counted = Counter[str](on_claim)
-    told = ", ".join(f"{counted[verdict]} {verdict}" for verdict in sorted(counted))
+    said = [
+        wording.counted_as(judgement, judgement.on_claim(judgement.adjusted_verdict))
+        for judgement in claims
+    ]
     text = (
         f"Of {len(claims)} claims (those of the paper's text, and that P falls without taxis), "
-        f"adjusted after Holm: {told}."
+        f"adjusted after Holm: {wording.counted(Counter(said))}."
     )
     refuted = [
         f"{wording.claimed(judgement)}, {judgement.comparison.label}"
-        for judgement, verdict in zip(claims, on_claim)
+        for judgement, verdict in zip(claims, said)
         if verdict == "refuted"
     ]
     return [text, *([f"Refuted: {'; '.join(refuted)}."] if refuted else [])]
@@ -147,7 +149,8 @@ def policies_block(findings: Findings, skewed: Findings) -> str:
     for judgement in (*findings.judgements, *skewed.judgements):
         comparison = judgement.comparison
         label = f"{comparison.indicator}, {comparison.label}"
-        rows.setdefault(label, {})[comparison.policy] = wording.ratio(judgement)
+        mark = _EXACT if judgement.unaffected else ""
+        rows.setdefault(label, {})[comparison.policy] = wording.ratio(judgement) + mark
     first, count, more = findings.plan.seeds[0], len(findings.plan.seeds), len(skewed.plan.seeds)
     replaced = dict.fromkeys(
         f"{j.comparison.indicator}, {j.comparison.label}" for j in skewed.judgements
@@ -159,6 +162,11 @@ def policies_block(findings: Findings, skewed: Findings) -> str:
     )
     head = ("", *(f"`{name}`" for name in names))
     body = [(label, *(row.get(name, "") for name in names)) for label, row in rows.items()]
+    if any(judgement.unaffected for judgement in findings.judgements):
+        text += (
+            f"\nThe sign{_EXACT} marks what is {wording.UNAFFECTED}: equal runs, an exact value, "
+            "and no evidence."
+        )
     return "\n".join([table(head, body), "", text, *_shortfall(findings)])
 
 

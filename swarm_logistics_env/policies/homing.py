@@ -10,6 +10,7 @@ What it leans on: the remembered direction is kept in the robot's own frame and 
 long as that frame keeps its direction. Nothing in the simulation turns a robot that does not
 command a turn, and this policy never commands one, so its body frame acts as a compass that never
 drifts. No real robot has such a sensor. Swarm D-T remembers no direction and does not need it.
+As it never turns, this policy is for the holonomic drive.
 
 The networks that `swarm-logistics train` makes begin by imitating this policy.
 """

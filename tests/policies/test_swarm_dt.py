@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, Warehouse, run_episode
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.policies import SwarmDT, load
+from swarm_logistics_env.policies import SwarmDT, SwarmDTParameters, load
+from swarm_logistics_env.scenario import SOURCES
 
 
 def nothing_near(n_robots: int = 1) -> NDArray[np.float32]:
@@ -248,3 +249,11 @@ def test_commands_stay_within_bounds_in_a_crowd() -> None:
 def test_rows_for_another_number_of_robots_are_refused() -> None:
     with pytest.raises(PolicyError, match="observations of 4 robots: reset was told 3"):
         fresh(3).act(nothing_near(4))
+
+
+def test_every_constant_says_whether_it_has_a_source_or_was_fitted() -> None:
+    for name, field in SwarmDTParameters.model_fields.items():
+        origin = (field.description or "").rsplit("; ", 1)[-1]
+        kind, _, source = origin.partition(": ")
+        assert kind in ("source", "fitted"), name
+        assert source in (SOURCES if kind == "source" else {""}), name
