@@ -13,6 +13,8 @@ BENCHMARK := .venvs/benchmark
 PEERS     := .venvs/peers
 
 TORCHRL   := .venvs/torchrl
+BENCHMARL := .venvs/benchmarl
+SKRL      := .venvs/skrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
 
@@ -95,6 +97,8 @@ $(DEV)/installed: EXTRAS := dev,docs,study,render,train
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl
+$(BENCHMARL)/installed: OTHERS := torch benchmarl
+$(SKRL)/installed: OTHERS := torch skrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
 $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit

@@ -11,8 +11,9 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.central_state import global_state, global_state_bounds
+from swarm_logistics_env.commands import as_array
 from swarm_logistics_env.dict_view import ArrayStep, DictView, agent_names
-from swarm_logistics_env.errors import ScenarioError, SetupError, suggest
+from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.reset_options import (
     OPTIONS,
@@ -25,10 +26,26 @@ from swarm_logistics_env.reset_options import (
 from swarm_logistics_env.rewards import RewardTerms
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
-from swarm_logistics_env.warehouse import Fault, Warehouse
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
+from swarm_logistics_env.warehouse.faults import failed_robots
 
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer
+
+# Fields that bound the state: an episode's value is at most the largest of those covered.
+_BOUND_THE_STATE = (
+    "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
+)  # fmt: skip
+
+# What other environments call an argument.
+_OTHER_NAMES = {
+    "num_agents": "n_robots",
+    "n_agents": "n_robots",
+    "num_robots": "n_robots",
+    "width": "warehouse_width",
+    "height": "warehouse_height",
+    "max_steps": "max_cycles",
+}
 
 
 class SwarmLogisticsEnv(DictView):
@@ -42,14 +59,17 @@ class SwarmLogisticsEnv(DictView):
         rewards: reward term -> weight; default: 1 to everybody for each delivery.
         render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
+        max_robots: the largest swarm that a reset's options may ask for; default: n_robots.
         **fields: fields of the scenario to replace, e.g. `n_robots=40`.
 
     Attributes:
         next_seed: the seed of the episode that a reset without one begins; follows from the
             seed of the episode before.
+        is_begun: whether there was a reset.
 
     Raises:
-        ScenarioError, FaultError, SetupError: an argument is unknown or cannot be.
+        ArgumentError: there is no such argument; a ScenarioError and a TypeError.
+        ScenarioError, FaultError, SetupError: an argument cannot be.
 
     Example:
         >>> env = SwarmLogisticsEnv(n_robots=3)
@@ -73,6 +93,7 @@ class SwarmLogisticsEnv(DictView):
         rewards: Mapping[str, float] | None = None,
         render_mode: Literal["human", "rgb_array"] | None = None,
         max_cycles: int | None = None,
+        max_robots: int | None = None,
         **fields: Any,
     ) -> None:
         self.scenario = _scenario_of(scenario, fields)
@@ -91,6 +112,7 @@ class SwarmLogisticsEnv(DictView):
         self._renderer: Renderer | None = None
         self.warehouse = Warehouse(self.scenario)
         self.agents: list[str] = []
+        self.is_begun = False
         self.possible_agents = agent_names(range(self.scenario.n_robots))
         self._covered = [self.scenario]
         self._rewards = RewardTerms(rewards)
@@ -98,6 +120,15 @@ class SwarmLogisticsEnv(DictView):
         low, high = bounds(self.scenario)
         self._observation_space = Box(low, high, dtype=np.float32)
         self._action_space = Box(-1.0, 1.0, (4 + self.scenario.message_size,), dtype=np.float32)
+        self.max_robots = max_robots
+        if max_robots is not None:
+            is_number = isinstance(max_robots, int | np.integer)
+            if not is_number or max_robots < self.scenario.n_robots:
+                raise SetupError(
+                    f"max_robots = {max_robots!r}: should be None or a whole number of at least "
+                    f"n_robots = {self.scenario.n_robots}"
+                )
+            self.cover(self.scenario.replace(n_robots=int(max_robots)))
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""
@@ -120,9 +151,10 @@ class SwarmLogisticsEnv(DictView):
 
         Raises:
             ScenarioError, FaultError: an option cannot be.
-            SetupError: a seed or option is of the wrong type, or in such a scenario observations
-                could leave the observation space, which is that of the environment's own (and of
-                those given to `cover`).
+            SetupError: a seed or option is of the wrong type; no robot would be there; or such a
+                scenario has more robots than `possible_agents`, or observations or states that
+                could leave their spaces, which are those of the environment's own (and of those
+                given to `cover`).
         """
         options = checked_options(options)
         for unknown in options.keys() - set(OPTIONS):
@@ -133,11 +165,12 @@ class SwarmLogisticsEnv(DictView):
         seed = self.next_seed if seed is None else checked_seed(seed)
         scenario = self.scenario_of(seed, options)
         self._check_covered(scenario)
-        observations = self.warehouse.reset(seed, faults_among(options, self.faults), scenario)
+        faults = faults_among(options, self.faults)
+        _check_somebody_is_there(faults, seed, scenario.n_robots)
+        observations = self.warehouse.reset(seed, faults, scenario)
         self.next_seed = key(seed, "the episode that follows") >> 1
         self._rewards.begin(self.warehouse)
-        if scenario.n_robots > len(self.possible_agents):
-            self.possible_agents = agent_names(range(scenario.n_robots))
+        self.is_begun = True
         self._present = self.warehouse.state.robot_present.copy()
         self._n_removed = self.warehouse.n_removed
         self.agents = agent_names(np.flatnonzero(self._present).tolist())
@@ -168,8 +201,10 @@ class SwarmLogisticsEnv(DictView):
             when the time is up. `agents` are those to whom neither happened yet.
 
         Raises:
-            CommandError: wrong shape or not finite; nothing has happened then.
+            CommandError: wrong shape, not readable or not finite; nothing has happened then.
         """
+        if not isinstance(commands, np.ndarray):
+            commands = as_array(commands, "commands")
         return self.outcome(self.warehouse.step(commands))
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
@@ -191,6 +226,14 @@ class SwarmLogisticsEnv(DictView):
             is_left = was_present & ~(terminations | truncations)
             self.agents = agent_names(np.flatnonzero(is_left).tolist())
         return observations, rewards, terminations, truncations
+
+    @property
+    def episode_info(self) -> dict[str, float]:
+        """What the `infos` of every agent say of the episode; the same keys at every step.
+
+        "delivered": items delivered so far, the paper's performance P.
+        """
+        return {"delivered": self.warehouse.state.delivered}
 
     def cover(self, scenario: Scenario) -> None:
         """Widen the observation space so that episodes may also be played in `scenario`.
@@ -260,9 +303,24 @@ class SwarmLogisticsEnv(DictView):
         return {**self.__dict__, "_renderer": None}
 
     def _check_covered(self, scenario: Scenario) -> None:
+        if scenario.n_robots > len(self.possible_agents):
+            raise SetupError(
+                f"n_robots = {scenario.n_robots}: should be at most {len(self.possible_agents)}, "
+                "as spaces and possible_agents never change; make the environment with "
+                f"max_robots={scenario.n_robots} or wrap it in SwarmSize"
+            )
+        if scenario in self._covered:
+            return
         low, high = bounds(scenario)
         space = self._observation_space
-        if low.shape == space.shape and (low >= space.low).all() and (high <= space.high).all():
+        is_seen_within = low.shape == space.shape and bool(
+            (low >= space.low).all() and (high <= space.high).all()
+        )
+        is_state_within = all(
+            getattr(scenario, name) <= max(getattr(known, name) for known in self._covered)
+            for name in _BOUND_THE_STATE
+        )
+        if is_seen_within and is_state_within:
             return
         changed = [
             f"{name} = {value}"
@@ -270,8 +328,19 @@ class SwarmLogisticsEnv(DictView):
             if value != getattr(self.scenario, name)
         ]
         raise SetupError(
-            f"{', '.join(changed)}: observations could leave the observation space; should be "
+            f"{', '.join(changed)}: observations or states could leave their spaces; should be "
             "within what the environment was built for, or announced by env.cover(scenario)"
+        )
+
+
+def _check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:
+    removing = [
+        fault for fault in faults if fault.onset == 0.0 and not FAILURE_MODES[fault.mode].present
+    ]
+    gone = {robot for f in removing for robot in failed_robots(f, seed, n_robots).tolist()}
+    if len(gone) == n_robots:
+        raise SetupError(
+            f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
         )
 
 
@@ -281,9 +350,11 @@ def _scenario_of(scenario: Scenario | None, fields: Mapping[str, Any]) -> Scenar
             f"scenario = {scenario!r}: should be a Scenario; its fields are arguments of their "
             "own, as n_robots=40"
         )
-    own = ("scenario", "faults", "rewards", "render_mode", "max_cycles")
+    own = ("scenario", "faults", "rewards", "render_mode", "max_cycles", "max_robots")
     for name in fields:
         if name not in Scenario.model_fields:
-            known = (*Scenario.model_fields, *own)
-            raise ScenarioError(f"the environment has no argument {name!r}{suggest(name, known)}")
+            hint = suggest(_OTHER_NAMES.get(name, name), (*Scenario.model_fields, *own))
+            raise ArgumentError(
+                f"the environment got an unexpected keyword argument {name!r}{hint}"
+            )
     return (scenario or Scenario()).replace(**fields)
