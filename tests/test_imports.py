@@ -19,7 +19,7 @@ FOUNDATION = {"errors", "records", "streams", "kernels", "scenario"}
 WORLD = FOUNDATION | {"warehouse", "observations"}
 RUNS = WORLD | {"hearing", "policies", "episode"}
 ENVIRONMENT = WORLD | {
-    "rewards", "central_state", "dict_view", "reset_options", "env", "rendering",
+    "rewards", "central_state", "commands", "dict_view", "reset_options", "env", "rendering",
     "swarm_logistics_v0", "hearing",
 }  # fmt: skip
 
@@ -36,9 +36,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "rewards": WORLD,
     "rendering": FOUNDATION | {"warehouse"},
     "central_state": WORLD,
-    "dict_view": WORLD,
+    "commands": {"errors"},
+    "dict_view": WORLD | {"commands"},
     "reset_options": WORLD,
-    "env": WORLD | {"rewards", "rendering", "central_state", "dict_view", "reset_options"},
+    "env": WORLD
+    | {"rewards", "rendering", "central_state", "commands", "dict_view", "reset_options"},
     "swarm_logistics_v0": WORLD | {"rewards", "env"},
     "wrappers": ENVIRONMENT | {"spi"},
     "adapters": ENVIRONMENT | {"wrappers"},
