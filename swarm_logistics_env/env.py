@@ -10,13 +10,13 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.central_state import global_state, global_state_bounds
+from swarm_logistics_env.central_state import global_state
 from swarm_logistics_env.commands import as_array
 from swarm_logistics_env.dict_view import ArrayStep, DictView, agent_names
 from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
-from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.reset_options import (
     OPTIONS,
+    check_somebody_is_there,
     checked_faults,
     checked_options,
     checked_seed,
@@ -25,17 +25,12 @@ from swarm_logistics_env.reset_options import (
 )
 from swarm_logistics_env.rewards import RewardTerms
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spaces import Spaces
 from swarm_logistics_env.streams import key
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.warehouse import Fault, Warehouse
 
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer
-
-# Fields that bound the state: an episode's value is at most the largest of those covered.
-_BOUND_THE_STATE = (
-    "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
-)  # fmt: skip
 
 # What other environments call an argument.
 _OTHER_NAMES = {
@@ -114,12 +109,9 @@ class SwarmLogisticsEnv(DictView):
         self.agents: list[str] = []
         self.is_begun = False
         self.possible_agents = agent_names(range(self.scenario.n_robots))
-        self._covered = [self.scenario]
+        self._spaces = Spaces(self.scenario)
         self._rewards = RewardTerms(rewards)
         self.next_seed = int(np.random.default_rng().integers(2**63))
-        low, high = bounds(self.scenario)
-        self._observation_space = Box(low, high, dtype=np.float32)
-        self._action_space = Box(-1.0, 1.0, (4 + self.scenario.message_size,), dtype=np.float32)
         self.max_robots = max_robots
         if max_robots is not None:
             is_number = isinstance(max_robots, int | np.integer)
@@ -132,11 +124,11 @@ class SwarmLogisticsEnv(DictView):
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""
-        return self._observation_space
+        return self._spaces.observation
 
     def action_space(self, agent: str) -> Box:
         """Return the space of a command (4,): forward, left, turn, gripper; the same for all."""
-        return self._action_space
+        return self._spaces.action
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -164,9 +156,9 @@ class SwarmLogisticsEnv(DictView):
             )
         seed = self.next_seed if seed is None else checked_seed(seed)
         scenario = self.scenario_of(seed, options)
-        self._check_covered(scenario)
+        self._spaces.check(scenario, len(self.possible_agents))
         faults = faults_among(options, self.faults)
-        _check_somebody_is_there(faults, seed, scenario.n_robots)
+        check_somebody_is_there(faults, seed, scenario.n_robots)
         observations = self.warehouse.reset(seed, faults, scenario)
         self.next_seed = key(seed, "the episode that follows") >> 1
         self._rewards.begin(self.warehouse)
@@ -243,16 +235,7 @@ class SwarmLogisticsEnv(DictView):
         Raises:
             SetupError: its rows or commands are longer or shorter than this environment's.
         """
-        low, high = bounds(scenario)
-        if low.shape != self._observation_space.shape:
-            raise SetupError(
-                f"message_size = {scenario.message_size}: should be the environment's own, "
-                f"{self.scenario.message_size}, which its spaces are made for"
-            )
-        space = self._observation_space
-        low, high = np.minimum(low, space.low), np.maximum(high, space.high)
-        self._observation_space = Box(low, high, dtype=np.float32)
-        self._covered.append(scenario)
+        self._spaces.cover(scenario)
         if scenario.n_robots > len(self.possible_agents):
             self.possible_agents = agent_names(range(scenario.n_robots))
 
@@ -276,21 +259,12 @@ class SwarmLogisticsEnv(DictView):
 
     def state(self) -> NDArray[np.float32]:
         """Return the whole warehouse as one vector, see `global_state`; for central critics."""
-        n_items = max(scenario.n_items for scenario in self._covered)
-        return global_state(self.warehouse, len(self.possible_agents), n_items)
+        return global_state(self.warehouse, len(self.possible_agents), self._spaces.n_items)
 
     @property
     def state_space(self) -> Box:
         """The space of `state()`, for `possible_agents` robots and the most items there may be."""
-        n_items = max(scenario.n_items for scenario in self._covered)
-        lows, highs = zip(
-            *(
-                global_state_bounds(scenario, len(self.possible_agents), n_items)
-                for scenario in self._covered
-            ),
-            strict=True,
-        )
-        return Box(np.min(lows, axis=0), np.max(highs, axis=0), dtype=np.float32)
+        return self._spaces.state(len(self.possible_agents))
 
     def close(self) -> None:
         """Release what rendering holds; harmless when called twice."""
@@ -301,47 +275,6 @@ class SwarmLogisticsEnv(DictView):
     def __getstate__(self) -> dict[str, Any]:
         # A copy opens a window of its own.
         return {**self.__dict__, "_renderer": None}
-
-    def _check_covered(self, scenario: Scenario) -> None:
-        if scenario.n_robots > len(self.possible_agents):
-            raise SetupError(
-                f"n_robots = {scenario.n_robots}: should be at most {len(self.possible_agents)}, "
-                "as spaces and possible_agents never change; make the environment with "
-                f"max_robots={scenario.n_robots} or wrap it in SwarmSize"
-            )
-        if scenario in self._covered:
-            return
-        low, high = bounds(scenario)
-        space = self._observation_space
-        is_seen_within = low.shape == space.shape and bool(
-            (low >= space.low).all() and (high <= space.high).all()
-        )
-        is_state_within = all(
-            getattr(scenario, name) <= max(getattr(known, name) for known in self._covered)
-            for name in _BOUND_THE_STATE
-        )
-        if is_seen_within and is_state_within:
-            return
-        changed = [
-            f"{name} = {value}"
-            for name, value in scenario.model_dump().items()
-            if value != getattr(self.scenario, name)
-        ]
-        raise SetupError(
-            f"{', '.join(changed)}: observations or states could leave their spaces; should be "
-            "within what the environment was built for, or announced by env.cover(scenario)"
-        )
-
-
-def _check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:
-    removing = [
-        fault for fault in faults if fault.onset == 0.0 and not FAILURE_MODES[fault.mode].present
-    ]
-    gone = {robot for f in removing for robot in failed_robots(f, seed, n_robots).tolist()}
-    if len(gone) == n_robots:
-        raise SetupError(
-            f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
-        )
 
 
 def _scenario_of(scenario: Scenario | None, fields: Mapping[str, Any]) -> Scenario:

@@ -19,8 +19,8 @@ FOUNDATION = {"errors", "records", "streams", "kernels", "scenario"}
 WORLD = FOUNDATION | {"warehouse", "observations"}
 RUNS = WORLD | {"hearing", "policies", "episode"}
 ENVIRONMENT = WORLD | {
-    "rewards", "central_state", "commands", "dict_view", "reset_options", "env", "rendering",
-    "swarm_logistics_v0", "hearing",
+    "rewards", "central_state", "commands", "dict_view", "reset_options", "spaces", "env",
+    "rendering", "swarm_logistics_v0", "hearing",
 }  # fmt: skip
 
 # What each part of the package (a module or folder of its top level) may import besides itself.
@@ -39,8 +39,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "commands": {"errors"},
     "dict_view": WORLD | {"commands"},
     "reset_options": WORLD,
+    "spaces": WORLD | {"central_state"},
     "env": WORLD
-    | {"rewards", "rendering", "central_state", "commands", "dict_view", "reset_options"},
+    | {"rewards", "rendering", "central_state", "spaces"}
+    | {"commands", "dict_view", "reset_options"},
     "swarm_logistics_v0": WORLD | {"rewards", "env"},
     "wrappers": ENVIRONMENT | {"spi"},
     "adapters": ENVIRONMENT | {"wrappers"},
