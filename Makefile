@@ -13,6 +13,8 @@ BENCHMARK := .venvs/benchmark
 PEERS     := .venvs/peers
 
 TORCHRL   := .venvs/torchrl
+BENCHMARL := .venvs/benchmarl
+SKRL      := .venvs/skrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
 
@@ -30,7 +32,7 @@ help:
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
-	@echo "make interop         TorchRL, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
+	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
@@ -74,9 +76,12 @@ benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 benchmark-learning: $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
 
-interop: $(TORCHRL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
+interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPERSUIT))
 	$(TORCHRL)/bin/python -m interop.torchrl_specs
+	$(TORCHRL)/bin/python -m interop.torchrl_collector
 	$(TORCHRL)/bin/python -m interop.plain_ppo
+	$(BENCHMARL)/bin/python -m interop.benchmarl_mappo
+	$(SKRL)/bin/python -m interop.skrl_ippo
 	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
 	$(RLLIB)/bin/python -m interop.rllib_ppo
 
@@ -99,6 +104,8 @@ $(DEV)/installed: EXTRAS := dev,docs,study,render,train
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl
+$(BENCHMARL)/installed: OTHERS := torch benchmarl
+$(SKRL)/installed: OTHERS := torch skrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
 $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit

@@ -19,6 +19,12 @@ from swarm_logistics_env.warehouse.warehouse import COMMAND_COLUMNS
 
 PAGE = Path(__file__).parent / "environment.md"
 
+INFOS = [
+    ("`failed`", "0 or 1", "1 while any failure mode holds for the robot, removal included"),
+    ("`delivered`", "items", "delivered so far by the whole swarm: the paper's P"),
+    ("`active`", "0 or 1", "with `FixedAgents` only: 1 if the agent's robot is there"),
+]
+
 TEXT = """\
 # Swarm logistics
 
@@ -47,6 +53,10 @@ whole swarm. `gymnasium.make("SwarmLogistics-v0")` is the swarm as one agent.
 ## Agents
 
 `robot_0` to `robot_{last}`, as many as the scenario has robots. A removed robot is gone from `agents` for the rest of the episode.
+
+`possible_agents` and all spaces stay as they were made. A reset may ask for fewer robots; for more, give `max_robots` when the environment
+is made, or wrap it in `SwarmSize`. Trainers that need the same agents from the first step to the last take `FixedAgents(env)`: all
+possible agents are always there, absent ones with rows of zeros, and all end together.
 
 ## Observation space
 
@@ -77,7 +87,17 @@ The weighted sum of terms, `parallel_env(rewards={{"own_delivery": 1.0, "contact
 ## Episode end
 
 All agents terminate when every item is delivered (never with `restock`); a robot terminates when it is removed. All are truncated after
-`duration` ({duration:g} s, {n_steps} steps), or after `max_cycles` steps if that is sooner. The last `infos` hold `delivered`.
+`duration` ({duration:g} s, {n_steps} steps), or after `max_cycles` steps if that is sooner.
+
+## Infos
+
+A dict of its own for each agent, of numbers, with the same keys at the reset and at every step. Robots are not told: infos are for
+whoever trains or judges them.
+
+{infos}
+
+`IndicatorReward` adds the indicators and their references, see its `episode_info`. `warehouse.state.failure_modes` names the modes of each
+robot. `SwarmVecEnv` tells `world`, `n_robots` and `padding` of each row besides; `CentralEnv` tells `failed` as an array (N,).
 
 ## Arguments
 
@@ -93,13 +113,13 @@ raises a subclass of `SwarmLogisticsError`, itself a `ValueError`, before anythi
 
 ## Failure modes
 
-`Fault(mode, robots, onset, duration, factor)`; robots are not told, `infos[agent]["failure_modes"]` names the modes while they hold.
+`Fault(mode, robots, onset, duration, factor)`; robots are not told, `infos[agent]["failed"]` is 1 while any mode holds.
 
 {failures}
 
 ## Wrappers
 
-They stack in any order and keep the array path.
+They stack in any order, but for `FixedAgents`, which goes around all others, and keep the array path.
 
 {wrappers}
 
@@ -146,6 +166,7 @@ def page() -> str:
                 for name, term in REWARD_TERMS.items()
             ],
         ),
+        infos=table(("key", "unit", "meaning"), INFOS),
         duration=scenario.duration,
         n_steps=scenario.n_steps,
         arguments=arguments_list(),

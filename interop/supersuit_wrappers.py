@@ -7,6 +7,7 @@ from typing import Any
 import supersuit
 from pettingzoo.test import api_test, parallel_api_test
 
+from interop.conditions import CONDITIONS, played
 from interop.versions import versions
 from swarm_logistics_env import swarm_logistics_v0
 from swarm_logistics_env.wrappers import SwarmSize
@@ -49,6 +50,15 @@ def main() -> None:
         constant.step({name: leaving.action_space(name).sample() for name in constant.agents})
         steps += 1
     print(f"black_death_v3 while 2 robots leave: 5 agents for {steps} steps of {MAX_CYCLES}")
+
+    for name, make in CONDITIONS.items():
+        env = make()
+        vector = supersuit.pettingzoo_env_to_vec_env_v1(env)
+        vector.reset(seed=0)
+        for _ in range(200):
+            rows, *_ = vector.step([vector.action_space.sample()] * vector.num_envs)
+            assert rows.shape == (5, width), rows.shape
+        print(f"pettingzoo_env_to_vec_env_v1, 200 steps, {played(name, env)}")
 
 
 if __name__ == "__main__":

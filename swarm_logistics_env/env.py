@@ -10,12 +10,13 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.central_state import global_state, global_state_bounds
+from swarm_logistics_env.central_state import global_state
+from swarm_logistics_env.commands import as_array
 from swarm_logistics_env.dict_view import ArrayStep, DictView, agent_names
-from swarm_logistics_env.errors import ScenarioError, SetupError, suggest
-from swarm_logistics_env.observations import bounds
+from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
 from swarm_logistics_env.reset_options import (
     OPTIONS,
+    check_somebody_is_there,
     checked_faults,
     checked_options,
     checked_seed,
@@ -24,11 +25,22 @@ from swarm_logistics_env.reset_options import (
 )
 from swarm_logistics_env.rewards import RewardTerms
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spaces import Spaces
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Fault, Warehouse
 
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer
+
+# What other environments call an argument.
+_OTHER_NAMES = {
+    "num_agents": "n_robots",
+    "n_agents": "n_robots",
+    "num_robots": "n_robots",
+    "width": "warehouse_width",
+    "height": "warehouse_height",
+    "max_steps": "max_cycles",
+}
 
 
 class SwarmLogisticsEnv(DictView):
@@ -42,14 +54,17 @@ class SwarmLogisticsEnv(DictView):
         rewards: reward term -> weight; default: 1 to everybody for each delivery.
         render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
+        max_robots: the largest swarm that a reset's options may ask for; default: n_robots.
         **fields: fields of the scenario to replace, e.g. `n_robots=40`.
 
     Attributes:
         next_seed: the seed of the episode that a reset without one begins; follows from the
             seed of the episode before.
+        is_begun: whether there was a reset.
 
     Raises:
-        ScenarioError, FaultError, SetupError: an argument is unknown or cannot be.
+        ArgumentError: there is no such argument; a ScenarioError and a TypeError.
+        ScenarioError, FaultError, SetupError: an argument cannot be.
 
     Example:
         >>> env = SwarmLogisticsEnv(n_robots=3)
@@ -73,6 +88,7 @@ class SwarmLogisticsEnv(DictView):
         rewards: Mapping[str, float] | None = None,
         render_mode: Literal["human", "rgb_array"] | None = None,
         max_cycles: int | None = None,
+        max_robots: int | None = None,
         **fields: Any,
     ) -> None:
         self.scenario = _scenario_of(scenario, fields)
@@ -91,21 +107,28 @@ class SwarmLogisticsEnv(DictView):
         self._renderer: Renderer | None = None
         self.warehouse = Warehouse(self.scenario)
         self.agents: list[str] = []
+        self.is_begun = False
         self.possible_agents = agent_names(range(self.scenario.n_robots))
-        self._covered = [self.scenario]
+        self._spaces = Spaces(self.scenario)
         self._rewards = RewardTerms(rewards)
         self.next_seed = int(np.random.default_rng().integers(2**63))
-        low, high = bounds(self.scenario)
-        self._observation_space = Box(low, high, dtype=np.float32)
-        self._action_space = Box(-1.0, 1.0, (4 + self.scenario.message_size,), dtype=np.float32)
+        self.max_robots = max_robots
+        if max_robots is not None:
+            is_number = isinstance(max_robots, int | np.integer)
+            if not is_number or max_robots < self.scenario.n_robots:
+                raise SetupError(
+                    f"max_robots = {max_robots!r}: should be None or a whole number of at least "
+                    f"n_robots = {self.scenario.n_robots}"
+                )
+            self.cover(self.scenario.replace(n_robots=int(max_robots)))
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""
-        return self._observation_space
+        return self._spaces.observation
 
     def action_space(self, agent: str) -> Box:
         """Return the space of a command (4,): forward, left, turn, gripper; the same for all."""
-        return self._action_space
+        return self._spaces.action
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -120,9 +143,10 @@ class SwarmLogisticsEnv(DictView):
 
         Raises:
             ScenarioError, FaultError: an option cannot be.
-            SetupError: a seed or option is of the wrong type, or in such a scenario observations
-                could leave the observation space, which is that of the environment's own (and of
-                those given to `cover`).
+            SetupError: a seed or option is of the wrong type; no robot would be there; or such a
+                scenario has more robots than `possible_agents`, or observations or states that
+                could leave their spaces, which are those of the environment's own (and of those
+                given to `cover`).
         """
         options = checked_options(options)
         for unknown in options.keys() - set(OPTIONS):
@@ -132,12 +156,13 @@ class SwarmLogisticsEnv(DictView):
             )
         seed = self.next_seed if seed is None else checked_seed(seed)
         scenario = self.scenario_of(seed, options)
-        self._check_covered(scenario)
-        observations = self.warehouse.reset(seed, faults_among(options, self.faults), scenario)
+        self._spaces.check(scenario, len(self.possible_agents))
+        faults = faults_among(options, self.faults)
+        check_somebody_is_there(faults, seed, scenario.n_robots)
+        observations = self.warehouse.reset(seed, faults, scenario)
         self.next_seed = key(seed, "the episode that follows") >> 1
         self._rewards.begin(self.warehouse)
-        if scenario.n_robots > len(self.possible_agents):
-            self.possible_agents = agent_names(range(scenario.n_robots))
+        self.is_begun = True
         self._present = self.warehouse.state.robot_present.copy()
         self._n_removed = self.warehouse.n_removed
         self.agents = agent_names(np.flatnonzero(self._present).tolist())
@@ -168,8 +193,10 @@ class SwarmLogisticsEnv(DictView):
             when the time is up. `agents` are those to whom neither happened yet.
 
         Raises:
-            CommandError: wrong shape or not finite; nothing has happened then.
+            CommandError: wrong shape, not readable or not finite; nothing has happened then.
         """
+        if not isinstance(commands, np.ndarray):
+            commands = as_array(commands, "commands")
         return self.outcome(self.warehouse.step(commands))
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
@@ -192,6 +219,14 @@ class SwarmLogisticsEnv(DictView):
             self.agents = agent_names(np.flatnonzero(is_left).tolist())
         return observations, rewards, terminations, truncations
 
+    @property
+    def episode_info(self) -> dict[str, float]:
+        """What the `infos` of every agent say of the episode; the same keys at every step.
+
+        "delivered": items delivered so far, the paper's performance P.
+        """
+        return {"delivered": self.warehouse.state.delivered}
+
     def cover(self, scenario: Scenario) -> None:
         """Widen the observation space so that episodes may also be played in `scenario`.
 
@@ -200,16 +235,7 @@ class SwarmLogisticsEnv(DictView):
         Raises:
             SetupError: its rows or commands are longer or shorter than this environment's.
         """
-        low, high = bounds(scenario)
-        if low.shape != self._observation_space.shape:
-            raise SetupError(
-                f"message_size = {scenario.message_size}: should be the environment's own, "
-                f"{self.scenario.message_size}, which its spaces are made for"
-            )
-        space = self._observation_space
-        low, high = np.minimum(low, space.low), np.maximum(high, space.high)
-        self._observation_space = Box(low, high, dtype=np.float32)
-        self._covered.append(scenario)
+        self._spaces.cover(scenario)
         if scenario.n_robots > len(self.possible_agents):
             self.possible_agents = agent_names(range(scenario.n_robots))
 
@@ -233,21 +259,12 @@ class SwarmLogisticsEnv(DictView):
 
     def state(self) -> NDArray[np.float32]:
         """Return the whole warehouse as one vector, see `global_state`; for central critics."""
-        n_items = max(scenario.n_items for scenario in self._covered)
-        return global_state(self.warehouse, len(self.possible_agents), n_items)
+        return global_state(self.warehouse, len(self.possible_agents), self._spaces.n_items)
 
     @property
     def state_space(self) -> Box:
         """The space of `state()`, for `possible_agents` robots and the most items there may be."""
-        n_items = max(scenario.n_items for scenario in self._covered)
-        lows, highs = zip(
-            *(
-                global_state_bounds(scenario, len(self.possible_agents), n_items)
-                for scenario in self._covered
-            ),
-            strict=True,
-        )
-        return Box(np.min(lows, axis=0), np.max(highs, axis=0), dtype=np.float32)
+        return self._spaces.state(len(self.possible_agents))
 
     def close(self) -> None:
         """Release what rendering holds; harmless when called twice."""
@@ -259,21 +276,6 @@ class SwarmLogisticsEnv(DictView):
         # A copy opens a window of its own.
         return {**self.__dict__, "_renderer": None}
 
-    def _check_covered(self, scenario: Scenario) -> None:
-        low, high = bounds(scenario)
-        space = self._observation_space
-        if low.shape == space.shape and (low >= space.low).all() and (high <= space.high).all():
-            return
-        changed = [
-            f"{name} = {value}"
-            for name, value in scenario.model_dump().items()
-            if value != getattr(self.scenario, name)
-        ]
-        raise SetupError(
-            f"{', '.join(changed)}: observations could leave the observation space; should be "
-            "within what the environment was built for, or announced by env.cover(scenario)"
-        )
-
 
 def _scenario_of(scenario: Scenario | None, fields: Mapping[str, Any]) -> Scenario:
     if scenario is not None and not isinstance(scenario, Scenario):
@@ -281,9 +283,11 @@ def _scenario_of(scenario: Scenario | None, fields: Mapping[str, Any]) -> Scenar
             f"scenario = {scenario!r}: should be a Scenario; its fields are arguments of their "
             "own, as n_robots=40"
         )
-    own = ("scenario", "faults", "rewards", "render_mode", "max_cycles")
+    own = ("scenario", "faults", "rewards", "render_mode", "max_cycles", "max_robots")
     for name in fields:
         if name not in Scenario.model_fields:
-            known = (*Scenario.model_fields, *own)
-            raise ScenarioError(f"the environment has no argument {name!r}{suggest(name, known)}")
+            hint = suggest(_OTHER_NAMES.get(name, name), (*Scenario.model_fields, *own))
+            raise ArgumentError(
+                f"the environment got an unexpected keyword argument {name!r}{hint}"
+            )
     return (scenario or Scenario()).replace(**fields)

@@ -17,6 +17,10 @@ class ScenarioError(SwarmLogisticsError):
     """A scenario that is mistyped, out of range, or impossible to build."""
 
 
+class ArgumentError(ScenarioError, TypeError):
+    """An argument that the environment does not have: also a TypeError, as Python's own is."""
+
+
 class FaultError(SwarmLogisticsError):
     """A fault whose mode, robots or times cannot be."""
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.faults import failed_robots
 
 OPTIONS = ("faults", "scenario")
 
@@ -69,3 +70,21 @@ def checked_faults(name: str, faults: Any) -> tuple[Fault, ...]:
     if not isinstance(faults, Sequence) or not all(isinstance(fault, Fault) for fault in faults):
         raise SetupError(f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)]')
     return tuple(faults)
+
+
+def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:
+    """Check that an episode with these faults begins with at least one robot.
+
+    Raises:
+        SetupError: they remove all at 0 s.
+        FaultError: a fault names robots that are not there.
+    """
+    gone = set[int]()
+    for fault in faults:
+        # Half a microsecond of grace, as in the warehouse.
+        if fault.onset <= 5e-7 and not FAILURE_MODES[fault.mode].present:
+            gone.update(failed_robots(fault, seed, n_robots).tolist())
+    if len(gone) == n_robots:
+        raise SetupError(
+            f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
+        )

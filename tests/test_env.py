@@ -16,7 +16,13 @@ from pettingzoo import AECEnv, ParallelEnv
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, swarm_logistics_v0
 from swarm_logistics_env.env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import CommandError, FaultError, ScenarioError, SetupError
+from swarm_logistics_env.errors import (
+    ArgumentError,
+    CommandError,
+    FaultError,
+    ScenarioError,
+    SetupError,
+)
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
 
 # Everything is in reach of everybody, so that whoever drives east delivers.
@@ -150,7 +156,10 @@ def test_actions_may_be_given_in_any_order() -> None:
     ("change", "complaint"),
     [
         ({"robot_1": None}, "no command for 'robot_1': should be one for every agent"),
-        ({"robot_7": np.zeros(4)}, "a command for 'robot_7', who is not there; did you mean"),
+        (
+            {"robot_7": np.zeros(4)},
+            "command for 'robot_7', who is not there: should be among 2 possible agents, robot_0",
+        ),
         ({"robot_0": np.zeros(3)}, r"command of 'robot_0' of shape \(3,\): should be \(4,\)"),
         ({"robot_0": np.zeros((1, 4))}, r"of shape \(1, 4\): should be \(4,\)"),
         ({"robot_0": 1.0}, r"of shape \(\): should be \(4,\)"),
@@ -201,7 +210,17 @@ def test_commands_beyond_their_bounds_are_cut() -> None:
         ({"faults": Fault("FM1")}, SetupError, "faults = .*: should be a list of faults"),
         ({"scenario": 25}, SetupError, "scenario = 25: should be a Scenario"),
         ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
-        ({"reward": {}}, ScenarioError, "no argument 'reward'; did you mean 'rewards'"),
+        (
+            {"reward": {}},
+            ScenarioError,
+            "unexpected keyword argument 'reward'; did you mean 'rewards'",
+        ),
+        ({"num_agents": 3}, TypeError, "keyword argument 'num_agents'; did you mean 'n_robots'"),
+        ({"width": 3.0}, TypeError, "argument 'width'; did you mean 'warehouse_width'"),
+        ({"frameskip": 4}, ArgumentError, "got an unexpected keyword argument 'frameskip'"),
+        ({"max_robots": 24}, SetupError, "max_robots = 24: should be None or .* n_robots = 25"),
+        ({"max_robots": "40"}, SetupError, "max_robots = '40': should be None or a whole number"),
+        ({"max_robots": 9000}, ScenarioError, "n_robots = 9000 of radius .* do not fit"),
         ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be None or a whole number"),
         ({"max_cycles": "9"}, SetupError, "max_cycles = '9': should be"),
         ({"max_cycles": 9.5}, SetupError, "max_cycles = 9.5: should be"),
@@ -256,16 +275,59 @@ def test_the_episodes_after_a_seed_follow_from_it() -> None:
 
 
 def test_options_change_one_episode() -> None:
-    env = parallel_env(n_robots=2, faults=(Fault("FM1", 1),))
+    env = parallel_env(n_robots=2, max_robots=5, faults=(Fault("FM1", 1),))
     options = {"scenario": {"n_robots": 4}, "faults": [Fault("FM2", (0, 3))]}
     observations, infos = env.reset(seed=0, options=options)
     assert list(observations) == env.agents == [f"robot_{number}" for number in range(4)]
-    assert set(env.agents) <= set(env.possible_agents)
-    assert infos["robot_3"] == {"failure_modes": ("FM2",)}
+    assert env.possible_agents == [f"robot_{number}" for number in range(5)]
+    assert [info["failed"] for info in infos.values()] == [1, 0, 0, 1]
     env.step(still(env))
     _, infos = env.reset(seed=0)
     assert env.agents == ["robot_0", "robot_1"]
-    assert [info.get("failure_modes") for info in infos.values()].count(("FM1",)) == 1
+    assert [info["failed"] for info in infos.values()].count(1) == 1
+
+
+def test_spaces_and_possible_agents_stay_as_they_were_made() -> None:
+    env = parallel_env(n_robots=3, n_items=5, max_robots=4)
+    agents, spaces, state_space = env.possible_agents, env.observation_spaces, env.state_space
+    assert list(spaces) == list(env.action_spaces) == agents
+    assert spaces["robot_3"] is env.observation_space("robot_3")
+    assert env.action_spaces["robot_3"] is env.action_space("robot_3")
+    env.reset(seed=0)
+    before = env.warehouse.state
+    for scenario, complaint in (
+        ({"n_robots": 5}, "n_robots = 5: should be at most 4, .* max_robots=5 or .* SwarmSize"),
+        ({"n_items": 6}, "n_items = 6: observations or states could leave their spaces"),
+        ({"duration": 501.0}, "duration = 501.0: observations or states"),
+        ({"message_size": 1}, "message_size = 1: observations or states"),
+    ):
+        with pytest.raises(SetupError, match=complaint):
+            env.reset(seed=1, options={"scenario": scenario})
+        assert env.warehouse.state is before
+    for n_robots in (1, 4):
+        env.reset(seed=1, options={"scenario": {"n_robots": n_robots, "n_items": 2}})
+        assert len(env.agents) == n_robots
+        assert state_space.contains(env.state())
+    assert env.possible_agents == agents
+    assert env.observation_spaces == spaces
+    assert env.state_space == state_space
+
+
+@pytest.mark.parametrize("n_robots", [2, 3])
+def test_a_reset_that_leaves_nobody_is_refused(n_robots: int) -> None:
+    env = parallel_env(n_robots=3, faults=[Fault("removed", 2), Fault("removed", (0, 1, 2), 0.1)])
+    options = {"scenario": {"n_robots": n_robots}, "faults": [Fault("removed", n_robots)]}
+    with pytest.raises(SetupError, match=f"remove all {n_robots} robots at 0 s"):
+        env.reset(seed=0, options=options)
+    assert not env.is_begun
+    assert len(env.reset(seed=0)[0]) == 1
+
+
+def test_a_step_before_the_reset_is_refused() -> None:
+    env = parallel_env(n_robots=2)
+    for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
+        with pytest.raises(SetupError, match="step before reset: call reset"):
+            step()
 
 
 def test_unknown_options_are_ignored_with_a_warning() -> None:
@@ -370,7 +432,7 @@ def test_everybody_is_truncated_when_the_time_is_up(arguments: dict[str, Any], s
         assert env.agents == []
 
 
-def test_infos_name_failures_while_they_hold_and_observations_do_not() -> None:
+def test_infos_tell_failures_while_they_hold_and_observations_do_not() -> None:
     faults = [Fault("FM2", (1,), onset=0.2, duration=0.2), Fault("FM4", (1,), onset=0.3)]
     failing, healthy = parallel_env(n_robots=2, faults=faults), parallel_env(n_robots=2)
     seen, plain = failing.reset(seed=0)[0], healthy.reset(seed=0)[0]
@@ -380,8 +442,9 @@ def test_infos_name_failures_while_they_hold_and_observations_do_not() -> None:
         seen, _, _, _, infos = failing.step(still(failing))
         plain, *_ = healthy.step(still(healthy))
         assert data_equivalence(seen, plain)
-        modes.append(infos["robot_1"].get("failure_modes", ()))
-        assert "failure_modes" not in infos["robot_0"]
+        modes.append(failing.warehouse.state.failure_modes[1])
+        assert infos["robot_0"] == {"failed": 0, "delivered": 0}
+        assert infos["robot_1"] == {"failed": int(bool(modes[-1])), "delivered": 0}
     assert modes == [(), ("FM2",), ("FM2", "FM4"), ("FM4",), ("FM4",)]
 
 
@@ -403,7 +466,7 @@ def test_an_absent_robot_earns_nothing() -> None:
 @pytest.mark.parametrize(
     ("command", "sentence"),
     [
-        ([[1.0, 2.0], [3.0]], r"of shape ragged: should be \(4,\)"),
+        ([[1.0, 2.0], [3.0]], r"command.* \(type list\) cannot be read: should be numbers"),
         (np.zeros(4, complex), "should be numbers"),
         ([None] * 4, "should be numbers"),
         (["left"] * 4, "should be numbers"),

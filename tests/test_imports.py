@@ -19,8 +19,8 @@ FOUNDATION = {"errors", "records", "streams", "kernels", "scenario"}
 WORLD = FOUNDATION | {"warehouse", "observations"}
 RUNS = WORLD | {"hearing", "policies", "episode"}
 ENVIRONMENT = WORLD | {
-    "rewards", "central_state", "dict_view", "reset_options", "env", "rendering",
-    "swarm_logistics_v0", "hearing",
+    "rewards", "central_state", "commands", "dict_view", "reset_options", "spaces", "env",
+    "rendering", "swarm_logistics_v0", "hearing",
 }  # fmt: skip
 
 # What each part of the package (a module or folder of its top level) may import besides itself.
@@ -36,9 +36,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "rewards": WORLD,
     "rendering": FOUNDATION | {"warehouse"},
     "central_state": WORLD,
-    "dict_view": WORLD,
+    "commands": {"errors"},
+    "dict_view": WORLD | {"commands"},
     "reset_options": WORLD,
-    "env": WORLD | {"rewards", "rendering", "central_state", "dict_view", "reset_options"},
+    "spaces": WORLD | {"central_state"},
+    "env": WORLD
+    | {"rewards", "rendering", "central_state", "spaces"}
+    | {"commands", "dict_view", "reset_options"},
     "swarm_logistics_v0": WORLD | {"rewards", "env"},
     "wrappers": ENVIRONMENT | {"spi"},
     "adapters": ENVIRONMENT | {"wrappers"},

@@ -9,10 +9,11 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.commands import as_array
 from swarm_logistics_env.env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.hearing import as_heard
-from swarm_logistics_env.reset_options import checked_options
+from swarm_logistics_env.wrappers import FixedAgents
 
 if TYPE_CHECKING:
     from swarm_logistics_env.wrappers import Wrapper
@@ -26,6 +27,9 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     The reward is the mean of the rewards of the robots present: 1 per delivery by default. An
     episode terminates when everything is delivered or nobody is left, and is truncated when the
     time is up. A robot that hears nothing gets no commands, see `as_heard`.
+
+    Infos are numbers, with the same keys at every step: "failed" (N,), 1 for each robot in which
+    any failure mode holds, else 0; "delivered", items so far; what wrappers add.
 
     Args:
         env: a `SwarmLogisticsEnv` or a wrapper of one; default: one made with the arguments.
@@ -53,32 +57,21 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if env is not None and not hasattr(env, "reset_arrays"):
             raise SetupError(f"env = {env!r}: should be a SwarmLogisticsEnv or a wrapper of one")
         self.env = SwarmLogisticsEnv(**arguments) if env is None else env
+        self._rows = self.env if isinstance(self.env, FixedAgents) else FixedAgents(self.env)
         self.metadata = self.env.metadata
         self.render_mode = self.env.render_mode
-        self._n_rows = len(self.env.possible_agents)
         robot = self.env.possible_agents[0]
         seen, told = self.env.observation_space(robot), self.env.action_space(robot)
-        rows = (self._n_rows, 1)
+        rows = (self._rows.n_rows, 1)
         self.observation_space = Box(np.tile(seen.low, rows), np.tile(seen.high, rows))
         self.action_space = Box(np.tile(told.low, rows), np.tile(told.high, rows))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin an episode; see `SwarmLogisticsEnv.reset_arrays`.
-
-        Raises:
-            SetupError: the options ask for more robots than the spaces have rows.
-        """
+        """Begin an episode; see `SwarmLogisticsEnv.reset_arrays`."""
         super().reset(seed=seed)
-        asked = seed if seed is not None else self.env.next_seed
-        n_robots = self.env.scenario_of(asked, checked_options(options)).n_robots
-        if n_robots > self._n_rows:
-            raise SetupError(
-                f"n_robots = {n_robots}: should be at most {self._n_rows}, which the spaces are "
-                "made for; a wrapper such as SwarmSize announces more"
-            )
-        return self._padded(self.env.reset_arrays(seed, options)), self._info()
+        return self._rows.reset_arrays(seed, options), self._info()
 
     def step(
         self, action: ArrayLike
@@ -86,24 +79,22 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Take one control period.
 
         Raises:
-            CommandError: the action's shape is not that of the action space, or it is not finite.
+            CommandError: the action's shape is not that of the action space, or it is not
+                readable, no numbers or not finite.
+            SetupError: there was no reset.
         """
-        world = self.env.warehouse
-        try:
-            commands = np.array(action, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise CommandError(f"action should be an array of numbers: {error}") from None
-        if commands.shape != self.action_space.shape:
+        state = self.env.warehouse.state
+        commands = np.array(as_array(action, "action"))
+        if commands.shape != self.action_space.shape or commands.dtype.kind not in "fiub":
             raise CommandError(
-                f"action of shape {commands.shape}: should be {self.action_space.shape}"
+                f"action of shape {commands.shape} and type {commands.dtype}: should be "
+                f"{self.action_space.shape} numbers"
             )
-        n_present = np.count_nonzero(world.state.robot_present)
-        heard = as_heard(commands[: world.state.n_robots], world.state)
-        observations, rewards, _, truncations = self.env.step_arrays(heard)
-        is_cut = bool(truncations.any())
-        is_over = not self.env.agents and not is_cut
+        n_present = np.count_nonzero(state.robot_present)
+        commands[: state.n_robots] = as_heard(commands[: state.n_robots], state)
+        observations, rewards, terminations, truncations = self._rows.step_arrays(commands)
         reward = float(rewards.sum() / max(n_present, 1))
-        return self._padded(observations), reward, is_over, is_cut, self._info()
+        return observations, reward, bool(terminations.any()), bool(truncations.any()), self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture or show it; see `SwarmLogisticsEnv.render`."""
@@ -119,12 +110,8 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Release what rendering holds; harmless when called twice."""
         self.env.close()
 
-    def _padded(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        rows = np.zeros(self.observation_space.shape or (), np.float32)
-        rows[: len(observations)] = observations
-        return rows
-
     def _info(self) -> dict[str, Any]:
-        state = self.env.warehouse.state
-        modes = {robot: names for robot, names in enumerate(state.failure_modes) if names}
-        return {"delivered": state.delivered, "failure_modes": modes}
+        failed = np.zeros(self._rows.n_rows, np.int8)
+        modes = self.env.warehouse.state.failure_modes
+        failed[: len(modes)] = [bool(names) for names in modes]
+        return {"failed": failed, **self.env.episode_info}

@@ -42,11 +42,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
       world ends padding is done too, so that the padding is an episode by itself with return 0,
       of which nothing reaches the next one. `present` tells padding from robots.
 
-    The info of a done row holds, beside `terminal_observation` and `TimeLimit.truncated`:
-    `delivered` (the paper's P, so far), `n_robots`, `failure_modes` (of the row's robot),
-    `padding`, `world`, and what the environment has to say as `episode_info` (see
-    `wrappers.IndicatorReward`). Name them as `info_keywords` of a `VecMonitor` to log them; its
-    mean return counts padding as episodes of return 0.
+    The info of a row is a dict of its own of numbers: `TimeLimit.truncated`, `padding`, `failed`
+    (1 while any failure mode holds for the row's robot, else 0), `world`, `n_robots`, `delivered`
+    (the paper's P, so far), and what wrappers add (see `wrappers.IndicatorReward`). A done row's
+    has `terminal_observation` besides, as stable-baselines3 expects. Name them as `info_keywords`
+    of a `VecMonitor` to log them; its mean return counts padding as episodes of return 0.
 
     Args:
         scenario: the conditions; default: the paper's.
@@ -104,7 +104,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._worlds = Worlds(make_env, n_worlds, threads)
         self.worlds = self._worlds.envs
         n_rows = self._worlds.n_rows
-        self._silence: Infos = [{"TimeLimit.truncated": False} for _ in range(n_rows)]
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
         if seed is not None:
             self.seed(seed)
@@ -155,6 +154,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         for world, rows in enumerate(self._worlds.rows):
             options = self._options[rows.start] or None
             self._worlds.begin(world, observations, self._seeds[rows.start], options)
+        self.reset_infos = self._infos()
         self._reset_seeds()
         self._reset_options()
         return observations
@@ -163,7 +163,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         """Take the commands (num_envs, 4) of the step that `step_wait` makes.
 
         Raises:
-            CommandError: wrong shape or not finite; nothing has happened in any world then.
+            CommandError: wrong shape, not readable or not finite; nothing has happened in any
+                world then.
         """
         self._actions = self._worlds.checked(actions)
 
@@ -172,12 +173,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Infos]:
         """Step every world; returns observations, rewards and dones by row, and infos.
 
-        The arrays are the caller's own. The infos of rows that are not done are always the same
-        dicts: to be read only.
+        The arrays and dicts are the caller's own.
         """
         step = self._worlds.step(self._actions)
         dones = step.terminated | step.truncated
-        infos = self._silence.copy()
+        infos = self._infos()
         # In the worlds' order: what episodes share must not depend on the threads.
         if dones.any() or any(self._worlds.is_over):
             for world, rows in enumerate(self._worlds.rows):
@@ -250,23 +250,36 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         answers = {world: answer(self.worlds[world]) for world in dict.fromkeys(worlds)}
         return [answers[world] for world in worlds]
 
+    def _infos(self) -> Infos:
+        """Return what there is to say of each row's robot and of its world."""
+        infos: Infos = []
+        for world, env in enumerate(self.worlds):
+            state, rows = env.warehouse.state, self._worlds.rows[world]
+            about: dict[str, Any] = {
+                "TimeLimit.truncated": False,
+                "padding": False,
+                "failed": 0,
+                "world": world,
+                "n_robots": state.n_robots,
+                **env.episode_info,
+            }
+            infos += [about.copy() for _ in range(rows.start, rows.stop)]
+            for robot, modes in enumerate(state.failure_modes):
+                if modes:
+                    infos[rows.start + robot]["failed"] = 1
+        for row in np.flatnonzero(~self._worlds.present).tolist():
+            infos[row]["padding"] = True
+        return infos
+
     def _end(self, world: int, step: RowsStep, dones: NDArray[np.bool_], infos: Infos) -> None:
         """Tell of the rows that are done, and begin the next episode if the world is over."""
-        env, rows = self.worlds[world], self._worlds.rows[world]
-        state = env.warehouse.state
+        rows = self._worlds.rows[world]
         if self._worlds.is_over[world]:
             dones[rows] = True
-        about = {"delivered": state.delivered, "n_robots": state.n_robots, "world": world}
-        about |= getattr(env, "episode_info", {})
-        for robot in np.flatnonzero(dones[rows]).tolist():
-            row = rows.start + robot
-            infos[row] = {
-                **about,
-                "terminal_observation": step.observations[row].copy(),
-                "TimeLimit.truncated": bool(step.truncated[row] and not step.terminated[row]),
-                "failure_modes": state.failure_modes[robot] if robot < state.n_robots else (),
-                "padding": not self._worlds.present[row],
-            }
+        for row in (rows.start + np.flatnonzero(dones[rows])).tolist():
+            is_cut = bool(step.truncated[row] and not step.terminated[row])
+            infos[row]["TimeLimit.truncated"] = is_cut
+            infos[row]["terminal_observation"] = step.observations[row].copy()
         if self._worlds.is_over[world]:
             self._worlds.begin(world, step.observations)
         else:

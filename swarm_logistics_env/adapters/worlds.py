@@ -11,6 +11,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.adapters.buffers import Buffers
+from swarm_logistics_env.commands import as_array
 from swarm_logistics_env.dict_view import ArrayStep
 from swarm_logistics_env.env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
@@ -85,18 +86,9 @@ class Worlds:
         seed: int | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> None:
-        """Begin an episode and write its first observations into those of all rows.
-
-        Raises:
-            SetupError: it has more robots than the world has rows.
-        """
+        """Begin an episode and write its first observations into those of all rows."""
         rows = self.rows[world]
         first = self.envs[world].reset_arrays(seed, options)
-        if len(first) > rows.stop - rows.start:
-            raise SetupError(
-                f"n_robots = {len(first)}: should be at most {rows.stop - rows.start}, for which "
-                f"world {world} has rows; a wrapper such as SwarmSize announces more"
-            )
         observations[rows] = 0.0
         observations[rows.start : rows.start + len(first)] = first
         self._n_robots[world], self.is_over[world] = len(first), False
@@ -112,12 +104,12 @@ class Worlds:
         """Return commands (R, 4) as an array.
 
         Raises:
-            CommandError: wrong shape or not finite.
+            CommandError: wrong shape, not readable or not finite.
             SetupError: no episode was begun.
         """
         if not any(self._n_robots):
             raise SetupError("step before reset: call reset() first")
-        given = np.asarray(commands)
+        given = as_array(commands, "actions")
         wanted = (self.n_rows, *self.command_space.shape)
         if given.shape != wanted or given.dtype.kind not in "fiub":
             raise CommandError(

@@ -72,10 +72,14 @@ def played(make: Make, policy: Policy | str, seed: int, steps: int) -> Iterator[
 def _actions(env: Any, policy: Policy, observations: dict[str, Any]) -> dict[str, Any]:
     world: Warehouse = env.unwrapped.warehouse
     length = len(next(iter(observations.values())))
-    rows = np.zeros((world.state.n_robots, length), np.float32)
+    n_robots = world.state.n_robots
+    # With `FixedAgents` there may be agents without a robot.
+    n_rows = max(n_robots, 1 + max(robot_of(agent) for agent in observations))
+    rows = np.zeros((n_rows, length), np.float32)
     for agent, observation in observations.items():
         rows[robot_of(agent)] = observation
-    commands = np.asarray(decide(policy, rows, world.state))
+    commands = np.asarray(decide(policy, rows[:n_robots], world.state))
+    commands = np.pad(commands, ((0, n_rows - n_robots), (0, 0)))
     silent = env.action_space(env.agents[0]).shape[0] - commands.shape[1]
     if silent > 0:  # a policy that broadcasts no message
         commands = np.pad(commands, ((0, 0), (0, silent)))

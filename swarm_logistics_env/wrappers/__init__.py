@@ -1,12 +1,14 @@
 """Wrappers: break an environment, resize it, change it while it runs, reward by indicators.
 
-Each is an environment itself, so they stack in any order. What a wrapper draws for an episode
+Each is an environment itself, so they stack in any order, but for `FixedAgents`, which goes around
+all others. What a wrapper draws for an episode
 follows from the episode's seed. What a reset's options ask for comes before what a wrapper
 draws, and an outer wrapper before an inner one; faults add up.
 """
 
 from swarm_logistics_env.wrappers.conditions import Condition
 from swarm_logistics_env.wrappers.fault_injection import FaultInjection
+from swarm_logistics_env.wrappers.fixed_agents import FixedAgents
 from swarm_logistics_env.wrappers.indicator_reward import IndicatorReward
 from swarm_logistics_env.wrappers.parameter_change import ParameterChange
 from swarm_logistics_env.wrappers.reference_performances import RunningMeans
@@ -16,6 +18,7 @@ from swarm_logistics_env.wrappers.wrapper import Wrapper
 __all__ = [
     "Condition",
     "FaultInjection",
+    "FixedAgents",
     "IndicatorReward",
     "ParameterChange",
     "RunningMeans",

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 class FaultInjection(Wrapper):
     """Lets robots fail in every episode, besides those that fail anyway.
 
-    The robots are not told; `infos` and `warehouse.state` name the modes while they hold. Faults
+    The robots are not told; `infos` say who has "failed", `warehouse.state.failure_modes` names
+    the modes while they hold. Faults
     given to a reset as an option take the place of those the environment was made with, as ever;
     this wrapper's come on top of either.
 

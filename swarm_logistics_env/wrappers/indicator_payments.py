@@ -12,7 +12,9 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.wrappers.conditions import Condition
 from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
 
-INDICATORS = ("S", "FT", "R", "A")
+# Of each indicator, the performances that it is relative to.
+PERFORMANCES = {"S": ("P_N",), "FT": ("P_o", "P_S"), "R": ("P_o",), "A": ("P_o",)}
+INDICATORS = tuple(PERFORMANCES)
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,10 @@ class Comparison:
 
 @dataclass(frozen=True)
 class EpisodeIndicator(Payment):
-    """An episode's indicator as share and constant, and the performances in them, by name."""
+    """An episode's indicator as share and constant, and the performances in them, by name.
+
+    The names are those of `PERFORMANCES`.
+    """
 
     performances: Mapping[str, tuple[Condition, float]] = field(default_factory=dict)
 

@@ -15,6 +15,7 @@ from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.wrappers.conditions import Condition, changes_of, condition_of
 from swarm_logistics_env.wrappers.indicator_payments import (
     INDICATORS,
+    PERFORMANCES,
     EpisodeIndicator,
     Payment,
     derivative_of,
@@ -159,32 +160,36 @@ class IndicatorReward(Wrapper):
         return payments
 
     @property
-    def episode_info(self) -> dict[str, Any]:
-        """What this episode is about and has come to, for the infos of its last step.
+    def episode_info(self) -> dict[str, float]:
+        """What the wrapped environment's infos say, and what this episode has come to.
 
-        "condition"; "indicators": name -> value so far, constant included, of those that it tests;
-        "references": name -> {"P_o": items, "measured P_o": items or None}, for FT "P_S" as well,
-        for S "P_N" instead.
+        "n_robots", "n_failed", "n_removed": of its `condition`. For each indicator but P, here R:
+        "R", its value so far, constant included; "R_tested", 1 if the episode tests it, else 0,
+        and then all others are 0 too; "R_P_o" [items], the reference; "R_P_o_measured" [items],
+        its running mean, and "R_P_o_episodes", how many episodes of that condition were played.
+        Likewise for P_S of FT, and for P_N instead of P_o of S.
         """
-        delivered = self.unwrapped.warehouse.state.delivered
-        tests = {name: test for name, test in self._indicators.items() if test.performances}
-        return {
-            "condition": self.condition,
-            "indicators": {
-                name: test.share * delivered + test.constant for name, test in tests.items()
-            },
-            "references": {
-                name: {
-                    label: items
-                    for role, (condition, given) in test.performances.items()
-                    for label, items in (
-                        (role, given),
-                        (f"measured {role}", self.measured.mean(condition)),
-                    )
-                }
-                for name, test in tests.items()
-            },
+        told = self.condition
+        info = {
+            **self.env.episode_info,
+            "n_robots": told.n_robots,
+            "n_failed": told.n_failed,
+            "n_removed": told.n_removed,
         }
+        delivered = self.unwrapped.warehouse.state.delivered
+        for name in self.weights:
+            if name not in PERFORMANCES:
+                continue
+            test = self._indicators.get(name)
+            info[name] = test.share * delivered + test.constant if test else 0.0
+            info[f"{name}_tested"] = int(test is not None)
+            for role in PERFORMANCES[name]:
+                condition, given = test.performances[role] if test else (None, 0.0)
+                mean = self.measured.mean(condition) if condition else None
+                info[f"{name}_{role}"] = given
+                info[f"{name}_{role}_measured"] = 0.0 if mean is None else mean
+                info[f"{name}_{role}_episodes"] = self.measured.count(condition) if condition else 0
+        return info
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None

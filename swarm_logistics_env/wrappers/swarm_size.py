@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 class SwarmSize(Wrapper):
     """Plays each episode with a swarm size of its own, and lets robots leave.
 
-    `possible_agents` are those of the largest swarm. A robot that leaves terminates, and is gone
-    from `agents` for the rest of the episode; those that leave first are those that would fail
-    first (see `Fault`), so that P_S and P_F of one seed are about the same robots. A size among a
-    reset's options comes before the drawn one.
+    `possible_agents` are those of the largest swarm, or as many as the environment's `max_robots`
+    if that is more. A robot that leaves terminates, and is gone from `agents` for the rest of the
+    episode; those that leave first are those that would fail first (see `Fault`), so that P_S and
+    P_F of one seed are about the same robots. A size among a reset's options comes before the
+    drawn one.
 
     Args:
         env: the environment, or a wrapper of one.
@@ -38,7 +39,8 @@ class SwarmSize(Wrapper):
 
     Raises:
         ScenarioError: such a swarm cannot be.
-        SetupError: a function without `within`, or more robots leave than there are.
+        SetupError: a function without `within`, more robots leave than there are, or all of them
+            leave at 0 s.
         FaultError: they leave at a time that cannot be.
 
     Example:
@@ -63,6 +65,7 @@ class SwarmSize(Wrapper):
         self._size = Drawn("n_robots", sizes, within)
         pairs = _departures(leave)
         self._leaving = sum(robots for robots, _ in pairs)
+        self._absent = sum(robots for robots, time in pairs if time == 0.0)
         # The sets are nested, so the first m + k take with them the m who have left.
         in_all = np.cumsum([robots for robots, _ in pairs], dtype=np.int64).tolist()
         self._departures = tuple(
@@ -77,7 +80,8 @@ class SwarmSize(Wrapper):
         )
         for scenario in self.scenarios:
             self.cover(scenario)
-        largest = max(scenario.n_robots for scenario in self.scenarios)
+        sizes_announced = (scenario.n_robots for scenario in self.scenarios)
+        largest = max(self.unwrapped.max_robots or 0, *sizes_announced)
         self.unwrapped.possible_agents = agent_names(range(largest))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
@@ -91,8 +95,13 @@ class SwarmSize(Wrapper):
         """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.cover`.
 
         Raises:
-            SetupError: more robots are to leave than it has.
+            SetupError: more robots are to leave than it has, or all of them at 0 s.
         """
+        if self._absent >= scenario.n_robots:
+            raise SetupError(
+                f"leave: {self._absent} robots at 0 s, should be fewer than n_robots = "
+                f"{scenario.n_robots}, or the episode would begin with nobody"
+            )
         if self._leaving > scenario.n_robots:
             raise SetupError(
                 f"leave: {self._leaving} robots in all, should be at most n_robots = "

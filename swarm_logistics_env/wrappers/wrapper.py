@@ -29,8 +29,12 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     Args:
         env: a `SwarmLogisticsEnv` or a wrapper of one.
 
+    Attributes:
+        is_outermost: whether no other wrapper may be put around it, as its arrays have other rows
+            than the warehouse's robots.
+
     Raises:
-        SetupError: it is something else.
+        SetupError: it is something else, or a wrapper that has to be the outermost one.
 
     Example:
         >>> from swarm_logistics_env.env import SwarmLogisticsEnv
@@ -39,11 +43,18 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         True
     """
 
+    is_outermost = False
+
     def __init__(self, env: SwarmLogisticsEnv | Wrapper) -> None:
         if not hasattr(env, "reset_arrays"):
             raise SetupError(
                 f"env = {env}: should be a SwarmLogisticsEnv (swarm_logistics_v0.parallel_env) or "
                 "a wrapper of one; wrap before converting to AEC"
+            )
+        if isinstance(env, Wrapper) and env.is_outermost:
+            raise SetupError(
+                f"{type(self).__name__} around {type(env).__name__}: should be inside of it, as "
+                f"{type(env).__name__}({type(self).__name__}(env, ...))"
             )
         super().__init__(env)
 
@@ -84,6 +95,15 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
         """Return what to tell of the step that the wrapped environment has taken."""
         return outcome
+
+    @property
+    def episode_info(self) -> dict[str, float]:
+        """What the `infos` of every agent say of the episode; the same keys at every step.
+
+        For wrappers that have more to say: `{**self.env.episode_info, "key": number}`.
+        """
+        info: dict[str, float] = self.env.episode_info
+        return info
 
     @property
     def max_cycles(self) -> int | None:

@@ -108,7 +108,11 @@ def test_rows_are_the_worlds_own_over_several_episodes() -> None:
                 assert info["n_robots"] == sizes[info["world"] % 2]
             last = np.concatenate([world.reset_arrays() for world in worlds])
         else:
-            assert infos == [{"TimeLimit.truncated": False}] * 11
+            for info, world in zip(infos, env._worlds.world_of.tolist()):
+                assert info == {
+                    "TimeLimit.truncated": False, "padding": False, "failed": 0, "world": world,
+                    "n_robots": sizes[world % 2], "delivered": info["delivered"],
+                }  # fmt: skip
         np.testing.assert_array_equal(observations, last)
         assert observations.dtype == rewards.dtype == np.float32
         assert env.observation_space.contains(observations[0])
@@ -166,7 +170,7 @@ def test_a_removed_robot_is_done_once_and_then_padding() -> None:
         if in_episode == 5:
             assert dones.tolist() == [False, True, False] * 2
             assert infos[1]["TimeLimit.truncated"] is infos[1]["padding"] is False
-            assert infos[1]["failure_modes"] == ("removed",)
+            assert [info["failed"] for info in infos] == [0, 1, 0] * 2
             assert infos[1]["terminal_observation"].shape == env.observation_space.shape
             assert env.present.tolist() == [True, False, True] * 2
         elif in_episode == 20:
@@ -216,12 +220,33 @@ def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world() -> None:
     assert all(info["delivered"] == 2 for info in infos)
     assert not any(info["TimeLimit.truncated"] for info in infos)
 
-    for onset, length in ((0.2, 2), (0.0, 1)):
+    for onset, length in ((0.2, 2), (0.1, 1)):
         faults = [Fault("removed", 3, onset=onset)]
         env = SwarmVecEnv(n_worlds=1, n_robots=3, faults=faults, seed=0, **SMALL)
         env.reset()
         ends = [env.step(np.zeros((3, 4)))[2].all() for _ in range(4)]
         assert ends == [(step % length) == 0 for step in range(1, 5)]
+
+
+def test_infos_that_are_written_into_share_nothing() -> None:
+    first, second = (SwarmVecEnv(n_worlds=2, n_robots=2, seed=0, **SMALL) for _ in range(2))
+    for env in (first, second):
+        env.reset()
+    for _ in range(21):
+        *_, infos = first.step(np.zeros((4, 4)))
+        keys = [set(info) - {"terminal_observation", "mine"} for info in infos]
+        assert keys == [set(first.reset_infos[0])] * 4
+        assert not any("mine" in info for info in infos)
+        infos[0]["mine"] = 1
+        assert not any("mine" in info for info in infos[1:])
+        assert not any("mine" in info for info in second.step(np.zeros((4, 4)))[-1])
+
+
+def test_actions_that_cannot_be_read_are_refused() -> None:
+    env = SwarmVecEnv(n_worlds=1, n_robots=2, seed=0, **SMALL)
+    env.reset()
+    with pytest.raises(CommandError, match=r"actions \(type Tensor, dtype torch.bfloat16"):
+        env.step_async(torch.zeros((2, 4), dtype=torch.bfloat16))
 
 
 def test_what_was_returned_stays_as_it_was() -> None:
@@ -492,10 +517,11 @@ def test_the_end_of_an_episode_tells_indicators_and_references() -> None:
     for _ in range(20):
         _, rewards, _, infos = env.step(np.zeros((6, 4)))
         returns += rewards
-    assert infos[0]["indicators"] == {}
-    assert infos[3]["indicators"] == {"R": pytest.approx(-1 + 2 / 3)}
-    assert infos[3]["references"]["R"]["P_o"] == 20.0
-    assert infos[3]["condition"].n_failed == 2
+    assert infos[0]["R_tested"] == infos[0]["R"] == 0
+    assert infos[3]["R_tested"] == 1
+    assert infos[3]["R"] == pytest.approx(-1 + 2 / 3)
+    assert infos[3]["R_P_o"] == 20.0
+    assert infos[3]["n_failed"] == 2
     assert returns == pytest.approx([0.0] * 3 + [-1 + 2 / 3] * 3)
 
 

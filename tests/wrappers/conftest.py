@@ -12,7 +12,13 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.env import SwarmLogisticsEnv
-from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize, Wrapper
+from swarm_logistics_env.wrappers import (
+    FaultInjection,
+    FixedAgents,
+    ParameterChange,
+    SwarmSize,
+    Wrapper,
+)
 
 Env = SwarmLogisticsEnv | Wrapper
 
@@ -43,6 +49,9 @@ WRAPPED: dict[str, Callable[[Env], Env]] = {
     "changes": with_changes,
     "changes(sizes(faults))": lambda env: with_changes(with_sizes(with_faults(env))),
     "faults(sizes(changes))": lambda env: with_faults(with_sizes(with_changes(env))),
+    "fixed(changes(sizes(faults)))": lambda env: FixedAgents(
+        with_changes(with_sizes(with_faults(env)))
+    ),
 }
 
 

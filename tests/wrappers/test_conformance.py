@@ -12,6 +12,7 @@ from pettingzoo.utils.conversions import parallel_to_aec
 
 STACKS = [
     "plain", "faults", "sizes", "changes", "changes(sizes(faults))", "faults(sizes(changes))",
+    "fixed(changes(sizes(faults)))",
 ]  # fmt: skip
 each_stack = pytest.mark.parametrize("stack", STACKS)
 each_size = pytest.mark.parametrize("n_robots", [1, 5, 25])

@@ -87,10 +87,12 @@ def test_the_return_is_the_indicator(name: str) -> None:
     for robot_return in rewards.sum(axis=0):
         assert robot_return == pytest.approx(estimate(p).value, **CLOSE)
     info = infos["robot_0"]
-    assert info["indicators"][name] == pytest.approx(estimate(p).value, **CLOSE)
-    reference = "P_N" if name == "S" else "P_o"
-    assert info["references"][name][reference] == 33
-    assert info["references"][name][f"measured {reference}"] is None
+    assert info[name] == pytest.approx(estimate(p).value, **CLOSE)
+    assert info[f"{name}_tested"] == 1
+    reference = f"{name}_P_N" if name == "S" else f"{name}_P_o"
+    assert info[reference] == 33
+    assert info[f"{reference}_episodes"] == info[f"{reference}_measured"] == 0
+    assert info.get("FT_P_S", 21) == 21
     assert info["delivered"] == p
     # Nothing but the constant without a delivery, and it only once.
     paying = np.flatnonzero(rewards[:, 0])
@@ -105,11 +107,14 @@ def test_the_constant_can_be_left_out_and_weights_add_up() -> None:
     p = delivered(env)
     r, ft = p / 33 - 1 + 2 / N, (p - 21) / 33
     assert rewards.sum(axis=0) == pytest.approx(2 * r + ft + 0.5 * p, **CLOSE)
-    assert infos["robot_0"]["indicators"] == pytest.approx({"R": r, "FT": ft})
+    info = infos["robot_0"]
+    assert [info["R"], info["FT"]] == pytest.approx([r, ft])
+    assert (info["n_robots"], info["n_failed"], info["n_removed"]) == (N, 2, 0)
+    assert "P" not in info
     env = IndicatorReward(busy(), "R", references=33, constant=False)
     rewards, infos = play(env, 0, SLOW)
     assert rewards.sum(axis=0) == pytest.approx(p / 33, **CLOSE)
-    assert infos["robot_0"]["indicators"] == pytest.approx({"R": r})
+    assert infos["robot_0"]["R"] == pytest.approx(r)
 
 
 def test_without_what_an_indicator_is_about_numbers_pay_nothing() -> None:
@@ -118,12 +123,15 @@ def test_without_what_an_indicator_is_about_numbers_pay_nothing() -> None:
         rewards, infos = play(env, 0, options)
         assert delivered(env) > 5
         assert not rewards.any()
-        assert next(iter(infos.values()))["indicators"] == {}
+        info = next(iter(infos.values()))
+        for name in ("R", "S", "A"):
+            assert info[name] == info[f"{name}_tested"] == 0
     # The P_o that the policy has in fact is told beside the one given.
     env.reset(seed=0, options=SLOW)
-    measured = env.episode_info["references"]["R"]["measured P_o"]
+    measured = env.episode_info["R_P_o_measured"]
     assert measured == env.measured.mean(OWN)
     assert measured > 5
+    assert env.episode_info["R_P_o_episodes"] == 1
 
 
 STACKS: dict[str, Callable[[Any], Any]] = {
@@ -154,7 +162,7 @@ def test_the_order_of_wrappers_does_not_matter(order: tuple[str, ...]) -> None:
         assert condition.n_robots in (5, 6)
         assert condition.n_failed == condition.n_removed == 1
         assert condition.changes[0][0] == "delivery_width"
-        assert set(infos["robot_0"]["indicators"]) == {"R", "FT", "S", "A"}
+        assert all(info[f"{name}_tested"] for info in infos.values() for name in "RSA")
 
 
 def test_a_change_in_mid_run_makes_the_return_the_adaptability() -> None:

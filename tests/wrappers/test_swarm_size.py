@@ -40,6 +40,14 @@ def test_possible_agents_are_those_of_the_largest_swarm_not_of_the_environment()
     assert env.state_space.contains(env.state())
 
 
+def test_the_environments_max_robots_stay_possible() -> None:
+    env = SwarmSize(small(n_robots=2, max_robots=5), [2, 3])
+    assert len(env.possible_agents) == 5
+    assert len(env.reset(seed=0, options={"scenario": {"n_robots": 5}})[0]) == 5
+    with pytest.raises(SetupError, match="n_robots = 6: should be at most 5"):
+        env.reset(seed=0, options={"scenario": {"n_robots": 6}})
+
+
 def test_a_distribution_gives_sizes_within_its_bounds() -> None:
     env = SwarmSize(small(), lambda rng: rng.integers(3, 8), within=(3, 7))
     assert set(sizes_of(env, range(40))) == {3, 4, 5, 6, 7}
@@ -91,6 +99,7 @@ def test_who_leaves_terminates_and_is_gone_for_the_rest_of_the_episode() -> None
         ({"sizes": lambda rng: 4}, SetupError, "within = None: should be"),
         ({"sizes": 4, "within": (3, 5)}, SetupError, "should be None but for a distribution"),
         ({"sizes": [3, 9], "leave": [(4, 1.0)]}, SetupError, "4 robots in all, should be at most"),
+        ({"sizes": [3, 9], "leave": [(2, 0.0), (1, 0.0)]}, SetupError, "3 robots at 0 s, should"),
         ({"sizes": 9, "leave": [(4, -1.0)]}, FaultError, "Fault.onset = -1.0"),
         ({"sizes": 9, "leave": [(0, 1.0)]}, SetupError, "at least one robot"),
         ({"sizes": 9, "leave": [4]}, SetupError, r"should be pairs \(robots, time"),
