@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.policies import robot_memory as known
+from swarm_logistics_env.policies.clearing import clear_the_way
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
@@ -108,9 +109,13 @@ class MotionFrame:
         return inputs
 
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read."""
+        """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
+
+        A robot that is caged by items clears its way instead.
+        """
         commands = np.zeros((len(outputs), 4))
         turn_outputs(outputs.astype(np.float64), self._turned, commands)
+        clear_the_way(self._rows, self.memory, commands)
         known.note_commands(self._rows, commands, self.memory)
         return commands
 

@@ -1,6 +1,6 @@
 """What a robot remembers beside its sensors: all of it from its own observations and commands.
 
-Directions are in the robot's own frame; they stay true as long as it is never told to turn.
+Directions are in the robot's own frame, which drifts; so what it remembers of them fades.
 """
 
 from __future__ import annotations
@@ -15,15 +15,20 @@ from swarm_logistics_env.kernels import kernel, uniform
 
 # Columns of a memory array (N, N_COLUMNS).
 HEADING_X, HEADING_Y = 0, 1  # of its last motion, length 1
-HOME_X, HOME_Y = 2, 3  # sum of its directions when it entered the delivery area, less those out
+HOME_X, HOME_Y = 2, 3  # fading sum of its directions into the delivery area, less those out
 WAS_INSIDE = 4  # the delivery area
 FAILED = 5  # 1: it just met its own failure; fades over FAILURE_TIME
 STUCK = 6  # 1: it just stood still with the requested item; falls to 0 in STUCK_TIME
 HELD = 7  # what its gripper was told: 0 open, 1 hold, 2 hold the requested item it carries
-N_COLUMNS = 8
+STANDING = 8  # [s] that it stood still with the requested item, less those that it moved
+CLEARING = 9  # [s] that are left to clear its way out of a cage of items; see `clearing`
+N_COLUMNS = 10
 
 FAILURE_TIME = 60.0  # [s]
+HOME_TIME = 10.0  # [s], in which a remembered direction fades: by then a gyro may have drifted
 STUCK_TIME = 1.5  # [s]
+CAGED_TIME = 5.0  # [s] of standing, after which a robot takes itself for caged
+CLEARING_TIME = 6.0  # [s]
 SURELY_IN_REACH = 0.24  # [m]; such an item is lifted by a gripper that works
 STANDS = 0.2  # [m/s] and less
 MOVES = 0.1  # [m/s] and more: its velocity has a direction
@@ -59,9 +64,17 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
             known[FAILED] = 1.0
 
         known[STUCK] = max(0.0, known[STUCK] - period / STUCK_TIME)
-        if delivers and known[HELD] > 1.5 and speed < STANDS:
+        stands = delivers and known[HELD] > 1.5 and speed < STANDS
+        if stands:
             known[STUCK] = 1.0
+        known[STANDING] = max(0.0, known[STANDING] + (period if stands else -period))
+        known[CLEARING] = max(0.0, known[CLEARING] - period)
+        if known[STANDING] > CAGED_TIME and not is_inside:
+            known[STANDING], known[CLEARING] = 0.0, CLEARING_TIME
 
+        kept = math.exp(-period / HOME_TIME)
+        known[HOME_X] *= kept
+        known[HOME_Y] *= kept
         if is_inside != (known[WAS_INSIDE] > 0.5) and speed > MOVES:
             way = 1.0 if is_inside else -1.0
             known[HOME_X] += way * x / speed

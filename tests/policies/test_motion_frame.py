@@ -89,10 +89,17 @@ def test_the_way_home_is_the_way_in() -> None:
     assert frame.memory[0, known.HOME_X : known.HOME_Y + 1].tolist() == [0.0, 0.0]
     for _ in range(3):
         frame.read(inside)
-    np.testing.assert_allclose(frame.memory[0, known.HOME_X : known.HOME_Y + 1], [0.6, 0.8])
+    # Two readings ago, fading in ten seconds.
+    kept = math.exp(-0.02)
+    np.testing.assert_allclose(
+        frame.memory[0, known.HOME_X : known.HOME_Y + 1], [0.6 * kept, 0.8 * kept]
+    )
     outside[0, row.VELOCITY : row.VELOCITY + 2] = -1.0, 0.0
     frame.read(outside)
-    np.testing.assert_allclose(frame.memory[0, known.HOME_X : known.HOME_Y + 1], [1.6, 0.8])
+    kept = math.exp(-0.03)
+    np.testing.assert_allclose(
+        frame.memory[0, known.HOME_X : known.HOME_Y + 1], [0.6 * kept + 1.0, 0.8 * kept]
+    )
 
 
 def test_a_robot_that_cannot_lift_or_deliver_notices_and_forgets() -> None:
@@ -185,3 +192,64 @@ def test_that_does_not_listen_reads_the_same_but_no_timer() -> None:
     heard[:, LEAD] = 0.0
     np.testing.assert_array_equal(unheard, heard)
     np.testing.assert_array_equal(deaf.peek(rows, np.array([0]))[:, LEAD], unheard[:, LEAD])
+
+
+def test_the_way_home_fades_in_ten_seconds() -> None:
+    frame = frame_of(1)
+    frame.memory[0, known.HOME_X] = 2.0
+    for _ in range(100):
+        frame.read(nothing())
+    assert frame.memory[0, known.HOME_X] == pytest.approx(2.0 * math.exp(-1.0))
+    assert frame.memory[0, known.HOME_Y] == 0.0
+
+
+def caged(*items: tuple[float, float, bool], carries: str = "requested") -> Rows:
+    """What a robot senses that stands amid items at (x, y) [m], some of them requested."""
+    rows = nothing()
+    rows[0, row.CARRYING] = carries != ""
+    rows[0, row.CARRYING_REQUESTED] = carries == "requested"
+    for place, (x, y, requested) in enumerate(items):
+        there = row.ITEMS + 5 * place
+        rows[0, there : there + 4] = 1.0, x, y, requested
+    return rows
+
+
+def test_a_caged_robot_lets_go_and_carries_off_what_is_in_its_way() -> None:
+    frame, wants = frame_of(1), np.array([[1.0, 0.0, 1.0]])
+    cage = ((0.35, 0.0, False), (-0.2, 0.3, False), (-0.2, -0.3, False))
+
+    def commands(rows: Rows) -> list[float]:
+        frame.read(rows)
+        return [float(number) for number in frame.command(wants)[0]]
+
+    # It drives on for five seconds in which it stands still, as it is told to.
+    for _ in range(50):
+        assert commands(caged(*cage))[3] == 1.0
+    for _ in range(2):
+        assert commands(caged(*cage)) is not None
+    assert commands(caged(*cage))[3] == -1.0
+    # Empty, it drives under the nearest other item, and lifts it where the requested one is not.
+    x, y, _, gripper = commands(caged((0.01, 0.0, True), *cage, carries=""))
+    assert x > 0.5
+    assert abs(y) < 1e-6
+    assert gripper == -1.0
+    assert commands(caged((-0.34, 0.0, True), (0.01, 0.0, False), carries=""))[3] == 1.0
+    # Laden with it, away from the requested one; then it puts it down.
+    x, _, _, gripper = commands(caged((-0.34, 0.0, True), carries="other"))
+    assert (x, gripper) == (1.0, 1.0)
+    for _ in range(53):
+        last = commands(caged((-0.34, 0.0, True), carries="other"))
+    assert last[3] == -1.0
+    # The clearing is over, and it does again what it is told.
+    for _ in range(10):
+        last = commands(caged(carries=""))
+    assert last[3] == 1.0
+
+
+def test_a_robot_that_moves_is_not_caged() -> None:
+    frame = frame_of(1)
+    rows = caged()
+    rows[0, row.VELOCITY] = 1.0
+    for _ in range(200):
+        frame.read(rows)
+        assert frame.command(np.array([[1.0, 0.0, 1.0]]))[0, 3] == 1.0

@@ -34,10 +34,10 @@ def test_they_are_small_and_say_how_they_were_made(name: str) -> None:
 def test_they_deliver_more_than_swarm_dt_at_any_size(name: str, n_robots: int) -> None:
     scenario = SHORT.replace(n_robots=n_robots)
     ours, scripted = (
-        np.mean([run_episode(scenario, policies.load(which), seed).delivered for seed in range(4)])
+        np.mean([run_episode(scenario, policies.load(which), seed).delivered for seed in range(8)])
         for which in (name, "swarm-dt")
     )
-    # Who does not listen finds the delivery area late in a crowd.
+    # It listens to no timer and its memory fades, so it finds the delivery area late in a crowd.
     factor = 1.0 if (name, n_robots) == ("ppo-robust", 40) else 1.5
     assert ours > factor * scripted
 
@@ -46,8 +46,8 @@ def test_robust_lets_go_of_what_it_cannot_deliver() -> None:
     faults = [Fault("FM4", 2)]
     ours, scripted = (
         np.mean(
-            [run_episode(SHORT, policies.load(which), seed, faults).delivered for seed in (0, 1)]
+            [run_episode(SHORT, policies.load(which), seed, faults).delivered for seed in range(8)]
         )
         for which in ("ppo-robust", "swarm-dt")
     )
-    assert ours > 2.0 * scripted
+    assert ours > 1.4 * scripted
