@@ -151,6 +151,16 @@ class Scenario(Record):
         """Physics steps in a control step."""
         return round(self.control_period / self.physics_period)
 
+    @property
+    def is_gossip(self) -> bool:
+        """Whether robots tell on what they heard."""
+        return self.relay == "gossip"
+
+    @property
+    def is_holonomic(self) -> bool:
+        """Whether robots can move sideways."""
+        return self.drive == "holonomic"
+
     @model_validator(mode="after")
     def _possible(self) -> Self:
         self._check_sizes()

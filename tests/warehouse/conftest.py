@@ -35,7 +35,7 @@ def build(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Warehouse]:
         monkeypatch.setattr(layout, "place_robots", lambda *_: (places.copy(), np.zeros(n)))
         monkeypatch.setattr(layout, "place_items", lambda *_: item_places.copy())
         monkeypatch.setattr(layout, "place_obstacles", lambda *_: solids.copy())
-        monkeypatch.setattr(layout, "request_order", lambda *_: np.arange(n_items))
+        monkeypatch.setattr(layout, "draw_order", lambda *_: None)  # in the order of their numbers
         scenario = Scenario(n_robots=n, n_items=n_items, n_obstacles=len(solids), **fields)
         world = Warehouse(scenario)
         world.reset(0, faults)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,19 +9,34 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.warehouse.driving import drive
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.warehouse.kinematics import drive, refused_command
+from swarm_logistics_env.warehouse.structs import (
+    NOBODY,
+    blank_capabilities,
+    blank_robots,
+    parameters_of,
+)
+
+
+def one_robot(heading: float = 0.0, obeys: bool = True, **fields: Any) -> tuple[Any, ...]:
+    """Return robots, capabilities and parameters of one robot of 2 m/s and 6 rad/s."""
+    scenario = Scenario(n_robots=1, **fields)
+    robots, able = blank_robots(scenario), blank_capabilities(scenario)
+    robots.heading[:], able.obeys[:] = heading, obeys
+    able.max_speed[:], able.max_turn_rate[:] = 2.0, 6.0
+    return robots, able, parameters_of(scenario)
 
 
 def driven(
-    commands: ArrayLike, heading: float = 0.0, able: bool = True, period: float = 0.1
+    commands: ArrayLike, heading: float = 0.0, obeys: bool = True, period: float = 0.1
 ) -> tuple[NDArray[np.float64], float]:
     """Return the wanted velocity [m/s] and the new heading of one robot of 2 m/s and 6 rad/s."""
-    headings, wanted = np.array([heading]), np.full((1, 2), 9.0)
+    robots, able, parameters = one_robot(heading, obeys)
+    wanted = np.full((1, 2), 9.0)
     given_row = np.array([commands], dtype=np.float64)
-    assert drive(
-        given_row, np.array([able]), np.array([2.0]), np.array([6.0]), period, headings, wanted
-    )
-    return wanted[0], float(headings[0])
+    drive(given_row, robots, able, parameters._replace(control_period=period), wanted)
+    return wanted[0], float(robots.heading[0])
 
 
 @pytest.mark.parametrize(
@@ -79,20 +95,17 @@ def test_speed_stays_within_the_top_and_heading_within_pi(
     assert math.remainder(change, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_robot_that_is_not_able_stands_and_does_not_turn() -> None:
-    wanted, heading = driven((1.0, 1.0, 1.0, 1.0), heading=0.4, able=False)
+def test_a_robot_that_does_not_obey_stands_and_does_not_turn() -> None:
+    wanted, heading = driven((1.0, 1.0, 1.0, 1.0), heading=0.4, obeys=False)
     assert wanted.tolist() == [0.0, 0.0]
     assert heading == 0.4
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_command_that_is_not_finite_changes_nothing(bad: float) -> None:
-    commands = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, bad]])
-    able, heading, wanted = np.array([True, True]), np.array([0.1, 0.2]), np.full((2, 2), 7.0)
-    top = np.array([2.0, 2.0])
-    assert not drive(commands, able, top, top, 0.1, heading, wanted)
-    assert heading.tolist() == [0.1, 0.2]
-    assert (wanted == 7.0).all()
-    able[1] = False
-    assert drive(commands, able, top, top, 0.1, heading, wanted)
-    assert wanted[1].tolist() == [0.0, 0.0]
+def test_the_first_command_that_is_not_finite_is_named(bad: float) -> None:
+    scenario = Scenario(n_robots=2)
+    robots, able = blank_robots(scenario), blank_capabilities(scenario)
+    commands = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 0.0, bad, bad]])
+    assert refused_command(commands, robots, able) == 6
+    able.obeys[1] = False
+    assert refused_command(commands, robots, able) == NOBODY
