@@ -100,6 +100,11 @@ class Scenario(Record):
     drive: Literal["holonomic", "differential"] = Field(
         "holonomic", description="differential: no sideways motion, `left` is ignored; DOTS"
     )
+    heading_drift: NonNegativeFloat = Field(
+        0.02,
+        description="every robot's body turns at a constant rate that nobody tells it, normal with "
+        "this standard deviation [rad/s]: a poor gyro; here",
+    )
     speed_mix: Mix = Field(
         (1.0,), description="robot i has factor i (repeating) of max_speed and turn rate; here"
     )
@@ -150,6 +155,17 @@ class Scenario(Record):
     def n_substeps(self) -> int:
         """Physics steps in a control step."""
         return round(self.control_period / self.physics_period)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Self:
+        """Return the record that `to_json` wrote; before there was a `heading_drift` it was 0.
+
+        Raises:
+            ScenarioError: `text` is not JSON or is not such a record.
+        """
+        scenario = super().from_json(text)
+        is_older = cls.model_fields.keys() - scenario.model_fields_set == {"heading_drift"}
+        return scenario.replace(heading_drift=0.0) if is_older else scenario
 
     @property
     def is_gossip(self) -> bool:

@@ -1,9 +1,8 @@
-"""The contact sensor: what a robot touches, and which robots touch each other."""
+"""The contact sensor: what a robot touches."""
 
 from __future__ import annotations
 
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.contact_clusters import join
 from swarm_logistics_env.warehouse.rangers import Pose
 from swarm_logistics_env.warehouse.structs import (
     Grid,
@@ -43,7 +42,6 @@ def touches_robots(
             other = grid.members[nearby.place[index]]
             touches = True
             is_anchored |= robots.failed[other] and not robots.failed[me]
-            join(robots.cluster, me, other)
     return touches, is_anchored
 
 

@@ -42,8 +42,9 @@ def drive(
     """Turn the robots and fill their wanted velocities (N, 2) [m/s] for one control period.
 
     Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
-    that turns drives along its mean direction; one that is not holonomic ignores `left`. Rows of
-    robots that ignore their commands are ignored.
+    turns as commanded and by its heading drift, unless its motor is dead, and drives along its mean
+    direction; one that is not holonomic ignores `left`. Rows of robots that ignore their commands
+    are ignored.
     """
     for robot in range(len(commands)):
         wanted_velocity[robot, 0] = 0.0
@@ -54,8 +55,9 @@ def drive(
         left = min(max(commands[robot, LEFT], -1.0), 1.0) if parameters.is_holonomic else 0.0
         norm = math.sqrt(forward * forward + left * left)
         speed = able.max_speed[robot] / max(norm, 1.0)
-        turn = min(max(commands[robot, TURN], -1.0), 1.0)
-        angle = turn * able.max_turn_rate[robot] * parameters.control_period
+        turn, most = min(max(commands[robot, TURN], -1.0), 1.0), able.max_turn_rate[robot]
+        drift = robots.heading_drift[robot] if most > 0.0 else 0.0
+        angle = (turn * most + drift) * parameters.control_period
         heading = robots.heading[robot]
         cosine, sine = math.cos(heading + 0.5 * angle), math.sin(heading + 0.5 * angle)
         wanted_velocity[robot, 0] = speed * (forward * cosine - left * sine)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import ScenarioError
-from swarm_logistics_env.kernels import inlined_kernel, kernel, pair_key, uniform
+from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, pair_key, uniform
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.warehouse.structs import STORED, Integers, Keys, World
@@ -41,6 +41,11 @@ def place_robots(
     n = scenario.n_robots
     centres = _strewn(scenario, seed, "robots", n, scenario.robot_radius, obstacles)
     return centres, (_first_draws(row_keys(seed, "headings", n)) * 2.0 - 1.0) * np.pi
+
+
+def heading_drifts(scenario: Scenario, seed: int) -> NDArray[np.float64]:
+    """Return at which rate each robot's body turns unasked [rad/s], shape (N,)."""
+    return scenario.heading_drift * _normal_draws(row_keys(seed, "drift", scenario.n_robots))
 
 
 @kernel
@@ -163,4 +168,12 @@ def _first_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
     draws = np.empty(keys.shape[0])
     for row in range(keys.shape[0]):
         draws[row] = uniform(keys[row], 0)
+    return draws
+
+
+@kernel
+def _normal_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
+    draws = np.empty(keys.shape[0])
+    for row in range(keys.shape[0]):
+        draws[row] = gaussian(keys[row], 0)
     return draws

@@ -1,9 +1,8 @@
 """Rigid bodies in pymunk: the only file that imports it.
 
-Each robot is a disc that cannot be turned by contacts (infinite moment), tied by a pivot joint to
-a kinematic control body whose velocity is the command. The joint's greatest force is the drive's
-(mass x acceleration), so contacts win where they should: writing a robot's velocity instead would
-discard the contact solution and let robots sink into each other.
+Each robot is a disc that no contact turns (infinite moment), driven by a force of at most its mass
+times its acceleration, see `engine.push`. So contacts win where they should: writing a robot's
+velocity instead would discard the contact solution and let robots sink into each other.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.building import N_WALLS, build, free
 from swarm_logistics_env.warehouse.engine import EMPTY_ROBOT, NO_ONE, collide_with, move
-from swarm_logistics_env.warehouse.structs import Engine, Functions
+from swarm_logistics_env.warehouse.structs import Batch, Engine, Functions
 
 _FUNCTIONS = {
     "step": "cpSpaceStep",
@@ -36,22 +35,17 @@ _FUNCTIONS = {
     "new_space": "cpSpaceNew",
     "static_body": "cpSpaceGetStaticBody",
     "set_slop": "cpSpaceSetCollisionSlop",
+    "set_bias": "cpSpaceSetCollisionBias",
     "new_body": "cpBodyNew",
-    "new_control": "cpBodyNewKinematic",
     "set_position": "cpBodySetPosition",
     "set_velocity": "cpBodySetVelocity",
     "new_circle": "cpCircleShapeNew",
     "new_segment": "cpSegmentShapeNew",
-    "new_joint": "cpPivotJointNew2",
-    "set_bias": "cpConstraintSetMaxBias",
-    "set_force": "cpConstraintSetMaxForce",
     "add_body": "cpSpaceAddBody",
     "add_shape": "cpSpaceAddShape",
-    "add_joint": "cpSpaceAddConstraint",
     "free_space": "cpSpaceFree",
     "free_body": "cpBodyFree",
     "free_shape": "cpShapeFree",
-    "free_joint": "cpConstraintFree",
 }
 
 
@@ -68,22 +62,25 @@ class Physics:
 
     def __init__(self, scenario: Scenario) -> None:
         n = scenario.n_robots
-        # A batch call reads and writes every body: N robots, N controls, and room for a static one.
-        self._read = _Batch(2 * n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY)
-        self._written = _Batch(2 * n + 1, 2, BodyFields.VELOCITY)
-        solids = N_WALLS + scenario.n_obstacles
-        lengths = {"space": 1, "item_shapes": scenario.n_items, "solid_shapes": solids}
-        per_robot = ("robot_bodies", "control_bodies", "joints", "robot_shapes")
-        lengths |= dict.fromkeys(per_robot, n)
+        lengths = {
+            "space": 1,
+            "robot_bodies": n,
+            "robot_shapes": n,
+            "item_shapes": scenario.n_items,
+            "solid_shapes": N_WALLS + scenario.n_obstacles,
+        }
+        # A batch call reads and writes every body: of N robots, and the static one.
+        state = _Memory(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY)
+        velocities = _Memory(n + 1, 2, BodyFields.VELOCITY)
+        forces = _Memory(n + 1, 2, BodyFields.FORCE)
+        self._kept = state, velocities, forces
         self.engine = Engine(
             functions=_FUNCTION_ADDRESSES,
             **{name: np.zeros(length, np.int64) for name, length in lengths.items()},
-            read_batch=self._read.address,
-            read_count=self._read.count_address,
-            write_batch=self._written.address,
-            write_count=self._written.count_address,
-            bodies=self._read.numbers,
-            velocities=self._written.numbers,
+            bodies=state.batch,
+            velocities=velocities.batch,
+            forces=forces.batch,
+            wanted_velocity=np.zeros((n, 2)),
         )
 
     def begin(self, world: NDArray[np.int64]) -> None:
@@ -91,7 +88,7 @@ class Physics:
         address = world.ctypes.data
         build(address)
         # Not at the end of the process, which frees everything anyway.
-        finalize(self, _free, world, self._read, self._written).atexit = False
+        finalize(self, _free, world, self.engine, self._kept).atexit = False
 
     def release(self, robot: int, item: int, x: float, y: float) -> None:
         """Put `item` to (x, y) [m], masked, and make `robot` an unladen one."""
@@ -108,22 +105,24 @@ def _free(world: NDArray[np.int64], *kept: object) -> None:
     free(world.ctypes.data)
 
 
-class _Batch:
-    """Numbers of all bodies, (rows, columns), that one call of the engine reads or writes."""
+class _Memory:
+    """The memory of a batch, (rows, columns)."""
 
     def __init__(self, rows: int, columns: int, fields: BodyFields) -> None:
         # The engine trusts the memory it is given. One number to spare: it replaces, with memory of
         # its own, a buffer that what it reads would fill.
         memory = np.zeros(rows * columns + 1)
-        self.numbers = memory[:-1].reshape(rows, columns)
         # All kept, because what a structure of cffi points to lives no longer for it.
         self._memory = ffi.from_buffer("double[]", memory)
         self._buffer = ffi.new("pmFloatArray *")
         self._buffer.arr, self._buffer.max = self._memory, len(memory)
-        self._batch = ffi.new("pmBatchedData *")
-        self._batch.floatArray, self._batch.fields = self._buffer, fields.value
-        self.address = _address(self._batch)
-        self.count_address = _address(ffi.addressof(self._buffer, "num"))
+        self._data = ffi.new("pmBatchedData *")
+        self._data.floatArray, self._data.fields = self._buffer, fields.value
+        self.batch = Batch(
+            address=_address(self._data),
+            count_address=_address(ffi.addressof(self._buffer, "num")),
+            numbers=memory[:-1].reshape(rows, columns),
+        )
 
 
 def _address(thing: Any) -> int:

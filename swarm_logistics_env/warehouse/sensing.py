@@ -38,8 +38,6 @@ def sense(world: World, step: int, rows: NDArray[np.float32]) -> int:
     """
     robots, n_anchored = world.robots, 0
     rows[:, :] = 0.0
-    for me in range(len(robots.cluster)):
-        robots.cluster[me] = me
     for me in range(len(rows)):
         robots.contact[me] = False
         robots.heard[me] = math.nan

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse.contact_clusters import largest
 from swarm_logistics_env.warehouse.engine import advance, follow
 from swarm_logistics_env.warehouse.grid import fill
 from swarm_logistics_env.warehouse.item_collisions import mask_below_lifters, unmask_left
@@ -80,20 +79,16 @@ def step(address: int, commands: NumberRows, rows: NDArray[np.float32]) -> StepR
 def move(world: World, commands: NumberRows) -> None:
     """Turn and move the robots as commanded and as far as bodies let them."""
     robots, engine, parameters = world.robots, world.engine, world.parameters
-    n = len(robots.item)
-    # What was just read, so that writing it back changes nothing for the robots themselves.
-    engine.velocities[:n] = engine.bodies[:n, 2:4]
-    wanted = engine.velocities[n : 2 * n]
-    drive(commands, robots, world.able, parameters, wanted)
+    drive(commands, robots, world.able, parameters, engine.wanted_velocity)
     reach = parameters.robot_radius + parameters.item_radius
     unmask_left(engine, reach, robots, world.items, world.robot_grid, world.item_grid)
-    pile = largest(robots.cluster)
-    advance(engine, pile, parameters.n_substeps, parameters.physics_period)
-    for robot in range(n):
+    advance(engine, parameters, int(np.count_nonzero(robots.contact)))
+    bodies = engine.bodies.numbers
+    for robot in range(len(robots.item)):
         is_there = 1.0 if robots.present[robot] else 0.0
         for axis in range(2):
-            robots.position[robot, axis] = engine.bodies[robot, axis] * is_there
-            robots.velocity[robot, axis] = engine.bodies[robot, 2 + axis] * is_there
+            robots.position[robot, axis] = bodies[robot, axis] * is_there
+            robots.velocity[robot, axis] = bodies[robot, 2 + axis] * is_there
 
 
 @inlined_kernel

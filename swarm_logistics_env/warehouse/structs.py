@@ -59,12 +59,12 @@ class Robots(NamedTuple):
     position: NumberRows  # (N, 2) [m]
     velocity: NumberRows  # (N, 2) [m/s]
     heading: Numbers  # (N,) [rad] from +x to the left, within +-pi
+    heading_drift: Numbers  # (N,) [rad/s] at which its body turns, whatever is commanded
     present: Flags  # (N,) False once it was removed
     failed: Flags  # (N,) any failure mode holds
     in_delivery: Flags  # (N,) its centre is in the delivery area
     last_in_delivery: Integers  # (N,) the last control step in which it was, or NOBODY
     contact: Flags  # (N,) touches something solid to it
-    cluster: Integers  # (N,) towards one robot of those that touch each other
     item: Integers  # (N,) item carried, or NOBODY
     memory: IntegerRows  # (N, memory_size) items put down, newest first, or NOBODY
     timer: Numbers  # (N,) [s] since the delivery area, NaN when silent
@@ -157,22 +157,25 @@ class Functions(NamedTuple):
     new_space: int
     static_body: int
     set_slop: int
+    set_bias: int
     new_body: int
-    new_control: int
     set_position: int
     set_velocity: int
     new_circle: int
     new_segment: int
-    new_joint: int
-    set_bias: int
-    set_force: int
     add_body: int
     add_shape: int
-    add_joint: int
     free_space: int
     free_body: int
     free_shape: int
-    free_joint: int
+
+
+class Batch(NamedTuple):
+    """Numbers of all bodies, the static one last, that one call of the engine reads or writes."""
+
+    address: int  # of the engine's structure
+    count_address: int  # of how many numbers it has read or written
+    numbers: NumberRows  # (bodies, columns)
 
 
 class Engine(NamedTuple):
@@ -181,17 +184,13 @@ class Engine(NamedTuple):
     functions: Functions
     space: Integers  # (1,)
     robot_bodies: Integers  # (N,)
-    control_bodies: Integers  # (N,)
-    joints: Integers  # (N,)
     robot_shapes: Integers  # (N,)
     item_shapes: Integers  # (I,)
     solid_shapes: Integers  # (4 + n_obstacles,) walls, then obstacles
-    read_batch: int
-    read_count: int  # of the numbers in the batch that is read
-    write_batch: int
-    write_count: int
-    bodies: NumberRows  # (2 N + 1, 4) x, y [m] and velocity [m/s] of every body, as read
-    velocities: NumberRows  # (2 N + 1, 2) [m/s], to be written
+    bodies: Batch  # (N + 1, 4) x, y [m] and velocity [m/s]
+    velocities: Batch  # (N + 1, 2) [m/s]
+    forces: Batch  # (N + 1, 2) [N], written to the bodies for one substep
+    wanted_velocity: NumberRows  # (N, 2) [m/s] what the drives aim at
 
 
 class World(NamedTuple):
@@ -222,12 +221,12 @@ def blank_robots(scenario: Scenario) -> Robots:
         position=np.zeros((n, 2)),
         velocity=np.zeros((n, 2)),
         heading=np.zeros(n),
+        heading_drift=np.zeros(n),
         present=np.ones(n, np.bool_),
         failed=np.zeros(n, np.bool_),
         in_delivery=np.zeros(n, np.bool_),
         last_in_delivery=np.full(n, NOBODY),
         contact=np.zeros(n, np.bool_),
-        cluster=np.arange(n),
         item=np.full(n, NOBODY),
         memory=np.full((n, scenario.memory_size), NOBODY),
         timer=np.full(n, np.nan),

@@ -88,6 +88,7 @@ class Warehouse:
         state.robot_position, state.robot_heading = layout.place_robots(
             scenario, seed, state.obstacle_position
         )
+        state.robot_heading_drift = layout.heading_drifts(scenario, seed)
         state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
         items = state.items
         items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import math
 from typing import Any
 
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env import Scenario
+from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.warehouse.kinematics import drive, refused_command
 from swarm_logistics_env.warehouse.structs import (
     NOBODY,
@@ -109,3 +110,53 @@ def test_the_first_command_that_is_not_finite_is_named(bad: float) -> None:
     assert refused_command(commands, robots, able) == 6
     able.obeys[1] = False
     assert refused_command(commands, robots, able) == NOBODY
+
+
+# -- heading drift ------------------------------------------------------------------------------
+
+
+def test_every_robot_turns_at_a_rate_of_its_own_that_depends_on_no_other() -> None:
+    few, many = Warehouse(Scenario(n_robots=5)), Warehouse(Scenario(n_robots=200))
+    few.reset(3)
+    many.reset(3)
+    rates = many.state.robot_heading_drift.copy()
+    np.testing.assert_array_equal(few.state.robot_heading_drift, rates[:5])
+    assert np.std(rates) == pytest.approx(0.02, rel=0.2)
+    assert abs(np.mean(rates)) < 5 * 0.02 / math.sqrt(200)
+    many.reset(4)
+    assert not np.isclose(many.state.robot_heading_drift, rates).any()
+
+
+@pytest.mark.parametrize("drive_kind", ["holonomic", "differential"])
+def test_headings_drift_at_constant_rates_whatever_is_commanded(drive_kind: Any) -> None:
+    world = Warehouse(Scenario(n_robots=6, heading_drift=0.1, drive=drive_kind))
+    world.reset(0)
+    before = world.state.robot_heading.copy()
+    commands = np.zeros((6, 4))
+    commands[:3, 0] = 1.0
+    for _ in range(50):
+        world.step(commands)
+    turned = np.remainder(world.state.robot_heading - before + np.pi, math.tau) - np.pi
+    np.testing.assert_allclose(turned, 5.0 * world.state.robot_heading_drift, atol=1e-9)
+    copied = copy.deepcopy(world)
+    for _ in range(10):
+        np.testing.assert_array_equal(world.step(commands), copied.step(commands))
+
+
+def test_robots_that_cannot_move_do_not_turn() -> None:
+    world = Warehouse(Scenario(n_robots=4, heading_drift=0.1))
+    faults = [Fault("dead", (0,)), Fault("motor_dead", (1,)), Fault("removed", (2,))]
+    world.reset(0, faults)
+    before = world.state.robot_heading.copy()
+    for _ in range(5):
+        world.step(np.zeros((4, 4)))
+    assert (world.state.robot_heading != before).tolist() == [False, False, False, True]
+
+
+def test_no_drift_is_the_world_with_a_lasting_compass() -> None:
+    world = Warehouse(Scenario(n_robots=4, heading_drift=0.0))
+    world.reset(0)
+    before = world.state.robot_heading.copy()
+    for _ in range(5):
+        world.step(np.tile([1.0, 0.5, 0.0, 0.0], (4, 1)))
+    np.testing.assert_array_equal(world.state.robot_heading, before)
