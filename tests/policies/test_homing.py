@@ -88,8 +88,8 @@ def test_it_follows_the_lowest_timer_heard_until_it_knows_the_way_for_sure() -> 
 
 
 def test_it_never_commands_a_turn() -> None:
-    arena = {"warehouse_width": 6, "warehouse_height": 5, "n_items": 20}
-    world = Warehouse(Scenario(n_robots=30, heading_drift=0.0, **arena))
+    scenario = Scenario(n_robots=30, warehouse_width=6, warehouse_height=5, n_items=20)
+    world = Warehouse(scenario.replace(heading_drift=0.0))
     rows, policy = world.reset(0), fresh(30)
     first = world.state.robot_heading.copy()
     for _ in range(100):
