@@ -137,6 +137,8 @@ def test_a_world_that_refuses_keeps_none_of_those_behind_it() -> None:
 def test_a_pool_goes_on_after_ctrl_c(
     n_helpers: int, kernel: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if n_helpers == 0 and kernel == "run_next_job":
+        kernel = "run_jobs"  # alone all in one call
     original = getattr(thread_pool, kernel)
     pool, made = WorldThreadPool(len(SIZES), n_helpers), worlds()
     step(pool, made, commands(0))
