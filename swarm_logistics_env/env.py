@@ -172,6 +172,18 @@ class SwarmLogisticsEnv(DictView):
         """
         return self.outcome(self.warehouse.step(commands))
 
+    def is_uneventful(self, was_eventful: bool) -> bool:
+        """Return whether the step that the warehouse has just taken pays nobody and ends nothing.
+
+        `outcome` gives zeros then and need not be asked.
+
+        Args:
+            was_eventful: what `warehouse.stepping.step` returned.
+        """
+        world = self.warehouse
+        is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
+        return not (was_eventful or is_cut or world.is_over_time or self._rewards.pays_steadily)
+
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
         """Return what `step_arrays` does of the step that the warehouse has just taken."""
         world, was_present = self.warehouse, self._present

@@ -91,7 +91,7 @@ class WorldThreadPool:
         firsts: Sequence[int],
         commands: NDArray[np.float64],
         rows: NDArray[np.float32],
-        arrived: Callable[[int, NDArray[np.float32]], None],
+        arrived: Callable[[int, NDArray[np.float32], bool], None],
     ) -> None:
         """Take one control period in every world.
 
@@ -101,7 +101,8 @@ class WorldThreadPool:
             commands: (R, C) of all; the worlds keep them for their pickles.
             rows: (R, D) for the observations of all.
             arrived: called with the place of each world, in their order and in the caller's
-                thread, and its observations, a part of `rows`, while others may be under way.
+                thread, its observations, a part of `rows`, and whether the step was eventful (see
+                `stepping.step`), while others may be under way.
 
         Raises:
             CommandError: a robot's command is not finite; its world is as it was.
@@ -129,7 +130,7 @@ class WorldThreadPool:
                 n_finished = finished_from(self._address, place, 1)
                 while place < n_finished:
                     place += 1
-                    arrived(place - 1, self._take(place - 1, worlds, firsts, commands, rows))
+                    arrived(place - 1, *self._take(place - 1, worlds, firsts, commands, rows))
         finally:
             if place < len(worlds):
                 finish(self._address)
@@ -145,12 +146,12 @@ class WorldThreadPool:
         firsts: Sequence[int],
         commands: NDArray[np.float64],
         rows: NDArray[np.float32],
-    ) -> NDArray[np.float32]:
+    ) -> tuple[NDArray[np.float32], bool]:
         world, first = worlds[place], firsts[place]
         own = slice(first, first + world.scenario.n_robots)
-        sensed = rows[own]
-        world.take(commands[own], sensed, bool(self._is_eventful[place]))
-        return sensed
+        sensed, is_eventful = rows[own], bool(self._is_eventful[place])
+        world.take(commands[own], sensed, is_eventful)
+        return sensed, is_eventful
 
     def _wait_for(self, place: int) -> None:
         while finished_from(self._address, place, _PATIENCE) == place:
