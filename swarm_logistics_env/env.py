@@ -180,9 +180,11 @@ class SwarmLogisticsEnv(DictView):
         Args:
             was_eventful: what `warehouse.stepping.step` returned.
         """
+        if was_eventful or not self.agents or self._rewards.pays_steadily:
+            return False
         world = self.warehouse
         is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
-        return not (was_eventful or is_cut or world.is_over_time or self._rewards.pays_steadily)
+        return not (is_cut or world.is_over_time)
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
         """Return what `step_arrays` does of the step that the warehouse has just taken."""
