@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.logistics import is_remembered
-from swarm_logistics_env.warehouse.radio import ITEM_SEEN, ROBOT_SEEN, hears, is_missed
+from swarm_logistics_env.warehouse.radio import ITEM_SEEN, ROBOT_SEEN, is_missed
 from swarm_logistics_env.warehouse.rangers import Pose, in_frame
 from swarm_logistics_env.warehouse.structs import Nearby, World
 
@@ -77,32 +77,29 @@ def see_items(
 @inlined_kernel
 def choose_neighbours(me: int, world: World, step: int, n_found: int) -> int:
     """List in `nearby.chosen` the robots that `me` sees or hears; returns how many."""
-    robots, able, parameters = world.robots, world.able, world.parameters
-    nearby, grid = world.nearby, world.robot_grid
-    limit, dropout, n_chosen = view_square(able.view_range[me]), parameters.sensor_dropout, 0
+    robots, nearby, grid = world.robots, world.nearby, world.robot_grid
+    limit = view_square(world.able.view_range[me])
+    dropout, n_chosen = world.parameters.sensor_dropout, 0
     for index in range(n_found):
         other, square = grid.members[nearby.place[index]], nearby.square[index]
-        is_heard = hears(me, other, square, robots, able, parameters, step)
-        is_seen = square <= limit
+        is_heard, is_seen = nearby.is_heard[index], square <= limit
         if dropout > 0.0 and is_seen:
             is_seen = not is_missed(robots.sensor_key[me], other, step, ROBOT_SEEN, dropout)
         nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square
+        nearby.chosen_heard[n_chosen] = is_heard
         n_chosen += int(is_heard | is_seen)
     return n_chosen
 
 
 @inlined_kernel
-def tell_of_neighbours(
-    me: int, pose: Pose, world: World, step: int, n_chosen: int, out: NDArray[np.float32]
-) -> None:
+def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: NDArray[np.float32]) -> None:
     """Fill the blocks of neighbours and of their messages in a row from those chosen."""
-    robots, able, parameters = world.robots, world.able, world.parameters
+    robots, parameters = world.robots, world.parameters
     nearby, width = world.nearby, world.robots.message.shape[1]
     for place in range(rank_nearest(nearby, n_chosen, _N_NEIGHBOURS)):
         index = nearby.nearest[place]
-        other, square = nearby.chosen[index], nearby.chosen_square[index]
+        other, is_heard = nearby.chosen[index], nearby.chosen_heard[index]
         forward, left = in_frame(pose, robots.position[other, 0], robots.position[other, 1])
-        is_heard = hears(me, other, square, robots, able, parameters, step)
         tells = is_heard and not math.isnan(robots.told[other])
         column = _NEIGHBOURS + place * _NEIGHBOUR_WIDTH
         out[column] = 1.0

@@ -138,8 +138,10 @@ class Nearby(NamedTuple):
 
     place: Integers  # (n,) where it stands in `Grid.members`
     square: Numbers  # (n,) [m^2] of its distance
+    is_heard: Flags  # (n,) of robots, on the radio
     chosen: Integers  # (n,) numbers of robots or items that are seen or heard
     chosen_square: Numbers  # (n,) [m^2]
+    chosen_heard: Flags  # (n,) of robots, whether it is heard
     nearest: Integers  # (n,) indices into `chosen` of the nearest, nearest first
     scanned: Integers  # (n,) indices into `place` of what the rangers may meet
     forward: Numbers  # (n,) [m] of what is scanned, in the robot's frame
@@ -330,8 +332,10 @@ def blank_nearby(scenario: Scenario) -> Nearby:
     return Nearby(
         place=np.zeros(n, np.int64),
         square=np.zeros(n),
+        is_heard=np.zeros(n, np.bool_),
         chosen=np.zeros(n, np.int64),
         chosen_square=np.zeros(n),
+        chosen_heard=np.zeros(n, np.bool_),
         nearest=np.zeros(n, np.int64),
         scanned=np.zeros(n, np.int64),
         forward=np.zeros(n),
