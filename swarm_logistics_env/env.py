@@ -199,6 +199,20 @@ class SwarmLogisticsEnv(DictView):
             commands = as_array(commands, "commands")
         return self.outcome(self.warehouse.step(commands))
 
+    def is_uneventful(self, was_eventful: bool) -> bool:
+        """Return whether the step that the warehouse has just taken pays nobody and ends nothing.
+
+        `outcome` gives zeros then and need not be asked.
+
+        Args:
+            was_eventful: what `warehouse.stepping.step` returned.
+        """
+        if was_eventful or not self.agents or self._rewards.pays_steadily:
+            return False
+        world = self.warehouse
+        is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
+        return not (is_cut or world.is_over_time)
+
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
         """Return what `step_arrays` does of the step that the warehouse has just taken."""
         world, was_present = self.warehouse, self._present

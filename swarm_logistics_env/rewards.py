@@ -20,6 +20,9 @@ class RewardTerms:
     Args:
         weights: term -> weight; see `REWARD_TERMS` for the terms.
 
+    Attributes:
+        pays_steadily: whether a step without a delivery may pay.
+
     Raises:
         SetupError: no dict; a term is unknown or its weight is not a finite number.
     """
@@ -36,6 +39,7 @@ class RewardTerms:
             finite_number(f"rewards[{name!r}]", weight)
         self._terms = [(REWARD_TERMS[name], weight) for name, weight in self.weights.items()]
         self._follows_carrier = not _OF_CARRIER.isdisjoint(self.weights)
+        self.pays_steadily = not _AT_DELIVERIES.issuperset(self.weights)
 
     def begin(self, world: Warehouse) -> None:
         """Note how an episode starts."""
@@ -126,6 +130,7 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "approach": approach,
     "contact": contact,
 }
+_AT_DELIVERIES = {"delivery", "own_delivery"}
 _OF_CARRIER = {"lift_requested", "approach"}
 
 

@@ -21,7 +21,7 @@ _HELD_BY_NOBODY = _references([np.empty(0, np.float32)], 0)
 
 
 class Buffers:
-    """Hands out arrays of zeros, an old one as soon as nobody holds it or a part of it.
+    """Hands out arrays, an old one as soon as nobody holds it or a part of it.
 
     New memory of this size comes from the system page by page and goes back at once, which with
     two threads costs as much as stepping a world.
@@ -35,12 +35,16 @@ class Buffers:
         self._kept: list[NDArray[np.float32]] = []
 
     def zeros(self) -> NDArray[np.float32]:
-        """Return an array of the caller's own."""
+        """Return an array of zeros of the caller's own."""
+        array = self.used()
+        array.fill(0.0)
+        return array
+
+    def used(self) -> NDArray[np.float32]:
+        """Return an array of the caller's own, that holds what it held before."""
         for place in range(len(self._kept)):
             if _references(self._kept, place) == _HELD_BY_NOBODY:
-                array = self._kept[place]
-                array.fill(0.0)
-                return array
+                return self._kept[place]
         new = np.zeros(self._shape, np.float32)
         self._kept = [*self._kept[1 - _MOST_KEPT :], new]
         return new

@@ -128,7 +128,7 @@ class Worlds:
         """Take one control period in every world, with `checked` commands (R, 4)."""
         # Memory of the caller's own: what was handed out stays as it was.
         outcome = RowsStep(
-            self.blank(),
+            self.blank() if self._has_padding() else self._buffers.used(),
             np.zeros(self.n_rows, np.float32),
             np.zeros(self.n_rows, np.bool_),
             np.zeros(self.n_rows, np.bool_),
@@ -159,9 +159,11 @@ class Worlds:
         # The worlds keep what they sensed, whatever the wrappers make of it.
         changed: dict[int, NDArray[np.float32]] = {}
 
-        def arrived(place: int, sensed: NDArray[np.float32]) -> None:
+        def arrived(place: int, sensed: NDArray[np.float32], is_eventful: bool) -> None:
             world = self._shared_out[place]
             *wrappers, core = self._layers[world]
+            if not wrappers and core.is_uneventful(is_eventful):
+                return  # everything else is zeros
             told = core.outcome(sensed)
             for wrapper in reversed(wrappers):
                 told = wrapper.after_step(told)
@@ -182,6 +184,10 @@ class Worlds:
         outcome.rewards[robots] = rewards
         outcome.terminated[robots], outcome.truncated[robots] = terminated, truncated
         self.is_over[world] = not self.envs[world].agents
+
+    def _has_padding(self) -> bool:
+        """Return whether there are rows that no world fills in a step."""
+        return bool(self._alone) or sum(self._n_robots) < self.n_rows
 
     def _robots(self, world: int) -> slice:
         first = self.rows[world].start

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.logistics import is_remembered
-from swarm_logistics_env.warehouse.radio import ITEM_SEEN, ROBOT_SEEN, hears, is_missed
+from swarm_logistics_env.warehouse.radio import ITEM_SEEN, ROBOT_SEEN, is_missed
 from swarm_logistics_env.warehouse.rangers import Pose, in_frame
-from swarm_logistics_env.warehouse.structs import Integers, Numbers, World
+from swarm_logistics_env.warehouse.structs import Nearby, World
 
 _ITEM_WIDTH = len(row.ITEM_FEATURES)
 _NEIGHBOUR_WIDTH = len(row.NEIGHBOUR_FEATURES)
@@ -21,19 +21,23 @@ _ITEMS, _NEIGHBOURS, _MESSAGES = row.ITEMS, row.NEIGHBOURS, row.MESSAGES
 
 
 @inlined_kernel
-def nearest_first(squares: Numbers, indices: Integers, count: int, wanted: int) -> int:
-    """Bring the `wanted` nearest of `count` things to the front, nearest first.
+def rank_nearest(nearby: Nearby, count: int, wanted: int) -> int:
+    """List in `nearby.nearest` the `wanted` nearest of `count` chosen things, nearest first.
+
+    Of two that are equally near the one that was chosen first is.
 
     Returns how many there are, at most `wanted`.
     """
-    for place in range(min(count, wanted)):
-        nearest, square = place, squares[place]
-        for index in range(place + 1, count):
-            # Both without a branch: which of them is nearer cannot be predicted.
-            nearest = index if squares[index] < square else nearest
-            square = squares[index] if squares[index] < square else square
-        squares[nearest], squares[place] = squares[place], square
-        indices[nearest], indices[place] = indices[place], indices[nearest]
+    squares = nearby.chosen_square
+    for one in range(count):
+        # Counted without a branch: a few vector instructions for all the others.
+        square, n_nearer = squares[one], 0
+        for other in range(one):
+            n_nearer += squares[other] <= square
+        for other in range(one + 1, count):
+            n_nearer += squares[other] < square
+        if n_nearer < wanted:
+            nearby.nearest[n_nearer] = one
     return min(count, wanted)
 
 
@@ -58,8 +62,8 @@ def see_items(
             is_seen = not is_missed(robots.sensor_key[me], item, step, ITEM_SEEN, dropout)
         nearby.chosen[n_seen], nearby.chosen_square[n_seen] = item, square
         n_seen += int(is_seen)
-    for place in range(nearest_first(nearby.chosen_square, nearby.chosen, n_seen, _N_ITEMS)):
-        item = nearby.chosen[place]
+    for place in range(rank_nearest(nearby, n_seen, _N_ITEMS)):
+        item = nearby.chosen[nearby.nearest[place]]
         position = world.items.position
         forward, left = in_frame(pose, position[item, 0], position[item, 1])
         column = _ITEMS + place * _ITEM_WIDTH
@@ -73,32 +77,29 @@ def see_items(
 @inlined_kernel
 def choose_neighbours(me: int, world: World, step: int, n_found: int) -> int:
     """List in `nearby.chosen` the robots that `me` sees or hears; returns how many."""
-    robots, able, parameters = world.robots, world.able, world.parameters
-    nearby, grid = world.nearby, world.robot_grid
-    limit, dropout, n_chosen = view_square(able.view_range[me]), parameters.sensor_dropout, 0
+    robots, nearby, grid = world.robots, world.nearby, world.robot_grid
+    limit = view_square(world.able.view_range[me])
+    dropout, n_chosen = world.parameters.sensor_dropout, 0
     for index in range(n_found):
         other, square = grid.members[nearby.place[index]], nearby.square[index]
-        is_heard = hears(me, other, square, robots, able, parameters, step)
-        is_seen = square <= limit
+        is_heard, is_seen = nearby.is_heard[index], square <= limit
         if dropout > 0.0 and is_seen:
             is_seen = not is_missed(robots.sensor_key[me], other, step, ROBOT_SEEN, dropout)
         nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square
+        nearby.chosen_heard[n_chosen] = is_heard
         n_chosen += int(is_heard | is_seen)
     return n_chosen
 
 
 @inlined_kernel
-def tell_of_neighbours(
-    me: int, pose: Pose, world: World, step: int, n_chosen: int, out: NDArray[np.float32]
-) -> None:
+def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: NDArray[np.float32]) -> None:
     """Fill the blocks of neighbours and of their messages in a row from those chosen."""
-    robots, able, parameters = world.robots, world.able, world.parameters
+    robots, parameters = world.robots, world.parameters
     nearby, width = world.nearby, world.robots.message.shape[1]
-    n_told = nearest_first(nearby.chosen_square, nearby.chosen, n_chosen, _N_NEIGHBOURS)
-    for place in range(n_told):
-        other, square = nearby.chosen[place], nearby.chosen_square[place]
+    for place in range(rank_nearest(nearby, n_chosen, _N_NEIGHBOURS)):
+        index = nearby.nearest[place]
+        other, is_heard = nearby.chosen[index], nearby.chosen_heard[index]
         forward, left = in_frame(pose, robots.position[other, 0], robots.position[other, 1])
-        is_heard = hears(me, other, square, robots, able, parameters, step)
         tells = is_heard and not math.isnan(robots.told[other])
         column = _NEIGHBOURS + place * _NEIGHBOUR_WIDTH
         out[column] = 1.0

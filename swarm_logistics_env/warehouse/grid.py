@@ -29,6 +29,10 @@ def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:
     )
 
 
+# Of so few points all are looked at: one run is faster than several.
+_FEW = 80
+
+
 @inlined_kernel
 def cell_along(coordinate: float, cell: float, n_cells: int) -> int:
     """Return the index of the cell that holds `coordinate`; outside counts as the edge."""
@@ -55,17 +59,37 @@ def run_of(grid: Grid, row: int, left: int, right: int) -> tuple[int, int]:
 @inlined_kernel
 def look_around(grid: Grid, x: float, y: float, reach: float, left_out: int, nearby: Nearby) -> int:
     """List in `nearby` the points within `reach` [m] of (x, y), but for `left_out`; how many."""
-    n_found, limit = 0, reach * reach
+    if grid.start[-1] <= _FEW:
+        return look_through(grid, (0, grid.start[-1]), (x, y), reach, left_out, nearby, 0)
+    n_found = 0
     left, right, bottom, top = cells_around(grid, x, y, reach)
     for row in range(bottom, top + 1):
-        first, end = run_of(grid, row, left, right)
-        for place in range(first, end):
-            dx, dy = grid.places[place, 0] - x, grid.places[place, 1] - y
-            square = dx * dx + dy * dy
-            # Written always and counted only if near: no branch to mispredict.
-            nearby.place[n_found] = place
-            nearby.square[n_found] = square
-            n_found += int((square <= limit) & (grid.members[place] != left_out))
+        run = run_of(grid, row, left, right)
+        n_found = look_through(grid, run, (x, y), reach, left_out, nearby, n_found)
+    return n_found
+
+
+@inlined_kernel
+def look_through(
+    grid: Grid,
+    run: tuple[int, int],
+    centre: tuple[float, float],
+    reach: float,
+    left_out: int,
+    nearby: Nearby,
+    n_found: int,
+) -> int:
+    """Append to `nearby`, which lists `n_found`, those of a run of points that `look_around` wants.
+
+    Returns how many are listed then.
+    """
+    for place in range(run[0], run[1]):
+        dx, dy = grid.places[place, 0] - centre[0], grid.places[place, 1] - centre[1]
+        square = dx * dx + dy * dy
+        # Written always and counted only if near: no branch to mispredict.
+        nearby.place[n_found] = place
+        nearby.square[n_found] = square
+        n_found += int((square <= reach * reach) & (grid.members[place] != left_out))
     return n_found
 
 

@@ -5,7 +5,8 @@ Each array handed to a kernel costs as much time as a robot's timers; a control 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import functools
+from collections.abc import Callable
 from typing import Any, TypeVar, cast, get_args, get_type_hints
 
 import numpy as np
@@ -20,6 +21,7 @@ S = TypeVar("S", bound=tuple[Any, ...])
 _WORD = ir.IntType(64)
 
 
+@functools.cache
 def field_kinds(structure: type) -> dict[str, Any]:
     """Return by field `float`, `int`, `bool`, a structure, or (dtype, dimensions) of an array."""
     kinds: dict[str, Any] = {}
@@ -39,22 +41,25 @@ def packed(value: tuple[Any, ...]) -> NDArray[np.int64]:
     Raises:
         TypeError: an array is not what its structure says; compiled code would read beyond it.
     """
-    return np.array(list(_words(value)), np.int64)
+    words: list[int] = []
+    _append_words(value, words)
+    return np.array(words, np.int64)
 
 
-def _words(value: tuple[Any, ...]) -> Iterator[int]:
+def _append_words(value: tuple[Any, ...], words: list[int]) -> None:
     for (name, kind), part in zip(field_kinds(type(value)).items(), value, strict=True):
         if isinstance(kind, tuple):
-            dtype, n_dimensions = kind
-            if (part.dtype, part.ndim) != (dtype, n_dimensions) or not part.flags.carray:
-                raise TypeError(f"{type(value).__name__}.{name}: no {n_dimensions}-d {dtype} array")
-            yield from (part.ctypes.data, *part.shape)
+            if (part.dtype, part.ndim) != kind or not part.flags.carray:
+                what = f"{type(value).__name__}.{name}"
+                raise TypeError(f"{what}: should be a {kind[1]}-d array of {kind[0]}, without gaps")
+            words.append(part.__array_interface__["data"][0])  # faster than part.ctypes
+            words += part.shape
         elif kind is float:
-            yield int(np.float64(part).view(np.int64))
+            words.append(int(np.float64(part).view(np.int64)))
         elif kind in (int, bool):
-            yield int(part)
+            words.append(int(part))
         else:
-            yield from _words(part)
+            _append_words(part, words)
 
 
 @cast("Callable[..., Callable[[type[S], int], S]]", intrinsic)

@@ -16,6 +16,7 @@ from swarm_logistics_env.warehouse.structs import (
     NumberRows,
     Parameters,
     Robots,
+    World,
 )
 
 # Purposes of the streams between a robot and another thing: numbers of one step.
@@ -78,34 +79,23 @@ def run_timers(robots: Robots, able: Capabilities, parameters: Parameters, step:
 
 
 @inlined_kernel
-def hears(
-    me: int,
-    other: int,
-    square: float,
-    robots: Robots,
-    able: Capabilities,
-    parameters: Parameters,
-    step: int,
-) -> bool:
-    """Return whether `me` hears `other`, at a distance of which `square` [m^2] is the square."""
-    is_in_range = square <= parameters.radio_range**2
-    is_heard = is_in_range & able.sends[other] & able.hears[me]
-    loss = parameters.radio_loss
-    return is_heard and not is_missed(robots.sensor_key[me], other, step, RADIO, loss)
+def listen(me: int, world: World, step: int, n_found: int) -> None:
+    """Note in `nearby.is_heard` which of the robots found nearby `me` hears."""
+    robots, able, nearby = world.robots, world.able, world.nearby
+    limit, loss = world.parameters.radio_range**2, world.parameters.radio_loss
+    for index in range(n_found):
+        other = world.robot_grid.members[nearby.place[index]]
+        is_heard = (nearby.square[index] <= limit) & able.sends[other] & able.hears[me]
+        if loss > 0.0 and is_heard:
+            is_heard = not is_missed(robots.sensor_key[me], other, step, RADIO, loss)
+        nearby.is_heard[index] = is_heard
 
 
 @inlined_kernel
 def lowest_timer_heard(
-    me: int,
-    robots: Robots,
-    able: Capabilities,
-    parameters: Parameters,
-    step: int,
-    grid: Grid,
-    nearby: Nearby,
-    n_found: int,
+    robots: Robots, grid: Grid, nearby: Nearby, n_found: int
 ) -> tuple[int, float]:
-    """Return who of those nearby tells the lowest timer that `me` hears, or NOBODY, and it [s].
+    """Return who tells the lowest timer of those nearby that are heard, or NOBODY, and it [s].
 
     Of several that tell the same it is the nearest.
     """
@@ -115,7 +105,7 @@ def lowest_timer_heard(
         other, square = grid.members[nearby.place[index]], nearby.square[index]
         told = robots.told[other]
         is_lower = (told < lowest_timer) | ((told == lowest_timer) & (square < lowest_square))
-        is_lower &= hears(me, other, square, robots, able, parameters, step)
+        is_lower &= nearby.is_heard[index]
         lowest = other if is_lower else lowest
         lowest_square = square if is_lower else lowest_square
         lowest_timer = told if is_lower else lowest_timer

@@ -142,7 +142,34 @@ def scan_discs(
     for index in range(n_found):
         nearby.scanned[n_scanned] = index
         n_scanned += int(nearby.square[index] < limit)
-    for index in nearby.scanned[:n_scanned]:
-        place, square = nearby.place[index], nearby.square[index]
-        forward, left = in_frame(pose, grid.places[place, 0], grid.places[place, 1])
-        scan_disc(forward, left, square, radius, scan)
+    for number in range(n_scanned):
+        index = nearby.scanned[number]
+        place = nearby.place[index]
+        nearby.forward[number], nearby.left[number] = in_frame(
+            pose, grid.places[place, 0], grid.places[place, 1]
+        )
+        nearby.scanned_square[number] = nearby.square[index]
+    meet_middle_beams(nearby, n_scanned, radius)
+    for number in range(n_scanned):
+        square = nearby.scanned_square[number]
+        if square > _ONE_BEAM * radius * radius:
+            beam, distance = nearby.beam[number], nearby.distance[number]
+            scan[beam] = distance if distance < scan[beam] else scan[beam]
+        else:
+            scan_disc(nearby.forward[number], nearby.left[number], square, radius, scan)
+
+
+@inlined_kernel
+def meet_middle_beams(nearby: Nearby, n_scanned: int, radius: float) -> None:
+    """Fill the beams nearest to the centres of discs, and where these meet them [m].
+
+    Infinitely far where they do not. Without branches: several discs are one vector instruction.
+    """
+    for number in range(n_scanned):
+        forward, left = nearby.forward[number], nearby.left[number]
+        beam = nearest_beam(forward, left)
+        along = forward * _BEAM_X[beam] + left * _BEAM_Y[beam]
+        inside = along * along - (nearby.scanned_square[number] - radius * radius)
+        distance = along - math.sqrt(max(inside, 0.0))
+        nearby.beam[number] = beam
+        nearby.distance[number] = distance if inside > 0.0 else math.inf

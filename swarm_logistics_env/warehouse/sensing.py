@@ -20,7 +20,7 @@ from swarm_logistics_env.warehouse.cameras import (
 )
 from swarm_logistics_env.warehouse.grid import look_around
 from swarm_logistics_env.warehouse.own_state import feel_itself
-from swarm_logistics_env.warehouse.radio import lowest_timer_heard
+from swarm_logistics_env.warehouse.radio import listen, lowest_timer_heard
 from swarm_logistics_env.warehouse.rangers import Pose
 from swarm_logistics_env.warehouse.structs import NOBODY, World
 
@@ -80,7 +80,8 @@ def sense_robots(me: int, pose: Pose, world: World, step: int, out: NDArray[np.f
     if ranger_range > 0.0:
         scan = out[_ROBOTS : _ROBOTS + _N_BEAMS]
         rangers.scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
-    lowest, timer = lowest_timer_heard(me, robots, able, parameters, step, grid, nearby, n_found)
+    listen(me, world, step, n_found)
+    lowest, timer = lowest_timer_heard(robots, grid, nearby, n_found)
     if lowest != NOBODY:
         robots.heard[me] = timer
         forward, left = rangers.in_frame(
@@ -91,7 +92,7 @@ def sense_robots(me: int, pose: Pose, world: World, step: int, out: NDArray[np.f
         out[_LOWEST + 2] = left
         out[_LOWEST + 3] = timer
     n_chosen = choose_neighbours(me, world, step, n_found)
-    tell_of_neighbours(me, pose, world, step, n_chosen, out)
+    tell_of_neighbours(pose, world, n_chosen, out)
     return is_anchored
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from swarm_logistics_env.warehouse.structs import (
     DELIVERED,
     NOBODY,
     STORED,
+    Progress,
     blank_capabilities,
     blank_items,
     blank_progress,
@@ -51,16 +52,18 @@ class Count(Generic[V]):
 
     def __set_name__(self, owner: type[WarehouseState], name: str) -> None:
         """Take the attribute's name."""
-        self.name = name
+        self.place = Progress._fields.index(name)
 
     def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> V:
         """Return the number."""
-        number: V = getattr(state.progress, self.name).item()
+        numbers: NDArray[Any] = state.progress[self.place]
+        number: V = numbers.item()
         return number
 
     def __set__(self, state: WarehouseState, value: V) -> None:
         """Set the number."""
-        getattr(state.progress, self.name)[0] = value
+        numbers: NDArray[Any] = state.progress[self.place]
+        numbers[0] = value
 
 
 class WarehouseState:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +27,27 @@ from swarm_logistics_env.warehouse.structs import (
     NOBODY,
     STORED,
     NumberRows,
+    Outcome,
     World,
 )
 
 
 class StepResult(NamedTuple):
-    """What a control step has to tell beside the state."""
+    """What a control step has to tell beside the state: the fields of `Outcome`."""
 
-    refused: int  # place, row by row, of the command that is not finite; NOBODY: step taken
-    n_delivered: int  # deliveries in this step, by `Claims.delivered_by`
-    is_paused: bool  # nothing was sensed yet, as faults begin or end now: `perceive` does it
-    is_room: bool  # whether all items that came back to the storage found room
+    refused: int
+    n_delivered: int
+    is_paused: bool
+    is_room: bool
+
+
+UNEVENTFUL = StepResult(refused=NOBODY, n_delivered=0, is_paused=False, is_room=True)
+
+
+def result_of(outcome: Outcome) -> StepResult:
+    """Return what the last step has to tell."""
+    told: Any = (part.item() for part in outcome)
+    return StepResult(*told)
 
 
 @kernel
@@ -56,16 +66,19 @@ def perceive(address: int, rows: NDArray[np.float32]) -> None:
 
 
 @kernel
-def step(address: int, commands: NumberRows, rows: NDArray[np.float32]) -> StepResult:
+def step(address: int, commands: NumberRows, rows: NDArray[np.float32]) -> bool:
     """Take a control step in the world at `address` and fill the observation rows (N, D).
 
     If a command is refused, the world is as it was.
+
+    Returns whether its `Outcome` was eventful: something to tell takes time to be told.
     """
     world = unpacked_at(World, address)
-    progress, parameters = world.progress, world.parameters
+    progress, outcome, parameters = world.progress, world.outcome, world.parameters
     refused = refused_command(commands, world.robots, world.able)
+    outcome.refused[0] = refused
     if refused != NOBODY:
-        return StepResult(refused, 0, False, True)
+        return True
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * parameters.control_period
     move(world, commands)
@@ -74,7 +87,10 @@ def step(address: int, commands: NumberRows, rows: NDArray[np.float32]) -> StepR
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:
         perceive(address, rows)
-    return StepResult(NOBODY, n_delivered, is_paused, is_room)
+    outcome.n_delivered[0] = n_delivered
+    outcome.is_paused[0] = is_paused
+    outcome.is_room[0] = is_room
+    return n_delivered > 0 or is_paused or not is_room
 
 
 @inlined_kernel

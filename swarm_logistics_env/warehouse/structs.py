@@ -138,9 +138,17 @@ class Nearby(NamedTuple):
 
     place: Integers  # (n,) where it stands in `Grid.members`
     square: Numbers  # (n,) [m^2] of its distance
+    is_heard: Flags  # (n,) of robots, on the radio
     chosen: Integers  # (n,) numbers of robots or items that are seen or heard
     chosen_square: Numbers  # (n,) [m^2]
+    chosen_heard: Flags  # (n,) of robots, whether it is heard
+    nearest: Integers  # (n,) indices into `chosen` of the nearest, nearest first
     scanned: Integers  # (n,) indices into `place` of what the rangers may meet
+    forward: Numbers  # (n,) [m] of what is scanned, in the robot's frame
+    left: Numbers  # (n,) [m]
+    scanned_square: Numbers  # (n,) [m^2]
+    beam: Integers  # (n,) that looks nearest to its centre
+    distance: Numbers  # (n,) [m] where that beam meets it, infinite if it does not
 
 
 class Claims(NamedTuple):
@@ -202,6 +210,15 @@ class Engine(NamedTuple):
     wanted_velocity: NumberRows  # (N, 2) [m/s] what the drives aim at
 
 
+class Outcome(NamedTuple):
+    """What the last step has to tell beside the state; each an array of one."""
+
+    refused: Integers  # place, row by row, of the command that is not finite; NOBODY: step taken
+    n_delivered: Integers  # deliveries in this step, by `Claims.delivered_by`
+    is_paused: Flags  # nothing was sensed yet, as faults begin or end now
+    is_room: Flags  # all items that came back to the storage found room
+
+
 class World(NamedTuple):
     """Everything that a step reads and writes."""
 
@@ -211,6 +228,7 @@ class World(NamedTuple):
     items: Items
     obstacles: NumberRows  # (n_obstacles, 2) [m]
     progress: Progress
+    outcome: Outcome
     robot_grid: Grid
     item_grid: Grid
     nearby: Nearby
@@ -298,15 +316,33 @@ def blank_progress() -> Progress:
     )
 
 
+def blank_outcome() -> Outcome:
+    """Return what an uneventful step tells."""
+    return Outcome(
+        refused=np.full(1, NOBODY),
+        n_delivered=np.zeros(1, np.int64),
+        is_paused=np.zeros(1, np.bool_),
+        is_room=np.ones(1, np.bool_),
+    )
+
+
 def blank_nearby(scenario: Scenario) -> Nearby:
     """Return working space for as many things as there may be near a robot."""
     n = max(scenario.n_robots, scenario.n_items) + 1
     return Nearby(
         place=np.zeros(n, np.int64),
         square=np.zeros(n),
+        is_heard=np.zeros(n, np.bool_),
         chosen=np.zeros(n, np.int64),
         chosen_square=np.zeros(n),
+        chosen_heard=np.zeros(n, np.bool_),
+        nearest=np.zeros(n, np.int64),
         scanned=np.zeros(n, np.int64),
+        forward=np.zeros(n),
+        left=np.zeros(n),
+        scanned_square=np.zeros(n),
+        beam=np.zeros(n, np.int64),
+        distance=np.zeros(n),
     )
 
 

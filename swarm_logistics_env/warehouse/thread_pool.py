@@ -25,7 +25,6 @@ from swarm_logistics_env.kernels import inlined_kernel, kernel
 from swarm_logistics_env.warehouse import stepping
 from swarm_logistics_env.warehouse.atomic import add, exchange, load, replace
 from swarm_logistics_env.warehouse.native import pointer_at
-from swarm_logistics_env.warehouse.stepping import StepResult
 from swarm_logistics_env.warehouse.warehouse import Warehouse
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
@@ -34,9 +33,11 @@ _WORD = 8  # bytes
 # Words of the queue. Jobs are taken and given in turn, counted without end, so that a helper who
 # comes late finds nothing to take rather than something that is not ready.
 TAKEN, GIVEN, ASLEEP, IS_CLOSED, N_JOBS, FIRST_JOB = range(6)
-# Words of a job, one per world, behind them; the result's are the last.
-WORLD, N_ROBOTS, COMMANDS, COMMAND_COLUMNS, ROWS, ROW_COLUMNS, IS_DONE, RESULT = range(8)
-_JOB_LENGTH = RESULT + len(StepResult._fields)
+# Words of a job, one per world, behind them.
+(
+    WORLD, N_ROBOTS, COMMANDS, COMMAND_COLUMNS, ROWS, ROW_COLUMNS, IS_DONE, IS_EVENTFUL,
+    JOB_LENGTH,
+) = range(9)  # fmt: skip
 # How often a helper looks for work before it goes to sleep: 0.3 ms, what ten wakings take.
 _PATIENCE = 400_000
 
@@ -63,10 +64,10 @@ class WorldThreadPool:
 
     def _start(self) -> None:
         self._process = os.getpid()
-        self._queue = queue = np.zeros(FIRST_JOB + self._n_worlds * _JOB_LENGTH, np.int64)
+        self._queue = queue = np.zeros(FIRST_JOB + self._n_worlds * JOB_LENGTH, np.int64)
         queue[N_JOBS] = self._n_worlds
-        jobs = queue[FIRST_JOB:].reshape(-1, _JOB_LENGTH)
-        jobs[:, IS_DONE], self._results = 1, jobs[:, RESULT:]
+        jobs = queue[FIRST_JOB:].reshape(-1, JOB_LENGTH)
+        jobs[:, IS_DONE], self._is_eventful = 1, jobs[:, IS_EVENTFUL]
         self._address: int = queue.ctypes.data
         # Not a semaphore, whose lock another thread may hold at a fork or when a finalizer comes.
         self._wake: SimpleQueue[None] = SimpleQueue()
@@ -90,7 +91,7 @@ class WorldThreadPool:
         firsts: Sequence[int],
         commands: NDArray[np.float64],
         rows: NDArray[np.float32],
-        arrived: Callable[[int, NDArray[np.float32]], None],
+        arrived: Callable[[int, NDArray[np.float32], bool], None],
     ) -> None:
         """Take one control period in every world.
 
@@ -100,7 +101,8 @@ class WorldThreadPool:
             commands: (R, C) of all; the worlds keep them for their pickles.
             rows: (R, D) for the observations of all.
             arrived: called with the place of each world, in their order and in the caller's
-                thread, and its observations, a part of `rows`, while others may be under way.
+                thread, its observations, a part of `rows`, and whether the step was eventful (see
+                `stepping.step`), while others may be under way.
 
         Raises:
             CommandError: a robot's command is not finite; its world is as it was.
@@ -108,7 +110,7 @@ class WorldThreadPool:
             SetupError: a world was never reset.
         """
         jobs = [
-            (world.address, first, world.state.n_robots) for world, first in zip(worlds, firsts)
+            (world.address, first, world.scenario.n_robots) for world, first in zip(worlds, firsts)
         ]
         if self._process != os.getpid():
             self._start()
@@ -118,15 +120,17 @@ class WorldThreadPool:
             submit(self._address, np.array(jobs, np.int64), commands, rows)
             for _ in range(take_sleepers(self._address)):
                 self._wake.put(None)
+            if self._n_helpers == 0:
+                run_jobs(self._address)
             while place < len(worlds):
                 # Not more than one at a time: what helpers have done meanwhile can be seen to
                 # while they go on.
-                if not run_next_job(self._address):
+                if self._n_helpers > 0 and not run_next_job(self._address):
                     self._wait_for(place)
                 n_finished = finished_from(self._address, place, 1)
                 while place < n_finished:
                     place += 1
-                    arrived(place - 1, self._take(place - 1, worlds, firsts, commands, rows))
+                    arrived(place - 1, *self._take(place - 1, worlds, firsts, commands, rows))
         finally:
             if place < len(worlds):
                 finish(self._address)
@@ -142,12 +146,12 @@ class WorldThreadPool:
         firsts: Sequence[int],
         commands: NDArray[np.float64],
         rows: NDArray[np.float32],
-    ) -> NDArray[np.float32]:
-        world, result = worlds[place], StepResult(*self._results[place].tolist())
-        own = slice(firsts[place], firsts[place] + world.state.n_robots)
-        sensed = rows[own]
-        world.take(commands[own], sensed, result)
-        return sensed
+    ) -> tuple[NDArray[np.float32], bool]:
+        world, first = worlds[place], firsts[place]
+        own = slice(first, first + world.scenario.n_robots)
+        sensed, is_eventful = rows[own], bool(self._is_eventful[place])
+        world.take(commands[own], sensed, is_eventful)
+        return sensed, is_eventful
 
     def _wait_for(self, place: int) -> None:
         while finished_from(self._address, place, _PATIENCE) == place:
@@ -168,7 +172,7 @@ def _close(queue: NDArray[np.int64], wake: SimpleQueue[None], n_helpers: int) ->
 @inlined_kernel
 def job_at(queue: int, place: int) -> int:
     """Return the address of a job."""
-    return queue + _WORD * (FIRST_JOB + place * _JOB_LENGTH)
+    return queue + _WORD * (FIRST_JOB + place * JOB_LENGTH)
 
 
 @kernel
@@ -225,11 +229,8 @@ def run_next_job(queue: int) -> bool:
     shape = (n_robots, load(job + _WORD * ROW_COLUMNS))
     commands = carray(pointer_at(load(job + _WORD * COMMANDS)), (n_robots, n_columns), np.float64)
     rows = carray(pointer_at(load(job + _WORD * ROWS)), shape, np.float32)
-    result = stepping.step(load(job + _WORD * WORLD), commands, rows)
-    exchange(job + _WORD * RESULT, result.refused)
-    exchange(job + _WORD * (RESULT + 1), result.n_delivered)
-    exchange(job + _WORD * (RESULT + 2), int(result.is_paused))
-    exchange(job + _WORD * (RESULT + 3), int(result.is_room))
+    is_eventful = stepping.step(load(job + _WORD * WORLD), commands, rows)
+    exchange(job + _WORD * IS_EVENTFUL, int(is_eventful))
     exchange(job + _WORD * IS_DONE, 1)
     return True
 

@@ -20,11 +20,12 @@ from swarm_logistics_env.warehouse.grid import blank_grid
 from swarm_logistics_env.warehouse.packing import packed
 from swarm_logistics_env.warehouse.physics import Physics
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
-from swarm_logistics_env.warehouse.stepping import StepResult
+from swarm_logistics_env.warehouse.stepping import UNEVENTFUL, result_of
 from swarm_logistics_env.warehouse.structs import (
     World,
     blank_claims,
     blank_nearby,
+    blank_outcome,
     parameters_of,
 )
 
@@ -127,14 +128,20 @@ class Warehouse:
         return rows
 
     def take(
-        self, commands: NDArray[np.float64], rows: NDArray[np.float32], result: StepResult
+        self, commands: NDArray[np.float64], rows: NDArray[np.float32], is_eventful: bool
     ) -> None:
         """Take over a step that compiled code took: what became of `commands` and `rows`.
+
+        Args:
+            commands: (N, C), kept for pickles.
+            rows: (N, D) what was sensed.
+            is_eventful: whether the world has more to tell, as `stepping.step` returned.
 
         Raises:
             CommandError: a robot's command is not finite; the world is as it was.
             ScenarioError: an item that came back to the storage found no room.
         """
+        result = result_of(self._world.outcome) if is_eventful else UNEVENTFUL
         if result.refused != NOBODY:
             robot, column = divmod(result.refused, commands.shape[1])
             raise CommandError(
@@ -257,9 +264,11 @@ class Warehouse:
         scenario = self.scenario
         n, n_items = scenario.n_robots, scenario.n_items
         width, height = scenario.warehouse_width, scenario.warehouse_height
-        cell = (scenario.ranger_range + scenario.robot_radius) / 2
-        self._robot_grid = blank_grid(width, height, cell, n)
-        self._item_grid = blank_grid(width, height, cell, n_items)
+        sees = max(scenario.ranger_range + scenario.robot_radius, scenario.view_range)
+        hears = max(sees, scenario.radio_range)
+        # Of half the side that robots look around in: few rows of cells, and few in vain.
+        self._robot_grid = blank_grid(width, height, hears / 2, n)
+        self._item_grid = blank_grid(width, height, sees / 2, n_items)
         self._command_shape = (n, len(COMMAND_COLUMNS) + scenario.message_size)
         self._row_shape = (n, n_columns(scenario))
         size = math.prod(self._command_shape)
@@ -349,6 +358,7 @@ class Warehouse:
             items=state.items,
             obstacles=state.obstacle_position,
             progress=state.progress,
+            outcome=blank_outcome(),
             robot_grid=self._robot_grid,
             item_grid=self._item_grid,
             nearby=blank_nearby(scenario),

@@ -66,7 +66,7 @@ def test_every_kind_of_field_is_read_and_arrays_are_written() -> None:
 )
 def test_an_array_that_is_not_as_declared_is_refused(rows: Any) -> None:
     outer = Outer(0.0, False, rows, Inner(0, np.zeros(1, np.uint64)), np.zeros(1, np.bool_))
-    with pytest.raises(TypeError, match=r"Outer\.rows"):
+    with pytest.raises(TypeError, match=r"Outer\.rows: should be a 2-d array of float64"):
         packed(outer)
 
 
