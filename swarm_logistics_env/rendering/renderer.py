@@ -122,11 +122,8 @@ class Renderer:
         return functools.partial(Renderer, **self._arguments), ()
 
 
-def load_pygame(instead: str = "") -> None:
+def load_pygame() -> None:
     """Import pygame, without the greeting that it prints.
-
-    Args:
-        instead: ends the error's sentence with what else one could do.
 
     Raises:
         SetupError: it is not installed.
@@ -140,5 +137,5 @@ def load_pygame(instead: str = "") -> None:
                 importlib.import_module(module)
     except ImportError as error:
         raise SetupError(
-            f"rendering needs pygame ({error}): pip install 'swarm-logistics-env[render]'{instead}"
+            f"rendering needs pygame ({error}): pip install 'swarm-logistics-env[render]'"
         ) from error

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.watch.keys import press
 from swarm_logistics_env.watch.session import Session
+from swarm_logistics_env.watch.web.keys import press
 
 
 class _Order(BaseModel):

@@ -225,7 +225,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         status = HTTPStatus(code)
         text = status.phrase
         if status == HTTPStatus.FORBIDDEN:
-            text = "Open the address that swarm-logistics watch --web printed, on its machine."
+            text = "Open the address that swarm-logistics watch printed, on its machine."
         # Even what is no request at all gets an answer.
         self.command = getattr(self, "command", None) or "GET"
         self.request_version = "HTTP/1.1"

@@ -1,4 +1,4 @@
-"""The keys, the same in the window and in the browser."""
+"""The keys of the page in the browser."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from swarm_logistics_env.watch.session import WIDTH_STEP, Session
 class Key:
     """A key, by the name that browsers have for it, what it means, and what it does.
 
-    `act` None: the view itself does it, by the key's `name`.
+    `act` is None if the page itself does it, by the key's `name`.
     """
 
     name: str
@@ -35,7 +35,7 @@ def _wider(metres: float) -> Callable[[Session], None]:
     return lambda session: session.set_delivery_width(session.scenario.delivery_width + metres)
 
 
-HELP, QUIT, TRAILS, LINKS = "h", "q", "t", "l"
+HELP, TRAILS, LINKS = "h", "t", "l"
 
 KEYS: tuple[Key, ...] = (
     Key(" ", "pause, or go on", lambda session: session.pause()),
@@ -58,7 +58,6 @@ KEYS: tuple[Key, ...] = (
     Key(TRAILS, "trails", None),
     Key(LINKS, "links of all robots", None),
     Key(HELP, "this help", None),
-    Key(QUIT, "end", None),
 )
 MOUSE: tuple[tuple[str, str], ...] = (
     ("click", "select a robot: what it senses"),
