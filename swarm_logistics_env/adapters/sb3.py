@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.adapters.worlds import RowsStep, World, Worlds, checked_count, maker
+from swarm_logistics_env.environment.reset_options import checked_seed
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.reset_options import checked_seed
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 
@@ -73,7 +73,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         20
         >>> PPO("MlpPolicy", env, n_steps=32, seed=0).learn(640).num_timesteps
         640
-        >>> from swarm_logistics_env.env import SwarmLogisticsEnv
+        >>> from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
         >>> from swarm_logistics_env.wrappers import FaultInjection
         >>> def make_env(world):
         ...     return FaultInjection(SwarmLogisticsEnv(n_robots=5), "FM1", robots=world + 1)

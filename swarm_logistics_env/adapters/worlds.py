@@ -11,9 +11,9 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.adapters.buffers import Buffers
-from swarm_logistics_env.commands import as_array
-from swarm_logistics_env.dict_view import ArrayStep
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.commands import as_array
+from swarm_logistics_env.environment.dict_view import ArrayStep
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.crew import Crew

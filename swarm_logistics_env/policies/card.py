@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.policies.motion_frame import INPUTS, OUTPUTS
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
 from swarm_logistics_env.records import Record
 
 Width = Annotated[int, Field(ge=1, le=4096)]
@@ -28,8 +28,8 @@ class Network(_Part):
     """What a trained policy reads, computes and commands.
 
     Args:
-        inputs: what it reads, in this order: `motion_frame.INPUTS`.
-        outputs: what it says, in this order: `motion_frame.OUTPUTS`.
+        inputs: what it reads, in this order: `motion.INPUTS`.
+        outputs: what it says, in this order: `motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
         activation: between layers.

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.policies import robot_memory as known
-from swarm_logistics_env.policies.motion_frame import (
+from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion.frame import (
     RANDOM_HEADING_TIME,
     MotionFrame,
     random_heading,
@@ -106,7 +106,7 @@ def decide_homing(
     period: float,
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) from rows (N, D) and memories (N, robot_memory.N_COLUMNS).
+    """Fill the commands (N, 4) from rows (N, D) and memories (N, memory.N_COLUMNS).
 
     `random_headings` (N,) are the numbers of the random directions whose turn it is.
     """

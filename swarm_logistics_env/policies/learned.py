@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.motion.frame import MotionFrame
 from swarm_logistics_env.policies.card import Network, PolicyCard
 from swarm_logistics_env.policies.exploration import explore
-from swarm_logistics_env.policies.motion_frame import MotionFrame
 from swarm_logistics_env.policies.network import FeedForward
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys

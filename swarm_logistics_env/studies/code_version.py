@@ -13,7 +13,6 @@ SOURCES = (
     "streams.py",
     "kernels.py",
     "observations.py",
-    "hearing.py",
     "episode.py",
     "policies/policy.py",
     "warehouse",

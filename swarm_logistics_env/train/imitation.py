@@ -13,9 +13,9 @@ import torch
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.policies import robot_memory
+from swarm_logistics_env.motion import memory
+from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.policies.homing import homing_commands
-from swarm_logistics_env.policies.motion_frame import INPUTS
 from swarm_logistics_env.streams import generator, key
 from swarm_logistics_env.train.learner import actor_parameters, outputs_of
 from swarm_logistics_env.train.network_view import NetworkView
@@ -65,7 +65,7 @@ def _collected(
         rows = view.observations
         matters = rows[:, row.CARRYING_REQUESTED] > 0.5
         matters |= inputs[:, SEEN] > 0.5
-        matters |= view.frame.memory[:, robot_memory.STUCK] > 0.0
+        matters |= view.frame.memory[:, memory.STUCK] > 0.0
         kept = (matters | (rng.random(len(rows)) < asked.common_share)) & view.venv.present
         seen.append(inputs[kept])
         said.append(wanted[kept])

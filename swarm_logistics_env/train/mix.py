@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swarm_logistics_env.reset_options import faults_among, scenario_fields
+from swarm_logistics_env.environment.reset_options import faults_among, scenario_fields
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.wrappers import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class EpisodeMix(Wrapper):

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from swarm_logistics_env.adapters import SwarmVecEnv
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.policies.learned import STREAM
-from swarm_logistics_env.policies.motion_frame import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key, row_keys
 

@@ -7,9 +7,9 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
+from swarm_logistics_env.environment.rewards import RewardTerms
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.rewards import RewardTerms
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from swarm_logistics_env.adapters import SwarmVecEnv
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.train.mix import EpisodeMix
 from swarm_logistics_env.train.references import performances_of_study
 from swarm_logistics_env.train.specification import Training

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swarm_logistics_env.environment.reset_options import faults_among
 from swarm_logistics_env.errors import FaultError
-from swarm_logistics_env.reset_options import faults_among
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
@@ -17,7 +17,7 @@ from swarm_logistics_env.wrappers.drawing import Distribution
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
     from swarm_logistics_env.scenario import Scenario
 
 

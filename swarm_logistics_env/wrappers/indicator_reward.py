@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.dict_view import ArrayStep
+from swarm_logistics_env.environment.dict_view import ArrayStep
+from swarm_logistics_env.environment.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.wrappers.conditions import Condition, changes_of, condition_of
 from swarm_logistics_env.wrappers.indicator_payments import (
@@ -25,7 +25,7 @@ from swarm_logistics_env.wrappers.reference_performances import GivenPerformance
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 CREDITS = ("team", "deliverer", "carriers")
 

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from swarm_logistics_env.environment.reset_options import scenario_fields
 from swarm_logistics_env.errors import ScenarioError, suggest
-from swarm_logistics_env.reset_options import scenario_fields
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.wrappers.drawing import Drawn
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class ParameterChange(Wrapper):

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo.utils import BaseParallelWrapper
 
-from swarm_logistics_env.dict_view import ArrayStep, DictView
+from swarm_logistics_env.environment.dict_view import ArrayStep, DictView
+from swarm_logistics_env.environment.reset_options import checked_options, checked_seed
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.reset_options import checked_options, checked_seed
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
     from swarm_logistics_env.scenario import Scenario
 
 
@@ -37,7 +37,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         SetupError: it is something else, or a wrapper that has to be the outermost one.
 
     Example:
-        >>> from swarm_logistics_env.env import SwarmLogisticsEnv
+        >>> from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
         >>> env = Wrapper(SwarmLogisticsEnv(n_robots=2))
         >>> env.reset_arrays(seed=0).shape == env.unwrapped.reset_arrays(seed=0).shape
         True

@@ -14,7 +14,7 @@ import pytest
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_logistics_env import Fault, spi
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.wrappers import (
     Condition,

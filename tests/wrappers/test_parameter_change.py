@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import ScenarioError, SetupError
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.policies import robot_memory as known
+from swarm_logistics_env.motion import memory as known
 
 # Ranges in m, beside the pick-up range of 0.25: hold lifts the requested item first if in reach.
 _IN_REACH, _OUT_OF_REACH = 0.2, 0.28

@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
-from swarm_logistics_env.commands import gathered
+from swarm_logistics_env.environment.commands import gathered
 from swarm_logistics_env.errors import SetupError
 
 if TYPE_CHECKING:

@@ -10,11 +10,10 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.central_state import global_state
-from swarm_logistics_env.commands import as_array
-from swarm_logistics_env.dict_view import ArrayStep, DictView, agent_names
-from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
-from swarm_logistics_env.reset_options import (
+from swarm_logistics_env.environment.central_state import global_state
+from swarm_logistics_env.environment.commands import as_array
+from swarm_logistics_env.environment.dict_view import ArrayStep, DictView, agent_names
+from swarm_logistics_env.environment.reset_options import (
     OPTIONS,
     check_somebody_is_there,
     checked_faults,
@@ -23,9 +22,10 @@ from swarm_logistics_env.reset_options import (
     faults_among,
     scenario_fields,
 )
-from swarm_logistics_env.rewards import RewardTerms
+from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.environment.spaces import Spaces
+from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.spaces import Spaces
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Fault, Warehouse
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, run_episode
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.hearing import as_heard
-from swarm_logistics_env.policies.policy import decide
+from swarm_logistics_env.policies.policy import decide, mask_unreachable_commands
 
 
 class Everywhere:
@@ -75,7 +74,7 @@ def test_it_stands_still_from_then_on_and_keeps_what_it_carries() -> None:
     for _ in range(20):
         # Told to open from 0.5 s on, which it hears from 1.3 s on.
         gripper = 1.0 if world.state.time < 0.45 else -1.0
-        world.step(as_heard(np.array([[0.2, 0.0, 0.0, gripper]]), world.state))
+        world.step(mask_unreachable_commands(np.array([[0.2, 0.0, 0.0, gripper]]), world.state))
         carried.append(world.state.robot_item[0] >= 0)
         places.append(world.state.robot_position[0].copy())
     assert carried == [True] * 13 + [False] * 7
@@ -87,7 +86,7 @@ def test_it_stands_still_from_then_on_and_keeps_what_it_carries() -> None:
 def test_what_was_given_stays_as_it_was() -> None:
     world = world_with(Fault("FM3", 2))
     given = np.ones((4, 6))
-    arrived = as_heard(given, world.state)
+    arrived = mask_unreachable_commands(given, world.state)
     assert given.all()
     assert arrived.sum() == 12.0
 

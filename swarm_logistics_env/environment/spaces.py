@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium.spaces import Box
 
-from swarm_logistics_env.central_state import global_state_bounds
+from swarm_logistics_env.environment.central_state import global_state_bounds
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.scenario import Scenario

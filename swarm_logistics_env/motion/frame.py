@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
-from swarm_logistics_env.policies import robot_memory as known
-from swarm_logistics_env.policies.clearing import clear_the_way
+from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion.clearing import clear_the_way
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
@@ -49,7 +49,7 @@ LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 class MotionFrame:
     """Makes network inputs from observation rows, and commands from outputs, row by row.
 
-    Each row has a memory of its own (see `robot_memory`), begun anew by `begin`.
+    Each row has a memory of its own (see `memory`), begun anew by `begin`.
 
     Args:
         scenario: for its control period.

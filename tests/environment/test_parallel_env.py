@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pettingzoo import AECEnv, ParallelEnv
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, swarm_logistics_v0
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import (
     ArgumentError,
     CommandError,

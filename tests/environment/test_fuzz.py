@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rewards import REWARD_TERMS, RewardTerms
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 STORAGE = 8.0  # [m], its width

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.policies import robot_memory as known
-from swarm_logistics_env.policies.motion_frame import INPUTS, LEAD, MotionFrame
+from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion.frame import INPUTS, LEAD, MotionFrame
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 

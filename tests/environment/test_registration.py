@@ -9,14 +9,14 @@ import gymnasium
 import pettingzoo
 import pytest
 
-from swarm_logistics_env import registration
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment import registration
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 def test_gymnasium_makes_it_by_name_after_a_bare_import() -> None:
     script = (
         "import gymnasium, swarm_logistics_env, sys;"
-        "assert 'swarm_logistics_env.env' not in sys.modules;"
+        "assert 'swarm_logistics_env.environment.parallel_env' not in sys.modules;"
         "print(gymnasium.make('SwarmLogistics-v0', n_robots=4).observation_space.shape[0])"
     )
     done = subprocess.run(
