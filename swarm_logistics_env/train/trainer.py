@@ -28,11 +28,11 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
 )
 from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.progress import Notes, Progress
-from swarm_logistics_env.train.reporting import Report
+from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, simulation, versions
 from swarm_logistics_env.train.scoring import score
 from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training_callback import TrainingCallback, TrainingLog
 from swarm_logistics_env.train.worlds import make_worlds
 
 
@@ -64,10 +64,10 @@ def train(
     # depend on their number.
     torch.set_num_threads(1)
     state = read_checkpoint(out)
-    view, notes = begun, Notes()
+    view, log = begun, TrainingLog()
     if state is not None:
         begun.close()
-        view, notes = view_of(state), state["notes"]
+        view, log = view_of(state), state["log"]
     learner = make_learner(training, view, device, goes_on=state is not None)
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
@@ -76,20 +76,20 @@ def train(
         imitate(learner.policy, training, training.imitation)
         # Its seeds, so that what follows does not depend on how long it took.
         learner.set_random_seed(training.seed)
-        save_checkpoint(out, learner, view, notes)
+        save_checkpoint(out, learner, view, log)
     if learner.num_timesteps < training.agent_steps:
-        notes.versions = versions()
-        with Report(training.name, training.agent_steps, learner.num_timesteps) as report:
-            watch = Progress(training, view, notes, out, report)
+        log.versions = versions()
+        with ProgressBar(training.name, training.agent_steps, learner.num_timesteps) as bar:
+            callback = TrainingCallback(training, view, log, out, bar)
             learner.learn(
-                training.agent_steps - learner.num_timesteps, watch, reset_num_timesteps=False
+                training.agent_steps - learner.num_timesteps, callback, reset_num_timesteps=False
             )
-            watch.end()
+            callback.end()
     view.close()
     tensors = tensors_of(learner.policy)
-    if training.evaluation.keep == "best" and notes.best is not None:
-        tensors = notes.best[1]
-    return _write(training, out, command, learner.num_timesteps, tensors, notes.versions)
+    if training.evaluation.keep == "best" and log.best is not None:
+        tensors = log.best[1]
+    return _write(training, out, command, learner.num_timesteps, tensors, log.versions)
 
 
 def _new_view(training: Training) -> NetworkView:

@@ -19,7 +19,7 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.confirmation import confirm
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate
-from swarm_logistics_env.train.reporting import Report
+from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, versions
 from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.train.specification import Seed, as_scenario
@@ -126,12 +126,12 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
     if not study.get_trials():
         study.enqueue_trial(_own_parameters(asked.policy))
     done = len(_completed(study))
-    with Report(f"tuning {asked.policy}", asked.trials, done, unit="trials") as report:
+    with ProgressBar(f"tuning {asked.policy}", asked.trials, done, unit="trials") as bar:
         while done < asked.trials:
             values = _try(study, asked, done)
             done = len(_completed(study))
             shown = (f"{name} = {value:.3g}" for name, value in zip(asked.objectives, values))
-            report.reach(done, ", ".join(shown))
+            bar.reach(done, ", ".join(shown))
     trials = _trials(study)
     best = max(trials, key=lambda trial: trial.values[0])
     record = TunedPolicy(

@@ -13,7 +13,7 @@ from swarm_logistics_env.errors import FaultError
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
-from swarm_logistics_env.wrappers.drawing import Distribution
+from swarm_logistics_env.wrappers.sampling import Distribution
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:

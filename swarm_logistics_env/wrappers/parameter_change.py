@@ -10,7 +10,7 @@ from swarm_logistics_env.environment.reset_options import scenario_fields
 from swarm_logistics_env.errors import ScenarioError, suggest
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
 from swarm_logistics_env.streams import generator
-from swarm_logistics_env.wrappers.drawing import Drawn
+from swarm_logistics_env.wrappers.sampling import Sampler
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
@@ -72,8 +72,8 @@ class ParameterChange(Wrapper):
                 f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
             )
         self.name = name
-        self._values = Drawn(name, values, within)
-        self._times = None if at is None else Drawn("at", at, at_within)
+        self._values = Sampler(name, values, within)
+        self._times = None if at is None else Sampler("at", at, at_within)
         if self._times is not None:
             for time in self._times.ends:
                 if not isinstance(time, int | float) or not time >= 0:
@@ -115,5 +115,5 @@ class ParameterChange(Wrapper):
 
     def _drawn(self, seed: int) -> tuple[Any, float | None]:
         rng = generator(seed, f"change of {self.name}", self._place())
-        value = self._values.draw(rng)
-        return value, None if self._times is None else float(self._times.draw(rng))
+        value = self._values.sample(rng)
+        return value, None if self._times is None else float(self._times.sample(rng))

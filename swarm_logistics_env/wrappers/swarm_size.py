@@ -13,7 +13,7 @@ from swarm_logistics_env.environment.reset_options import faults_among, scenario
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.wrappers.drawing import Distribution, Drawn
+from swarm_logistics_env.wrappers.sampling import Distribution, Sampler
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class SwarmSize(Wrapper):
         super().__init__(env)
         if isinstance(sizes, tuple | range):
             sizes = list(sizes)
-        self._size = Drawn("n_robots", sizes, within)
+        self._size = Sampler("n_robots", sizes, within)
         pairs = _departures(leave)
         self._leaving = sum(robots for robots, _ in pairs)
         self._absent = sum(robots for robots, time in pairs if time == 0.0)
@@ -86,7 +86,7 @@ class SwarmSize(Wrapper):
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's size and departures among them."""
-        size = self._size.draw(generator(seed, "swarm size", self._place()))
+        size = self._size.sample(generator(seed, "swarm size", self._place()))
         faults = (*faults_among(options, self.unwrapped.faults), *self._departures)
         scenario = {"n_robots": size, **scenario_fields(options)}
         return {**options, "scenario": scenario, "faults": faults}

@@ -4,7 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from swarm_logistics_env.studies.code_version import LEFT_OUT, SOURCES, without_prose
+from swarm_logistics_env.policies.code_identity import without_prose
+from swarm_logistics_env.studies.code_version import LEFT_OUT, SOURCES
 
 
 def test_prose_does_not_count() -> None:

@@ -12,7 +12,7 @@ from swarm_logistics_env.errors import SetupError
 Distribution = Callable[[np.random.Generator], Any]
 
 
-class Drawn:
+class Sampler:
     """A value for each episode.
 
     Args:
@@ -44,7 +44,7 @@ class Drawn:
         if within is not None and not callable(given):
             raise SetupError(f"within = {within!r}: should be None but for a distribution")
 
-    def draw(self, rng: np.random.Generator) -> Any:
+    def sample(self, rng: np.random.Generator) -> Any:
         """Return the value of an episode.
 
         Raises:

@@ -1,4 +1,4 @@
-"""What one sees of a training while it runs."""
+"""The progress of a training, at a terminal or in a log file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 LINE_EVERY = 30.0  # seconds between plain lines
 
 
-class Report:
+class ProgressBar:
     """Shows on standard error how far a training is: a bar at a terminal, sparse lines elsewhere.
 
     Args:
