@@ -50,7 +50,7 @@ test: check
 	$(DEV)/bin/python -m coverage report --fail-under=92
 
 # What reaches every line of the kernels in seconds, without the compiler.
-KERNELS := $(addprefix tests/warehouse/test_,crew.py logistics.py sensing.py driving.py layout.py grid.py) \
+KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py kinematics.py layout.py grid.py) \
 	$(addprefix tests/policies/test_,swarm_dt.py routes.py)
 
 check: $(DEV)/installed

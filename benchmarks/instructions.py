@@ -19,7 +19,7 @@ from pathlib import Path
 _SHORT, _LONG = 100, 2500  # steps; what differs is nearly free of the start-up, which varies
 _ROOT = Path(__file__).parents[1]
 _CONTESTANTS = {
-    "pymunk floor": "world = Floor(recording); step = lambda index: world.step(index)",
+    "force floor": "world = ForceFloor(recording); step = lambda index: world.step(index)",
     "Warehouse.step": (
         "world = Warehouse(recording.scenario); world.reset(0)\n"
         "step = lambda index: world.step(recording.commands[index])"
@@ -31,7 +31,7 @@ _CONTESTANTS = {
 }
 _SCRIPT = """
 import pickle, sys
-from benchmarks.floor import Floor
+from benchmarks.floor import ForceFloor
 from swarm_logistics_env import Warehouse
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 with open(sys.argv[1], "rb") as file:
@@ -92,7 +92,7 @@ def main() -> None:
     if counts is None:
         print("valgrind is not installed: no instructions counted")
         return
-    floor = counts["pymunk floor"]
+    floor = counts["force floor"]
     for name, count in counts.items():
         print(f"{name:20} {count:12,.0f} instructions a step, {count / floor:.2f} x floor")
 

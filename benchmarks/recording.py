@@ -17,7 +17,7 @@ class Recording:
 
     scenario: Scenario
     commands: NDArray[np.float64]  # (T, N, 4)
-    wanted_velocity: NDArray[np.float64]  # (T, N, 2) [m/s], world frame; nobody turns
+    wanted_velocity: NDArray[np.float64]  # (T, N, 2) [m/s], world frame
     start: NDArray[np.float64]  # (N, 2) [m]
     items: NDArray[np.float64]  # (I, 2) [m]
 
@@ -28,12 +28,24 @@ def record(scenario: Scenario, n_steps: int) -> Recording:
     observations = world.reset(seed=0)
     start(policy, scenario, seed=0)
     starts, items = world.state.robot_position.copy(), world.state.item_position.copy()
-    heading = world.state.robot_heading
-    rotation = np.stack([np.cos(heading), -np.sin(heading), np.sin(heading), np.cos(heading)])
-    turned = rotation.T.reshape(-1, 2, 2) * scenario.max_speed
     commands = np.zeros((n_steps, scenario.n_robots, 4))
+    wanted = np.zeros((n_steps, scenario.n_robots, 2))
     for step in range(n_steps):
         commands[step] = policy.act(observations)
+        before = world.state.robot_heading.copy()
         observations = world.step(commands[step])
-    wanted = np.einsum("nij,tnj->tni", turned, commands[:, :, :2])
+        wanted[step] = _wanted(commands[step], before, world)
     return Recording(scenario, commands, wanted, starts, items)
+
+
+def _wanted(
+    commands: NDArray[np.float64], before: NDArray[np.float64], world: Warehouse
+) -> NDArray[np.float64]:
+    """Return the wanted velocities (N, 2) [m/s]; who turns drives along its mean direction."""
+    turned = np.remainder(world.state.robot_heading - before + np.pi, 2.0 * np.pi) - np.pi
+    middle = before + 0.5 * turned
+    forward, left = commands[:, 0], commands[:, 1]
+    speed = world.scenario.max_speed / np.maximum(np.hypot(forward, left), 1.0)
+    along = forward * np.cos(middle) - left * np.sin(middle)
+    across = forward * np.sin(middle) + left * np.cos(middle)
+    return np.asarray(speed[:, None] * np.stack([along, across], axis=1))

@@ -104,7 +104,7 @@ robot. `SwarmVecEnv` tells `world`, `n_robots` and `padding` of each row besides
 {arguments}
 
 Every field of `Scenario` is an argument too. Those marked * can change during a run. Each default comes from a source ({sources}), was
-fitted to bring the paper's tables closest, or is off: an addition of this package that the default leaves out.
+fitted to bring the paper's tables closest, was chosen without a source, or is off: an addition of this package that the default leaves out.
 
 {scenario}
 

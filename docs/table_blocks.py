@@ -144,7 +144,7 @@ def policies_block(findings: Findings, skewed: Findings) -> str:
     names = judged_policies(findings)
     rows: dict[str, dict[str, str]] = {}
     for cell in findings.cells:
-        if cell.arm.level.kind == "size":
+        if cell.arm.level.kind in ("size", "parameter"):
             rows.setdefault(f"P, {cell.arm.level}", {})[cell.policy] = _performance(cell)
     for judgement in (*findings.judgements, *skewed.judgements):
         comparison = judgement.comparison

@@ -8,7 +8,7 @@ import math
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
@@ -23,10 +23,10 @@ def _digest_of_sources() -> str:
     for pattern in ("*.py", "warehouse/*.py", "motion/*.py", "policies/*.py"):
         for path in sorted(here.glob(pattern)):
             source = path.read_bytes()
-            # Kernels, what they are made of, and the two files whose constants they use.
-            marks = (b"@kernel", b"import intrinsic")
-            constants = ("observations.py", "state.py")
-            if any(mark in source for mark in marks) or path.name in constants:
+            # Kernels, what they are made of, and the files whose constants and arrays they use.
+            marks = (b"swarm_logistics_env.kernels import", b"import intrinsic")
+            others = ("kernels.py", "observations.py", "structs.py")
+            if any(mark in source for mark in marks) or path.name in others:
                 digest.update(source)
     return digest.hexdigest()
 
@@ -41,16 +41,29 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     that a second process starts at once; without fast-math, so that results are the same bits
     wherever they run; and with numpy's division, which needs no check for zero.
     """
+    return _compiled(function, is_inlined=False)
+
+
+def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` with numba as a part of the kernels that call it.
+
+    A structure of arrays costs nothing then, where a call would copy hundreds of words.
+    """
+    return _compiled(function, is_inlined=True)
+
+
+def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
     # numba notices a change of a kernel's own file only, not of the kernels and constants from
     # other files that were compiled into it. So their digest goes into the name of the cache.
     name = function.__qualname__
     function.__qualname__ = f"{name}-{_SOURCES}"
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": is_inlined}
     try:
-        compiled = numba.njit(function, cache=True, nogil=True, error_model="numpy")
+        compiled = numba.njit(function, cache=True, **options)
     except RuntimeError:
         # Neither the installation nor the user's own folder can be written.
         _warn_of_no_cache()
-        compiled = numba.njit(function, nogil=True, error_model="numpy")
+        compiled = numba.njit(function, **options)
     function.__qualname__ = name
     return cast("Callable[P, R]", compiled)
 
@@ -60,7 +73,7 @@ def _warn_of_no_cache() -> None:
     warnings.warn(
         "compiled code can be kept nowhere, so every process compiles for itself, which takes "
         "half a minute: set NUMBA_CACHE_DIR to a folder that can be written",
-        stacklevel=4,
+        stacklevel=5,
     )
 
 

@@ -69,8 +69,8 @@ class Scenario(Record):
     Each default ends with where it comes from. "source": see `SOURCES`; "paper" is Milner,
     Sooriyabandara and Hauert, Swarm Performance Indicators; "simulator" its author's early
     simulator, "descendant" a later one that grew from it; "DOTS" the robots' developers. "fitted":
-    chosen here, because it brings the paper's tables closest. "off": an addition of this package,
-    which the default leaves out.
+    chosen here, because it brings the paper's tables closest. "chosen": here, without a source and
+    fitted to nothing. "off": an addition of this package, which the default leaves out.
 
     Raises:
         ScenarioError: a field is unknown or out of range, or the whole cannot be built (robots
@@ -112,6 +112,11 @@ class Scenario(Record):
     )
     drive: Literal["holonomic", "differential"] = Field(
         "holonomic", description="differential: no sideways motion, `left` is ignored; source: DOTS"
+    )
+    heading_drift: NonNegativeFloat = Field(
+        0.02,
+        description="every robot's body turns at a constant rate that nobody tells it, normal with "
+        "this standard deviation [rad/s]: a poor gyro; chosen",
     )
     speed_mix: Mix = Field(
         (1.0,), description="robot i has factor i (repeating) of max_speed and turn rate; off"
@@ -163,6 +168,27 @@ class Scenario(Record):
     def n_substeps(self) -> int:
         """Physics steps in a control step."""
         return round(self.control_period / self.physics_period)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Self:
+        """Return the record that `to_json` wrote; before there was a `heading_drift` it was 0.
+
+        Raises:
+            ScenarioError: `text` is not JSON or is not such a record.
+        """
+        scenario = super().from_json(text)
+        is_older = cls.model_fields.keys() - scenario.model_fields_set == {"heading_drift"}
+        return scenario.replace(heading_drift=0.0) if is_older else scenario
+
+    @property
+    def is_gossip(self) -> bool:
+        """Whether robots tell on what they heard."""
+        return self.relay == "gossip"
+
+    @property
+    def is_holonomic(self) -> bool:
+        """Whether robots can move sideways."""
+        return self.drive == "holonomic"
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

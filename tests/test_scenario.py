@@ -41,6 +41,15 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
     assert hash(Scenario.from_json(scenario.to_json())) == hash(scenario)
 
 
+def test_a_stored_scenario_from_before_there_was_a_drift_has_none() -> None:
+    stored = Scenario(n_robots=7).model_dump(mode="json")
+    del stored["heading_drift"]
+    older = Scenario.from_json(json.dumps(stored))
+    assert older == Scenario(n_robots=7, heading_drift=0.0)
+    # A few fields that somebody wrote by hand are no stored scenario.
+    assert Scenario.from_json('{"n_robots": 7}').heading_drift == 0.02
+
+
 @pytest.mark.parametrize(
     ("fields", "complaint"),
     [
@@ -173,7 +182,7 @@ def test_the_sheet_lists_every_field_with_its_value_unit_and_source() -> None:
         assert not isinstance(value, float) or "[" in meaning, name
         origin = meaning.rsplit("; ", 1)[-1]
         kind, _, sources = origin.partition(": ")
-        assert kind in ("source", "fitted", "off"), name
+        assert kind in ("source", "fitted", "chosen", "off"), name
         assert set(sources.split(", ")) <= (SOURCES.keys() if kind == "source" else {""}), name
     assert "| 7 (default 25) |" in rows["n_robots"]
     assert "| 1.25 (default 2) |" in rows["max_speed"]

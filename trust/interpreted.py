@@ -13,9 +13,11 @@ import os
 import threading
 from typing import Any
 
+import numpy as np
 import pytest
 
-from swarm_logistics_env.warehouse import building, crew, engine, tables
+from swarm_logistics_env.warehouse import building, engine, stepping, thread_pool
+from swarm_logistics_env.warehouse.packing import field_kinds
 
 
 class _Words(ctypes.Structure):
@@ -43,6 +45,25 @@ def _passed(argument: Any) -> Any:
     if isinstance(argument[0], float):
         return _Doubles(*argument)
     return _Words(*(int(word) for word in argument))
+
+
+def _unpacked_at(structure: type, address: int) -> Any:
+    words = iter(range(int(address), 2**63, 8))
+
+    def loaded(kind: Any) -> Any:
+        if isinstance(kind, tuple):
+            where = _load(next(words))
+            shape = tuple(_load(next(words)) for _ in range(kind[1]))
+            size = int(np.prod(shape)) * kind[0].itemsize
+            memory = (ctypes.c_char * size).from_address(where)
+            return np.frombuffer(memory, kind[0]).reshape(shape)
+        if kind is float:
+            return ctypes.c_double.from_address(next(words)).value
+        if kind in (int, bool):
+            return kind(_load(next(words)))
+        return kind(*map(loaded, field_kinds(kind).values()))
+
+    return loaded(structure)
 
 
 def _store_at(address: int, value: int) -> None:
@@ -87,10 +108,13 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
     for module in (building, engine):
         vars(module).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
-    for module in (crew, tables):
-        vars(module).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
+    for module in (building, stepping):
+        vars(module).update(unpacked_at=_unpacked_at)
+    vars(thread_pool).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
     # A look takes a thousand times as long.
-    vars(crew).update(load=_load, exchange=_exchange, add=_add, replace=_replace, _PATIENCE=40)
+    vars(thread_pool).update(
+        load=_load, exchange=_exchange, add=_add, replace=_replace, _PATIENCE=40
+    )
     # Streams count modulo 2**64, and kernels divide as IEEE 754 says.
     for what in ("overflow", "divide by zero"):
         config.addinivalue_line("filterwarnings", f"ignore:{what} encountered:RuntimeWarning")

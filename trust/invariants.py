@@ -157,7 +157,9 @@ class Watch:
             put = (before["item_status"] != STORED) | (
                 state.item_position != before["item_position"]
             ).any(axis=1)
-            self._covered |= put | self._above(vars(state), took).any(axis=0)
+            self._covered |= put | self._above(
+                {"robot_position": state.robot_position, "item_position": state.item_position}, took
+            ).any(axis=0)
             if (before["robot_present"] & ~state.robot_present).any():
                 # Where they were when they took something is not known any more.
                 self._covered |= state.item_covered == 1

@@ -23,6 +23,7 @@ from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.policies.policy import decide, start
 from trust.invariants import BrokenPromiseError, Watch
+from trust.jams import SIZES, TARGETS, overlaps
 from trust.scenarios import drawn_change, drawn_faults, some_scenario
 
 Steer = Callable[[Warehouse, NDArray[np.float32]], NDArray[np.float64]]
@@ -90,6 +91,16 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
     tally.deepest = max(tally.deepest, watch.deepest)
 
 
+def broken_jam() -> str | None:
+    """Press swarms to one point, to a wall and into a corner; returns what overlaps too much."""
+    for n_robots in SIZES:
+        for target in TARGETS:
+            problem = overlaps(n_robots, target, seed=0).problem(Scenario())
+            if problem:
+                return f"{n_robots} robots driven to a {target}: {problem}"
+    return None
+
+
 def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
     if source.random() < 0.5:
         try:
@@ -136,6 +147,11 @@ def main() -> int:
     parser.add_argument("--worlds", type=int, default=sys.maxsize, help="at most so many")
     parser.add_argument("--steps", type=int, default=400, help="of each world")
     asked = parser.parse_args()
+    if asked.first == 0:
+        problem = broken_jam()
+        if problem:
+            print(problem)
+            return 1
     until = time.monotonic() + 60.0 * asked.minutes
     said, tally = time.monotonic(), Tally()
     for number in range(asked.first, asked.first + asked.worlds):

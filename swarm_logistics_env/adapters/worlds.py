@@ -16,7 +16,7 @@ from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.crew import Crew
+from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers import Wrapper
 
 World: TypeAlias = SwarmLogisticsEnv | Wrapper
@@ -73,7 +73,7 @@ class Worlds:
         self._alone = [world for world in order if not self._layers[world]]
         # The thread that asks for a step works as well.
         self._n_helpers = max(min(threads, len(self._shared_out)) - 1, 0)
-        self._crew = Crew(len(self._shared_out), self._n_helpers)
+        self._pool = WorldThreadPool(len(self._shared_out), self._n_helpers)
 
     def blank(self) -> NDArray[np.float32]:
         """Return zeros for the observations of all rows, (R, D)."""
@@ -144,7 +144,7 @@ class Worlds:
 
     def close(self) -> None:
         """Release threads and what rendering holds; harmless when called twice."""
-        self._crew.close()
+        self._pool.close()
         for env in self.envs:
             env.close()
 
@@ -169,7 +169,7 @@ class Worlds:
                 changed[world] = told[0]
             self._take(world, told, outcome)
 
-        self._crew.step(warehouses, firsts, given, outcome.observations, arrived)
+        self._pool.step(warehouses, firsts, given, outcome.observations, arrived)
         if changed:
             outcome = outcome._replace(observations=outcome.observations.copy())
             for world, rows in changed.items():
@@ -188,12 +188,12 @@ class Worlds:
         return slice(first, first + self._n_robots[world])
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_crew": None, "_buffers": None}
+        return {**self.__dict__, "_pool": None, "_buffers": None}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self.__dict__.update(saved)
         self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
-        self._crew = Crew(len(self._shared_out), self._n_helpers)
+        self._pool = WorldThreadPool(len(self._shared_out), self._n_helpers)
 
 
 def _layers(env: World) -> list[Any]:

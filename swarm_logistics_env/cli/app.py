@@ -62,7 +62,10 @@ def scenario_command(
         typer.echo(chosen.to_json())
         return
     typer.echo(chosen.sheet())
-    typer.echo("fitted: chosen to bring the paper's tables closest. off: added here, left out.")
+    typer.echo(
+        "fitted: chosen to bring the paper's tables closest. chosen: without a source. "
+        "off: added here, left out."
+    )
     for name, address in SOURCES.items():
         typer.echo(f"{name}: {address}")
 

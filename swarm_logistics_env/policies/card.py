@@ -88,7 +88,8 @@ class PolicyCard(_Part):
         versions: of the packages that trained it, and as "simulation" the digest of the world's
             code (`studies.code_version`) that it was trained in.
         scored_with: the version of this package and the digest that its scores are of.
-        scenario: what it was trained in, fields that differ from the defaults.
+        scenario: what it was trained in, fields that differ from the defaults, and always
+            `heading_drift`: cards from before there was one read it as 0.
         training: the specification of the training.
         seed: of the training.
         agent_steps: decisions of single robots that it learned from.
@@ -107,3 +108,8 @@ class PolicyCard(_Part):
     agent_steps: NonNegativeInt = 0
     scores: tuple[Score, ...] = ()
     scored_with: dict[str, str] = Field(default_factory=dict)
+
+    @field_validator("scenario")
+    @classmethod
+    def _with_drift(cls, scenario: dict[str, Any]) -> dict[str, Any]:
+        return {"heading_drift": 0.0, **scenario}

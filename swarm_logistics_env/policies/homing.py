@@ -6,10 +6,9 @@ heard as long as it has entered rarely; of 32 directions it takes the one that f
 free. A robot that stands still drives in a random direction for a moment. One that has met a
 failure of its own leaves requested items to others, and lets go inside the area.
 
-What it leans on: the remembered direction is kept in the robot's own frame and stays true only as
-long as that frame keeps its direction. Nothing in the simulation turns a robot that does not
-command a turn, and this policy never commands one, so its body frame acts as a compass that never
-drifts. No real robot has such a sensor. Swarm D-T remembers no direction and does not need it.
+What it leans on: the remembered direction is kept in the robot's own frame, which drifts, so the
+memory fades within ten seconds. It holds for robots that move sideways: this policy never commands
+a turn. Swarm D-T remembers no direction and does not need it.
 As it never turns, this policy is for the holonomic drive.
 
 The networks that `swarm-logistics train` makes begin by imitating this policy.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.sensing import scan_disc, scan_walls
+from swarm_logistics_env.warehouse.rangers import Pose, scan_disc, scan_walls
 from swarm_logistics_env.warehouse.state import STORED, WarehouseState
 
 N_BEAMS = 16
@@ -29,7 +29,8 @@ def ranges(state: WarehouseState, scenario: Scenario, robot: int) -> NDArray[np.
     cosine, sine = math.cos(heading), math.sin(heading)
     others = state.robot_present.copy()
     others[robot] = False
-    scan_walls(x, y, cosine, sine, scenario.warehouse_width, scenario.warehouse_height, scans[1])
+    pose = Pose(x, y, cosine, sine)
+    scan_walls(pose, scenario.warehouse_width, scenario.warehouse_height, scans[1])
     for scan, centres, radius in (
         (scans[0], state.robot_position[others], scenario.robot_radius),
         (scans[1], state.obstacle_position, scenario.obstacle_radius),

@@ -128,11 +128,11 @@ class Parameter(Factor):
 
     Args:
         name: a numeric field of `Scenario`.
-        values: x_o first, then every x_new, in the field's unit.
+        values: x_o first, above 0, then every x_new, in the field's unit.
     """
 
     name: str
-    values: Annotated[tuple[PositiveFloat, ...], Field(min_length=2)]
+    values: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=2)]
 
     @field_validator("name")
     @classmethod
@@ -151,6 +151,8 @@ class Parameter(Factor):
     @field_validator("values")
     @classmethod
     def _distinct(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if values[0] == 0.0:
+            raise ValueError("should start with x_o above 0: A is relative to it")
         return _each_once(values)
 
 

@@ -125,4 +125,6 @@ def _write(
 
 
 def _changed(scenario: Scenario) -> dict[str, Any]:
-    return scenario.model_dump(mode="json", exclude_defaults=True)
+    changed = scenario.model_dump(mode="json", exclude_defaults=True)
+    # Always: a card that does not name it is from before there was one.
+    return {"heading_drift": scenario.heading_drift, **changed}

@@ -1,89 +1,101 @@
 """What the physics engine does within a control step, called by address from compiled code.
 
-`physics` builds the bodies and fills the table that these kernels read: addresses of the engine's
-functions and of its things, and what else it wants to be told.
+`physics` fills in the addresses, `building` makes the bodies and shapes.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import math
 
-from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.warehouse.logistics import LIFTED
+from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.native import call_at, store_at
+from swarm_logistics_env.warehouse.structs import Batch, Engine, IntegerRows, NumberRows, Parameters
 
-# Rows of the table. Of the functions that a step calls, and of those that make and free things:
-(
-    STEP, SET_ITERATIONS, EACH_BODY, READ_BODY, WRITE_BODY, SET_FILTER, SET_OFFSET, REINDEX,
-    NEW_SPACE, STATIC_BODY, SET_SLOP, NEW_BODY, NEW_CONTROL, SET_POSITION, SET_VELOCITY, NEW_CIRCLE,
-    NEW_SEGMENT, NEW_JOINT, SET_BIAS, SET_FORCE, ADD_BODY, ADD_SHAPE, ADD_JOINT,
-    FREE_SPACE, FREE_BODY, FREE_SHAPE, FREE_JOINT,
-    # of the space, of the batches that are read and written, and of how far each is filled:
-    SPACE, READ_BATCH, WRITE_BATCH, READ_COUNT, WRITE_COUNT,
-    # what a filter says of whom a shape collides with (the two masks of a cpShapeFilter),
-    NO_ONE, EMPTY_ROBOT, LADEN_ROBOT, FREE_ITEM, SOLID,
-    # and from here on the address of every robot's shape, then of every item's, then of the rest.
-    SHAPES,
-) = range(38)  # fmt: skip
+_ROBOT, _SOLID, _ITEM = 1, 2, 4  # categories of shapes
+_MASK = 32  # bits of the categories in a filter's second word, below those of its mask
 
-# Of the contact solver: few for robots that meet, many for a pile. With 4, a pile of 150 in a
-# corner stands 50 mm inside itself for good; with 16 always, a step costs a fifth more.
-_FEWEST_ITERATIONS, _MOST_ITERATIONS, _PILED_PER_ITERATION = 4, 16, 8
+# Whom a shape collides with: its own categories, and the mask of those that it meets.
+NO_ONE = 0
+EMPTY_ROBOT = _ROBOT | (_ROBOT | _SOLID) << _MASK
+LADEN_ROBOT = _ROBOT | (_ROBOT | _SOLID | _ITEM) << _MASK
+FREE_ITEM = _ITEM | _ROBOT << _MASK
+SOLID_THING = _SOLID | _ROBOT << _MASK
+
+# Kinds of events: what happened to (robot, item) that changes whom they collide with.
+LIFTED, PUT_DOWN, DELIVERED_IT, CAME_BACK = 0, 1, 2, 3
+
+# Of the contact solver: the more robots touch, the more. With 16 a jam of 150 in a corner stands
+# 10 mm inside itself, with 50 now and then 7 mm, with 80 always 1 mm; always 80 costs a swarm of
+# 25 an eighth of its step.
+_FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 16, 80, 2
 
 
-@kernel
-def advance(engine: NDArray[np.int64], pile: int, n_substeps: int, period: float) -> None:
-    """Write the bodies' velocities, take `n_substeps` of `period` [s], read the bodies.
+@inlined_kernel
+def advance(engine: Engine, parameters: Parameters, n_touching: int) -> None:
+    """Take the substeps of a control step, and read where the bodies are then and how fast.
 
-    The largest `pile` has so many robots now, which says how hard the contacts are to solve.
+    Before each, every drive pushes with the force that brings its robot to the wanted velocity
+    within the substep, or with its greatest force. So many robots touch something as it begins.
     """
-    iterations = min(_FEWEST_ITERATIONS + pile // _PILED_PER_ITERATION, _MOST_ITERATIONS)
-    space = engine[SPACE]
-    call_at(engine[SET_ITERATIONS], (space, iterations))
-    store_at(engine[WRITE_COUNT], 0)
-    call_at(engine[EACH_BODY], (space, engine[WRITE_BODY], engine[WRITE_BATCH]))
-    for _ in range(n_substeps):
-        call_at(engine[STEP], (space, period))
-    read_bodies(engine)
+    iterations = min(_FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS)
+    call_at(engine.functions.set_iterations, (engine.space[0], iterations))
+    period = parameters.physics_period
+    greatest = parameters.max_acceleration * period
+    for _ in range(parameters.n_substeps):
+        read(engine, engine.velocities)
+        push(engine, greatest, parameters.robot_mass / period)
+        call_at(engine.functions.step, (engine.space[0], period))
+    read(engine, engine.bodies)
 
 
-@kernel
-def read_bodies(engine: NDArray[np.int64]) -> None:
-    """Fill the batch that is read with where the bodies are and how fast."""
-    store_at(engine[READ_COUNT], 0)
-    call_at(engine[EACH_BODY], (engine[SPACE], engine[READ_BODY], engine[READ_BATCH]))
+@inlined_kernel
+def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
+    """Give every robot the force that changes its velocity as wanted, by `greatest` [m/s] at most.
+
+    `mass_per_period` [kg/s] makes a force of a change of velocity.
+    """
+    velocities, forces = engine.velocities.numbers, engine.forces.numbers
+    for robot in range(len(engine.wanted_velocity)):
+        change_x = engine.wanted_velocity[robot, 0] - velocities[robot, 0]
+        change_y = engine.wanted_velocity[robot, 1] - velocities[robot, 1]
+        change = math.sqrt(change_x * change_x + change_y * change_y)
+        share = mass_per_period * (1.0 if change <= greatest else greatest / change)
+        forces[robot, 0], forces[robot, 1] = share * change_x, share * change_y
+    call = engine.functions
+    store_at(engine.forces.count_address, 0)
+    call_at(call.each_body, (engine.space[0], call.write_body, engine.forces.address))
 
 
-@kernel
-def follow(
-    engine: NDArray[np.int64],
-    events: NDArray[np.int64],
-    n_events: int,
-    n_robots: int,
-    item_position: NDArray[np.float64],
-) -> None:
+@inlined_kernel
+def read(engine: Engine, batch: Batch) -> None:
+    """Fill a batch with what it holds of the bodies."""
+    store_at(batch.count_address, 0)
+    call = engine.functions
+    call_at(call.each_body, (engine.space[0], call.read_body, batch.address))
+
+
+@inlined_kernel
+def follow(engine: Engine, events: IntegerRows, n_events: int, item_position: NumberRows) -> None:
     """Let bodies collide as they must after these events (kind, robot, item)."""
     for event in range(n_events):
-        kind, item = events[event, 0], events[event, 2]
-        robot_shape = engine[SHAPES + events[event, 1]]
-        item_shape = engine[SHAPES + n_robots + item]
+        kind, robot, item = events[event, 0], events[event, 1], events[event, 2]
         if kind == LIFTED:
-            collide_with(engine, item_shape, engine[NO_ONE])
-            collide_with(engine, robot_shape, engine[LADEN_ROBOT])
-        else:
-            collide_with(engine, robot_shape, engine[EMPTY_ROBOT])
-            move(engine, item_shape, item_position[item, 0], item_position[item, 1])
+            collide_with(engine, engine.item_shapes[item], NO_ONE)
+            collide_with(engine, engine.robot_shapes[robot], LADEN_ROBOT)
+        if kind in (PUT_DOWN, DELIVERED_IT):
+            collide_with(engine, engine.robot_shapes[robot], EMPTY_ROBOT)
+        if kind in (PUT_DOWN, CAME_BACK):
+            move(engine, engine.item_shapes[item], item_position[item, 0], item_position[item, 1])
 
 
-@kernel
-def move(engine: NDArray[np.int64], item_shape: int, x: float, y: float) -> None:
+@inlined_kernel
+def move(engine: Engine, item_shape: int, x: float, y: float) -> None:
     """Move an item to (x, y) [m]; who collides with it stays as it is."""
-    call_at(engine[SET_OFFSET], (item_shape, (x, y)))
-    call_at(engine[REINDEX], (engine[SPACE], item_shape))
+    call_at(engine.functions.set_offset, (item_shape, (x, y)))
+    call_at(engine.functions.reindex, (engine.space[0], item_shape))
 
 
-@kernel
-def collide_with(engine: NDArray[np.int64], shape: int, masks: int) -> None:
+@inlined_kernel
+def collide_with(engine: Engine, shape: int, whom: int) -> None:
     """Give a shape a filter, of no group."""
-    call_at(engine[SET_FILTER], (shape, (np.int64(0), masks)))
+    call_at(engine.functions.set_filter, (shape, (0, whom)))

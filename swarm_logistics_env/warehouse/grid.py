@@ -1,7 +1,7 @@
 """A cell grid over the warehouse, so that looking for what is near costs the same at any size.
 
 `fill` sorts points into square cells (counting sort). Points of a cell, and of neighbouring cells
-in a row, lie side by side in `members`, so one look-around reads a few runs of memory.
+in a row, lie side by side in `Grid.members`, so one look-around reads a few runs of memory.
 """
 
 from __future__ import annotations
@@ -9,101 +9,87 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
-
-
-class Grid:
-    """The cells over a warehouse and which of `n_points` points stand in each.
-
-    Attributes:
-        start: (n_columns * n_rows + 1,) where each cell's points begin in `members`.
-        members: (n_points,) point numbers, cell by cell, row by row of cells.
-        places: (n_points, 2) where they are [m], in the same order.
-        size: [cells along x, cells along y].
-        cell: side of a cell [m].
-    """
-
-    def __init__(self, width: float, height: float, cell: float, n_points: int) -> None:
-        # More cells than points buys nothing: widen the cells of an arena that is nearly empty.
-        self.cell = max(cell, math.sqrt(width * height / (4.0 * n_points + 16.0)))
-        self.size = np.array(
-            [math.ceil(width / self.cell), math.ceil(height / self.cell)], dtype=np.int64
-        )
-        self.start = np.zeros(int(self.size[0] * self.size[1]) + 1, dtype=np.int64)
-        self.members = np.zeros(n_points, dtype=np.int64)
-        self.places = np.zeros((n_points, 2))
+from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.warehouse.structs import Flags, Grid, Nearby, NumberRows
 
 
-@kernel
+def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:
+    """Return an empty grid for `n_points` points, of cells at least `cell` wide [m]."""
+    # More cells than points buys nothing: widen the cells of an arena that is nearly empty.
+    cell = max(cell, math.sqrt(width * height / (4.0 * n_points + 16.0)))
+    n_columns, n_rows = math.ceil(width / cell), math.ceil(height / cell)
+    return Grid(
+        cell=cell,
+        n_columns=n_columns,
+        n_rows=n_rows,
+        start=np.zeros(n_columns * n_rows + 1, np.int64),
+        members=np.zeros(n_points, np.int64),
+        places=np.zeros((n_points, 2)),
+    )
+
+
+@inlined_kernel
 def cell_along(coordinate: float, cell: float, n_cells: int) -> int:
     """Return the index of the cell that holds `coordinate`; outside counts as the edge."""
     return min(max(int(coordinate / cell), 0), n_cells - 1)
 
 
-@kernel
-def look_around(
-    x: float,
-    y: float,
-    reach: float,
-    left_out: int,
-    cell: float,
-    size: NDArray[np.int64],
-    start: NDArray[np.int64],
-    members: NDArray[np.int64],
-    places: NDArray[np.float64],
-    found: NDArray[np.int64],
-    squares: NDArray[np.float64],
-) -> int:
-    """List the points within `reach` [m] of (x, y), but for `left_out`; returns how many.
+@inlined_kernel
+def cells_around(grid: Grid, x: float, y: float, reach: float) -> tuple[int, int, int, int]:
+    """Return the first and last column and the first and last row within `reach` of (x, y)."""
+    left = cell_along(x - reach, grid.cell, grid.n_columns)
+    right = cell_along(x + reach, grid.cell, grid.n_columns)
+    bottom = cell_along(y - reach, grid.cell, grid.n_rows)
+    top = cell_along(y + reach, grid.cell, grid.n_rows)
+    return left, right, bottom, top
 
-    `found` and `squares`, longer than there are points, get where the points stand in `members`
-    and `places`, and the squares of their distances [m^2].
-    """
+
+@inlined_kernel
+def run_of(grid: Grid, row: int, left: int, right: int) -> tuple[int, int]:
+    """Return where the points of a row's cells begin and end in `grid.members`."""
+    first = row * grid.n_columns
+    return grid.start[first + left], grid.start[first + right + 1]
+
+
+@inlined_kernel
+def look_around(grid: Grid, x: float, y: float, reach: float, left_out: int, nearby: Nearby) -> int:
+    """List in `nearby` the points within `reach` [m] of (x, y), but for `left_out`; how many."""
     n_found, limit = 0, reach * reach
-    left = cell_along(x - reach, cell, size[0])
-    right = cell_along(x + reach, cell, size[0])
-    top = cell_along(y + reach, cell, size[1])
-    for row in range(cell_along(y - reach, cell, size[1]), top + 1):
-        for index in range(start[row * size[0] + left], start[row * size[0] + right + 1]):
-            dx, dy = places[index, 0] - x, places[index, 1] - y
+    left, right, bottom, top = cells_around(grid, x, y, reach)
+    for row in range(bottom, top + 1):
+        first, end = run_of(grid, row, left, right)
+        for place in range(first, end):
+            dx, dy = grid.places[place, 0] - x, grid.places[place, 1] - y
             square = dx * dx + dy * dy
             # Written always and counted only if near: no branch to mispredict.
-            found[n_found] = index
-            squares[n_found] = square
-            n_found += int((square <= limit) & (members[index] != left_out))
+            nearby.place[n_found] = place
+            nearby.square[n_found] = square
+            n_found += int((square <= limit) & (grid.members[place] != left_out))
     return n_found
 
 
-@kernel
-def fill(
-    position: NDArray[np.float64],
-    included: NDArray[np.bool_],
-    cell: float,
-    size: NDArray[np.int64],
-    start: NDArray[np.int64],
-    members: NDArray[np.int64],
-    places: NDArray[np.float64],
-) -> None:
+@inlined_kernel
+def fill(grid: Grid, position: NumberRows, included: Flags) -> None:
     """Sort the included points of `position` (n, 2) into the grid's cells."""
+    start, cell = grid.start, grid.cell
     start[:] = 0
-    for point in range(position.shape[0]):
+    for point in range(len(position)):
         if included[point]:
-            column = cell_along(position[point, 0], cell, size[0])
-            row = cell_along(position[point, 1], cell, size[1])
-            start[row * size[0] + column] += 1
+            column = cell_along(position[point, 0], cell, grid.n_columns)
+            row = cell_along(position[point, 1], cell, grid.n_rows)
+            start[row * grid.n_columns + column] += 1
     total = 0
-    for index in range(start.shape[0]):
+    for index in range(len(start)):
         total += start[index]
         start[index] = total
     # Backwards, so that each cell lists its points in ascending order: ties never depend on memory.
-    for point in range(position.shape[0] - 1, -1, -1):
+    for point in range(len(position) - 1, -1, -1):
         if included[point]:
-            column = cell_along(position[point, 0], cell, size[0])
-            row = cell_along(position[point, 1], cell, size[1])
-            start[row * size[0] + column] -= 1
-            place = start[row * size[0] + column]
-            members[place] = point
-            places[place, 0] = position[point, 0]
-            places[place, 1] = position[point, 1]
+            column = cell_along(position[point, 0], cell, grid.n_columns)
+            row = cell_along(position[point, 1], cell, grid.n_rows)
+            start[row * grid.n_columns + column] -= 1
+            place = start[row * grid.n_columns + column]
+            grid.members[place] = point
+            grid.places[place, 0] = position[point, 0]
+            grid.places[place, 1] = position[point, 1]

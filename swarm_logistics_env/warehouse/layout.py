@@ -1,4 +1,4 @@
-"""Where everything starts and what is asked for, from keyed random streams.
+"""Where everything starts and where items come back to, from keyed random streams.
 
 Robot i's place, item j's place and their order depend on the seed and on i or j, not on how many
 there are, as far as the places of those before them leave room.
@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import ScenarioError
-from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, pair_key, uniform
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.warehouse.structs import STORED, Integers, Keys, World
 
 _ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
+_ATTEMPTS = 5_000  # to place a disc among those that stand
 _NO_DISCS = np.zeros((0, 2))
 
 
@@ -41,38 +43,50 @@ def place_robots(
     return centres, (_first_draws(row_keys(seed, "headings", n)) * 2.0 - 1.0) * np.pi
 
 
-def request_order(scenario: Scenario, seed: int, cycle: int = 0) -> NDArray[np.int64]:
-    """Return item numbers in the order of requests, shape (n_items,).
+def heading_drifts(scenario: Scenario, seed: int) -> NDArray[np.float64]:
+    """Return at which rate each robot's body turns unasked [rad/s], shape (N,)."""
+    return scenario.heading_drift * _normal_draws(row_keys(seed, "drift", scenario.n_robots))
 
-    With `restock` the requests go on; `cycle` counts how often all items were asked for before.
+
+@kernel
+def draw_order(keys: Keys, cycle: int, order: Integers) -> None:
+    """Fill the order in which items are asked for, for the `cycle`-th time (0: the first)."""
+    draws = np.empty(len(keys))
+    for item in range(len(keys)):
+        draws[item] = uniform(keys[item], cycle)
+    order[:] = np.argsort(draws, kind="mergesort")
+
+
+@inlined_kernel
+def place_restocked(world: World, item: int) -> bool:
+    """Put an item that comes back into the storage, clear of free items and of robots.
+
+    Where depends on the episode's key and on how many items were delivered before.
+
+    Returns whether there was room.
     """
-    keys = row_keys(seed, f"requests {cycle}", scenario.n_items)
-    return np.argsort(_first_draws(keys), kind="stable")
-
-
-def place_restocked(
-    scenario: Scenario,
-    seed: int,
-    count: int,
-    taken: NDArray[np.float64],
-    obstacles: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the place [m] (2,) of the `count`-th item that came back to the storage.
-
-    It is clear of the discs of item size at `taken` (n, 2): free items and robots.
-
-    Raises:
-        ScenarioError: there is no room.
-    """
-    keys = row_keys(seed, f"restock {count}", 1)
-    clearance = max(scenario.item_radius, scenario.robot_radius)
-    centres = np.vstack([taken, np.zeros((1, 2))])
-    if not _place(scenario, keys, scenario.item_radius, clearance, centres, obstacles):
-        raise ScenarioError(
-            f"no room for items that come back (delivery {count}): should be fewer items or "
-            "robots, or a larger warehouse"
-        )
-    return np.asarray(centres[-1])
+    parameters, items, robots = world.parameters, world.items, world.robots
+    radius = parameters.item_radius
+    width, height = parameters.storage_width - radius, parameters.warehouse_height - radius
+    spacing = radius + max(radius, parameters.robot_radius)
+    key = pair_key(items.restock_key[0], world.progress.n_delivered[0])
+    for attempt in range(_ATTEMPTS):
+        x = radius + (width - radius) * uniform(key, 2 * attempt)
+        y = radius + (height - radius) * uniform(key, 2 * attempt + 1)
+        is_free = is_clear(x, y, world.obstacles, parameters.obstacle_radius + radius)
+        for other in range(len(items.status)):
+            dx, dy = items.position[other, 0] - x, items.position[other, 1] - y
+            is_near = dx * dx + dy * dy < spacing * spacing
+            is_free &= not (is_near and items.status[other] == STORED)
+        for robot in range(len(robots.present)):
+            dx, dy = robots.position[robot, 0] - x, robots.position[robot, 1] - y
+            is_near = dx * dx + dy * dy < spacing * spacing
+            is_free &= not (is_near and robots.present[robot])
+        if is_free:
+            items.position[item, 0] = x
+            items.position[item, 1] = y
+            return True
+    return False
 
 
 def _strewn(
@@ -87,7 +101,7 @@ def _strewn(
     for arrangement in range(_ARRANGEMENTS):
         again = f" {arrangement}" if arrangement else ""
         keys = row_keys(seed, f"places of {what}{again}", count)
-        if _place(scenario, keys, radius, radius, centres, obstacles):
+        if _place(scenario, keys, radius, centres, obstacles):
             return centres
     raise ScenarioError(
         f"no room for {count} {what} of radius {radius} m: should be fewer {what}, fewer "
@@ -99,14 +113,13 @@ def _place(
     scenario: Scenario,
     keys: NDArray[np.uint64],
     radius: float,
-    clearance: float,
     centres: NDArray[np.float64],
     obstacles: NDArray[np.float64],
 ) -> bool:
     low = np.array([radius, radius])
     high = np.array([scenario.storage_width - radius, scenario.warehouse_height - radius])
     reach = scenario.obstacle_radius + radius
-    return strew(keys, centres, low, high, radius + clearance, obstacles, reach)
+    return strew(keys, centres, low, high, 2.0 * radius, obstacles, reach)
 
 
 @kernel
@@ -125,7 +138,7 @@ def strew(
     """
     first = centres.shape[0] - keys.shape[0]
     for disc in range(keys.shape[0]):
-        for attempt in range(5_000):
+        for attempt in range(_ATTEMPTS):
             x = low[0] + (high[0] - low[0]) * uniform(keys[disc], 2 * attempt)
             y = low[1] + (high[1] - low[1]) * uniform(keys[disc], 2 * attempt + 1)
             if is_clear(x, y, centres[: first + disc], spacing) and is_clear(
@@ -155,4 +168,12 @@ def _first_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
     draws = np.empty(keys.shape[0])
     for row in range(keys.shape[0]):
         draws[row] = uniform(keys[row], 0)
+    return draws
+
+
+@kernel
+def _normal_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
+    draws = np.empty(keys.shape[0])
+    for row in range(keys.shape[0]):
+        draws[row] = gaussian(keys[row], 0)
     return draws

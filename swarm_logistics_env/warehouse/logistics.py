@@ -1,243 +1,215 @@
-"""Pick up, carry, drop, deliver, next request, and the timers: the rules of the warehouse.
+"""Pick up, carry, drop, deliver and the next request: the rules of the warehouse.
 
-Kernels change the state's arrays and list what the physics must know as events
-(kind, robot, item), so that they know no engine.
+Kernels change the world's arrays and list what the physics must know as events
+(kind, robot, item), so that they call no engine.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.warehouse.grid import cell_along
-from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.warehouse.engine import CAME_BACK, DELIVERED_IT, LIFTED, PUT_DOWN
+from swarm_logistics_env.warehouse.grid import cells_around, run_of
+from swarm_logistics_env.warehouse.kinematics import GRIPPER
+from swarm_logistics_env.warehouse.layout import draw_order, place_restocked
+from swarm_logistics_env.warehouse.structs import (
+    CARRIED,
+    DELIVERED,
+    NOBODY,
+    STORED,
+    Capabilities,
+    Grid,
+    IntegerRows,
+    Items,
+    NumberRows,
+    Robots,
+    World,
+)
 
-LIFTED, PUT_DOWN = 0, 1
 _HOLD, _OPEN = 0.5, -0.5
 
 
-@kernel
-def carry_along(
-    position: NDArray[np.float64],
-    present: NDArray[np.bool_],
-    delivery_edge: float,
-    robot_item: NDArray[np.int64],
-    item_position: NDArray[np.float64],
-    in_delivery: NDArray[np.bool_],
-) -> None:
+@inlined_kernel
+def note_event(events: IntegerRows, n_events: int, kind: int, robot: int, item: int) -> int:
+    """Write an event; returns the number of events so far."""
+    events[n_events, 0] = kind
+    events[n_events, 1] = robot
+    events[n_events, 2] = item
+    return n_events + 1
+
+
+@inlined_kernel
+def carry_along(robots: Robots, items: Items, delivery_edge: float) -> None:
     """Bring carried items to where their carriers are and note who is in the delivery area."""
-    for robot in range(position.shape[0]):
-        in_delivery[robot] = present[robot] and position[robot, 0] >= delivery_edge
-        item = robot_item[robot]
+    for robot in range(len(robots.item)):
+        x = robots.position[robot, 0]
+        robots.in_delivery[robot] = robots.present[robot] and x >= delivery_edge
+        item = robots.item[robot]
         if item != NOBODY:
-            item_position[item, 0] = position[robot, 0]
-            item_position[item, 1] = position[robot, 1]
+            items.position[item, 0] = x
+            items.position[item, 1] = robots.position[robot, 1]
 
 
-@kernel
+@inlined_kernel
 def open_grippers(
-    gripper: NDArray[np.float64],
-    able: NDArray[np.bool_],
-    in_delivery: NDArray[np.bool_],
+    commands: NumberRows,
+    robots: Robots,
+    able: Capabilities,
+    items: Items,
     requested: int,
-    robot_item: NDArray[np.int64],
-    memory: NDArray[np.int64],
-    item_status: NDArray[np.int64],
-    item_carrier: NDArray[np.int64],
-    item_covered: NDArray[np.int64],
-    events: NDArray[np.int64],
+    events: IntegerRows,
 ) -> int:
     """Put down what robots let go of, covered; returns the number of events written.
 
     The requested item is let go of anywhere, another one only outside the delivery area.
     """
     n_events = 0
-    for robot in range(gripper.shape[0]):
-        item = robot_item[robot]
-        if item == NOBODY or not able[robot] or gripper[robot] >= _OPEN:
+    for robot in range(len(commands)):
+        item = robots.item[robot]
+        is_able = robots.present[robot] and able.obeys[robot]
+        if item == NOBODY or not is_able or commands[robot, GRIPPER] >= _OPEN:
             continue
-        if in_delivery[robot] and item != requested:
+        if robots.in_delivery[robot] and item != requested:
             continue
-        for place in range(memory.shape[1] - 1, 0, -1):
-            memory[robot, place] = memory[robot, place - 1]
-        if memory.shape[1] > 0:
-            memory[robot, 0] = item
-        robot_item[robot] = NOBODY
-        item_status[item] = STORED
-        item_carrier[item] = NOBODY
-        item_covered[item] = 1
-        events[n_events, 0] = PUT_DOWN
-        events[n_events, 1] = robot
-        events[n_events, 2] = item
-        n_events += 1
+        remember(robots.memory, robot, item)
+        robots.item[robot] = NOBODY
+        items.status[item] = STORED
+        items.carrier[item] = NOBODY
+        items.covered[item] = 1
+        n_events = note_event(events, n_events, PUT_DOWN, robot, item)
     return n_events
 
 
-@kernel
+@inlined_kernel
+def remember(memory: IntegerRows, robot: int, item: int) -> None:
+    """Put `item` in front of a robot's memory, which forgets its oldest."""
+    for place in range(memory.shape[1] - 1, 0, -1):
+        memory[robot, place] = memory[robot, place - 1]
+    if memory.shape[1] > 0:
+        memory[robot, 0] = item
+
+
+@inlined_kernel
+def is_remembered(memory: IntegerRows, robot: int, item: int) -> bool:
+    """Return whether `item` is in a robot's memory."""
+    found = False
+    for place in range(memory.shape[1]):
+        found |= memory[robot, place] == item
+    return found
+
+
+@inlined_kernel
 def wanted_item(
-    robot: int,
-    position: NDArray[np.float64],
-    memory: NDArray[np.int64],
-    requested: int,
-    pickup_range: float,
-    item_position: NDArray[np.float64],
-    item_status: NDArray[np.int64],
-    cell: float,
-    size: NDArray[np.int64],
-    start: NDArray[np.int64],
-    members: NDArray[np.int64],
+    robot: int, robots: Robots, items: Items, item_grid: Grid, requested: int, reach: float
 ) -> tuple[int, float]:
     """Return the item that `robot` would lift now, or NOBODY, and the square of its distance.
 
-    The requested item in reach comes first, else the nearest in reach that is not in its memory.
+    The requested item within `reach` [m] comes first, else the nearest that is not in its memory.
     """
-    x, y = position[robot, 0], position[robot, 1]
-    best, best_square = NOBODY, pickup_range * pickup_range
-    left = cell_along(x - pickup_range, cell, size[0])
-    right = cell_along(x + pickup_range, cell, size[0])
-    for row in range(
-        cell_along(y - pickup_range, cell, size[1]),
-        cell_along(y + pickup_range, cell, size[1]) + 1,
-    ):
-        for index in range(start[row * size[0] + left], start[row * size[0] + right + 1]):
-            item = members[index]
-            if item_status[item] != STORED:
+    x, y = robots.position[robot, 0], robots.position[robot, 1]
+    best, best_square = NOBODY, reach * reach
+    left, right, bottom, top = cells_around(item_grid, x, y, reach)
+    for row in range(bottom, top + 1):
+        first, end = run_of(item_grid, row, left, right)
+        for place in range(first, end):
+            item = item_grid.members[place]
+            if items.status[item] != STORED:
                 continue
-            dx, dy = item_position[item, 0] - x, item_position[item, 1] - y
+            dx, dy = items.position[item, 0] - x, items.position[item, 1] - y
             square = dx * dx + dy * dy
-            if square > pickup_range * pickup_range:
+            if square > reach * reach:
                 continue
             if item == requested:
                 return item, square
             if square > best_square or (square == best_square and best != NOBODY):
                 continue
-            remembered = False
-            for place in range(memory.shape[1]):
-                remembered = remembered or memory[robot, place] == item
-            if not remembered:
+            if not is_remembered(robots.memory, robot, item):
                 best, best_square = item, square
     return best, best_square
 
 
-@kernel
-def close_grippers(
-    gripper: NDArray[np.float64],
-    able: NDArray[np.bool_],
-    position: NDArray[np.float64],
-    requested: int,
-    pickup_range: float,
-    robot_item: NDArray[np.int64],
-    memory: NDArray[np.int64],
-    item_position: NDArray[np.float64],
-    item_status: NDArray[np.int64],
-    item_carrier: NDArray[np.int64],
-    item_covered: NDArray[np.int64],
-    claim: NDArray[np.int64],
-    claim_square: NDArray[np.float64],
-    cell: float,
-    size: NDArray[np.int64],
-    start: NDArray[np.int64],
-    members: NDArray[np.int64],
-    events: NDArray[np.int64],
-    n_events: int,
-) -> int:
+@inlined_kernel
+def close_grippers(world: World, commands: NumberRows, requested: int, n_events: int) -> int:
     """Lift what empty robots hold on to; returns the number of events so far.
 
     Where several want the same item the nearest able one gets it, and the others choose again.
-    `claim` (I,) and `claim_square` (I,) are working space, all NOBODY before and after.
     """
+    robots, able, items, claims = world.robots, world.able, world.items, world.claims
+    reach = world.parameters.pickup_range
     while True:
         n_before = n_events
-        for robot in range(gripper.shape[0]):
-            if robot_item[robot] != NOBODY or not able[robot] or gripper[robot] <= _HOLD:
+        for robot in range(len(commands)):
+            is_able = robots.present[robot] and able.obeys[robot] and able.lifts[robot]
+            is_free = robots.item[robot] == NOBODY
+            if not is_free or not is_able or commands[robot, GRIPPER] <= _HOLD:
                 continue
-            item, square = wanted_item(
-                robot, position, memory, requested, pickup_range,
-                item_position, item_status, cell, size, start, members,
-            )  # fmt: skip
-            if item != NOBODY and (claim[item] == NOBODY or square < claim_square[item]):
-                claim[item] = robot
-                claim_square[item] = square
-        for item in range(claim.shape[0]):
-            robot = claim[item]
+            item, square = wanted_item(robot, robots, items, world.item_grid, requested, reach)
+            if item != NOBODY and (claims.robot[item] == NOBODY or square < claims.square[item]):
+                claims.robot[item] = robot
+                claims.square[item] = square
+        for item in range(len(claims.robot)):
+            robot = claims.robot[item]
             if robot == NOBODY:
                 continue
-            claim[item] = NOBODY
-            robot_item[robot] = item
-            item_status[item] = CARRIED
-            item_carrier[item] = robot
-            item_covered[item] = 0
-            item_position[item, 0] = position[robot, 0]
-            item_position[item, 1] = position[robot, 1]
-            events[n_events, 0] = LIFTED
-            events[n_events, 1] = robot
-            events[n_events, 2] = item
-            n_events += 1
+            claims.robot[item] = NOBODY
+            robots.item[robot] = item
+            items.status[item] = CARRIED
+            items.carrier[item] = robot
+            items.covered[item] = 0
+            items.position[item, 0] = robots.position[robot, 0]
+            items.position[item, 1] = robots.position[robot, 1]
+            n_events = note_event(claims.events, n_events, LIFTED, robot, item)
         if n_events == n_before:
             return n_events
 
 
-@kernel
-def deliver(
-    requested: int,
-    in_delivery: NDArray[np.bool_],
-    delivers: NDArray[np.bool_],
-    robot_item: NDArray[np.int64],
-    memory: NDArray[np.int64],
-    item_status: NDArray[np.int64],
-    item_carrier: NDArray[np.int64],
-) -> int:
-    """Deliver the requested item if its carrier can; returns that robot, or NOBODY.
+@inlined_kernel
+def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
+    """Deliver the requested item if its carrier can, then the next one, and so on.
 
-    Delivery clears every robot's memory.
+    A delivery clears every robot's memory; with `restock` the item comes back to the storage.
+
+    Returns:
+        The number of events so far, of deliveries, and whether all that came back found room.
     """
-    if requested == NOBODY:
-        return NOBODY
-    robot = item_carrier[requested]
-    if robot == NOBODY or not in_delivery[robot] or not delivers[robot]:
-        return NOBODY
-    robot_item[robot] = NOBODY
-    item_status[requested] = DELIVERED
-    item_carrier[requested] = NOBODY
-    memory[:, :] = NOBODY
-    return int(robot)
+    robots, items, progress = world.robots, world.items, world.progress
+    n_delivered, is_room = 0, True
+    while progress.requested[0] != NOBODY:
+        item = progress.requested[0]
+        robot = items.carrier[item]
+        if robot == NOBODY or not robots.in_delivery[robot] or not world.able.delivers[robot]:
+            break
+        robots.item[robot] = NOBODY
+        robots.memory[:, :] = NOBODY
+        items.status[item] = DELIVERED
+        items.carrier[item] = NOBODY
+        world.claims.delivered_by[n_delivered] = robot
+        n_delivered += 1
+        progress.n_delivered[0] += 1
+        n_events = note_event(world.claims.events, n_events, DELIVERED_IT, robot, item)
+        if world.parameters.restock:
+            if place_restocked(world, item):
+                items.status[item] = STORED
+                items.covered[item] = 1
+                n_events = note_event(world.claims.events, n_events, CAME_BACK, robot, item)
+            else:
+                is_room = False
+        ask_for_next(world)
+    return n_events, n_delivered, is_room
 
 
-@kernel
-def run_timers(
-    step: int,
-    period: float,
-    limit: float,
-    gossip: bool,
-    in_delivery: NDArray[np.bool_],
-    present: NDArray[np.bool_],
-    honest: NDArray[np.bool_],
-    heard: NDArray[np.float64],
-    last_in_delivery: NDArray[np.int64],
-    timer: NDArray[np.float64],
-    told: NDArray[np.float64],
-) -> None:
-    """Advance every robot's timer and what it tells (NaN: silent), both (N,) [s].
-
-    Counted in steps, so that rounding never adds up. With gossip a robot tells the lowest of its
-    own timer and of what it heard one period ago, aged. One that is not honest tells 0.
-    """
-    for robot in range(timer.shape[0]):
-        if in_delivery[robot]:
-            last_in_delivery[robot] = step
-        timer[robot] = math.nan
-        if present[robot] and last_in_delivery[robot] >= 0:
-            elapsed = (step - last_in_delivery[robot]) * period
-            if elapsed < limit - 1e-9:
-                timer[robot] = elapsed
-        value = timer[robot]
-        if gossip and present[robot] and heard[robot] + period < limit - 1e-9:
-            value = (
-                heard[robot] + period if math.isnan(value) else min(value, heard[robot] + period)
-            )
-        told[robot] = value
-        if present[robot] and not honest[robot]:
-            told[robot] = 0.0
+@inlined_kernel
+def ask_for_next(world: World) -> None:
+    """Ask for the next item in the order of requests that has not left for good."""
+    items, progress = world.items, world.progress
+    progress.requested[0] = NOBODY
+    if np.all(items.status == DELIVERED):
+        return
+    while progress.requested[0] == NOBODY:
+        progress.n_asked[0] += 1
+        cycle, place = divmod(progress.n_asked[0], len(items.order))
+        if place == 0:
+            draw_order(items.request_key, cycle, items.order)
+        if items.status[items.order[place]] != DELIVERED:
+            progress.requested[0] = items.order[place]

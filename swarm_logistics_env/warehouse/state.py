@@ -1,4 +1,4 @@
-"""The arrays of one world, their shapes and units."""
+"""The state of one world, by the names that everybody outside this folder uses."""
 
 from __future__ import annotations
 
@@ -8,125 +8,118 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.structs import (
+    CARRIED,
+    DELIVERED,
+    NOBODY,
+    STORED,
+    blank_capabilities,
+    blank_items,
+    blank_progress,
+    blank_robots,
+)
 
-STORED, CARRIED, DELIVERED = 0, 1, 2
-NOBODY = -1
-
-# Rows of the tables.
-HEADING, TIMER, TOLD, HEARD, MAX_SPEED, MAX_TURN_RATE, RANGER_RANGE, VIEW_RANGE = range(8)
-PRESENT, IN_DELIVERY, CONTACT, LIFTS, DELIVERS, SENDS, HEARS, HONEST, OBEYS, FAILED = range(10)
-ITEM, LAST_IN_DELIVERY, PILE = range(3)
-STATUS, CARRIER, COVERED = range(3)
+__all__ = ["CARRIED", "DELIVERED", "NOBODY", "STORED", "WarehouseState"]
 
 T = TypeVar("T", bound=np.generic)
+V = TypeVar("V", int, float)
 
 
-class Column(Generic[T]):
-    """One named quantity in a table of several, each a contiguous run of the table's memory.
+class Quantity(Generic[T]):
+    """An array of a structure; what is assigned is copied into it, as kernels know where it lies.
 
-    Tables rather than single arrays, because every array handed to a kernel costs time.
+    Args:
+        structure: the state's attribute that holds the structure.
+        name: the structure's field, where shape and unit are told.
     """
 
-    def __init__(self, table: str, index: int) -> None:
-        self.table, self.index = table, index
+    def __init__(self, structure: str, name: str) -> None:
+        self.structure, self.name = structure, name
 
     def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> NDArray[T]:
-        """Return the quantity as a view."""
-        column: NDArray[T] = state.__dict__[self.table][self.index]
-        return column
+        """Return the array."""
+        array: NDArray[T] = getattr(state.__dict__[self.structure], self.name)
+        return array
 
     def __set__(self, state: WarehouseState, values: NDArray[T]) -> None:
-        """Copy `values` into the table."""
-        state.__dict__[self.table][self.index] = values
+        """Copy `values` into the array."""
+        getattr(state.__dict__[self.structure], self.name)[...] = values
 
 
-class Array(Generic[T]):
-    """One array: what is assigned to it is copied into it, as kernels know where it lies."""
+class Count(Generic[V]):
+    """A number of `Progress`."""
 
     def __set_name__(self, owner: type[WarehouseState], name: str) -> None:
         """Take the attribute's name."""
         self.name = name
 
-    def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> NDArray[T]:
-        """Return the array."""
-        array: NDArray[T] = state.__dict__[self.name]
-        return array
+    def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> V:
+        """Return the number."""
+        number: V = getattr(state.progress, self.name).item()
+        return number
 
-    def __set__(self, state: WarehouseState, values: NDArray[T]) -> None:
-        """Copy `values` into the array, which they become if there is none."""
-        state.__dict__.setdefault(self.name, values)[...] = values
+    def __set__(self, state: WarehouseState, value: V) -> None:
+        """Set the number."""
+        getattr(state.progress, self.name)[0] = value
 
 
 class WarehouseState:
     """What is true in the warehouse now. N robots, I items; a row is one robot or item for good.
 
-    The row of a robot that is absent holds zeros and `NOBODY`.
+    `structs` tells of every array its shape and unit. The row of a robot that is absent holds
+    zeros and `NOBODY`.
     """
 
-    robot_heading = Column[np.float64]("numbers", HEADING)  # (N,) [rad] from +x to the left, +-pi
-    robot_timer = Column[np.float64]("numbers", TIMER)  # (N,) [s] since the area, NaN when silent
-    robot_told = Column[np.float64]("numbers", TOLD)  # (N,) [s] told, NaN when silent
-    robot_heard = Column[np.float64]("numbers", HEARD)  # (N,) [s] lowest heard, NaN when none
-    max_speed = Column[np.float64]("numbers", MAX_SPEED)  # (N,) [m/s]
-    max_turn_rate = Column[np.float64]("numbers", MAX_TURN_RATE)  # (N,) [rad/s]
-    ranger_range = Column[np.float64]("numbers", RANGER_RANGE)  # (N,) [m], 0 when blind
-    view_range = Column[np.float64]("numbers", VIEW_RANGE)  # (N,) [m]
+    robot_position = Quantity[np.float64]("robots", "position")
+    robot_velocity = Quantity[np.float64]("robots", "velocity")
+    robot_heading = Quantity[np.float64]("robots", "heading")
+    robot_heading_drift = Quantity[np.float64]("robots", "heading_drift")
+    robot_present = Quantity[np.bool_]("robots", "present")
+    robot_in_delivery = Quantity[np.bool_]("robots", "in_delivery")
+    robot_contact = Quantity[np.bool_]("robots", "contact")
+    robot_item = Quantity[np.int64]("robots", "item")
+    robot_memory = Quantity[np.int64]("robots", "memory")
+    robot_timer = Quantity[np.float64]("robots", "timer")
+    robot_told = Quantity[np.float64]("robots", "told")
+    robot_heard = Quantity[np.float64]("robots", "heard")
+    robot_message = Quantity[np.float64]("robots", "message")
+    last_in_delivery = Quantity[np.int64]("robots", "last_in_delivery")
+    failed = Quantity[np.bool_]("robots", "failed")
 
-    robot_present = Column[np.bool_]("flags", PRESENT)  # (N,)
-    robot_in_delivery = Column[np.bool_]("flags", IN_DELIVERY)  # (N,) its centre is in the area
-    robot_contact = Column[np.bool_]("flags", CONTACT)  # (N,) touches something solid to it
-    # What each robot can do now; failures take from it, as from the ranges and speeds above.
-    lifts = Column[np.bool_]("flags", LIFTS)  # (N,)
-    delivers = Column[np.bool_]("flags", DELIVERS)  # (N,)
-    sends = Column[np.bool_]("flags", SENDS)  # (N,)
-    hears = Column[np.bool_]("flags", HEARS)  # (N,)
-    honest = Column[np.bool_]("flags", HONEST)  # (N,) False: tells timer 0 always
-    obeys = Column[np.bool_]("flags", OBEYS)  # (N,) False: ignores its commands, the gripper's too
-    failed = Column[np.bool_]("flags", FAILED)  # (N,) any failure mode holds
+    max_speed = Quantity[np.float64]("able", "max_speed")
+    max_turn_rate = Quantity[np.float64]("able", "max_turn_rate")
+    ranger_range = Quantity[np.float64]("able", "ranger_range")
+    view_range = Quantity[np.float64]("able", "view_range")
+    lifts = Quantity[np.bool_]("able", "lifts")
+    delivers = Quantity[np.bool_]("able", "delivers")
+    sends = Quantity[np.bool_]("able", "sends")
+    hears = Quantity[np.bool_]("able", "hears")
+    honest = Quantity[np.bool_]("able", "honest")
+    obeys = Quantity[np.bool_]("able", "obeys")
 
-    robot_item = Column[np.int64]("links", ITEM)  # (N,) item carried, or NOBODY
-    last_in_delivery = Column[np.int64]("links", LAST_IN_DELIVERY)  # (N,) step, or NOBODY
-    robot_pile = Column[np.int64]("links", PILE)  # (N,) towards one robot of those it touches
-    item_status = Column[np.int64]("item_links", STATUS)  # (I,) STORED, CARRIED or DELIVERED
-    item_carrier = Column[np.int64]("item_links", CARRIER)  # (I,) robot, or NOBODY
-    item_covered = Column[np.int64]("item_links", COVERED)  # (I,) 1: stored, yet no obstacle; or 0
+    item_position = Quantity[np.float64]("items", "position")
+    item_status = Quantity[np.int64]("items", "status")
+    item_carrier = Quantity[np.int64]("items", "carrier")
+    item_covered = Quantity[np.int64]("items", "covered")
 
-    numbers, links, item_links = Array[np.float64](), Array[np.int64](), Array[np.int64]()
-    flags = Array[np.bool_]()
-    robot_position = Array[np.float64]()  # (N, 2) [m]
-    robot_velocity = Array[np.float64]()  # (N, 2) [m/s]
-    robot_memory = Array[np.int64]()  # (N, memory_size) put down, newest first
-    robot_message = Array[np.float64]()  # (N, message_size) in [-1, 1], broadcast
-    item_position = Array[np.float64]()  # (I, 2) [m], its carrier's while carried
-    obstacle_position = Array[np.float64]()  # (n_obstacles, 2) [m]
+    step, requested, time = Count[int](), Count[int](), Count[float]()
+    anchoring_seconds = Count[float]()
 
     def __init__(self, scenario: Scenario) -> None:
-        n, items = scenario.n_robots, scenario.n_items
-        self.numbers = np.full((8, n), np.nan)
-        self.numbers[HEADING] = 0.0
-        self.flags = np.ones((10, n), np.bool_)
-        self.flags[[IN_DELIVERY, CONTACT, FAILED]] = False
-        self.links = np.full((3, n), NOBODY)
-        self.item_links = np.full((3, items), NOBODY)
-        self.robot_position = np.zeros((n, 2))
-        self.robot_velocity = np.zeros((n, 2))
-        self.robot_memory = np.full((n, scenario.memory_size), NOBODY)
-        self.robot_message = np.zeros((n, scenario.message_size))
-        self.item_position = np.zeros((items, 2))
-        self.item_status[:], self.item_covered[:] = STORED, 0
-        self.obstacle_position = np.zeros((scenario.n_obstacles, 2))
-        self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * n  # per robot, those that hold
-        self.step = 0  # control steps since the start
-        self.time = 0.0  # [s]
-        self.requested = 0  # the item asked for now, or NOBODY when all are delivered
+        self.robots = blank_robots(scenario)
+        self.able = blank_capabilities(scenario)
+        self.items = blank_items(scenario)
+        self.progress = blank_progress()
+        self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
+        # Per robot, the failure modes that hold.
+        self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots
         self.delivery_times: list[float] = []  # [s], ascending
         self.delivered_by: list[int] = []  # robot, one per delivery
-        self.anchoring_seconds = 0.0  # robot-seconds of working robots touching failed ones
 
     @property
     def n_robots(self) -> int:
         """Rows of robots, absent ones included."""
-        return len(self.robot_position)
+        return len(self.robots.position)
 
     @property
     def delivered(self) -> int:

@@ -13,18 +13,25 @@ from numpy.typing import ArrayLike, NDArray
 from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.warehouse import layout, stepping
 from swarm_logistics_env.warehouse.faults import Fault, apply_faults, failed_robots
-from swarm_logistics_env.warehouse.grid import Grid
+from swarm_logistics_env.warehouse.grid import blank_grid
+from swarm_logistics_env.warehouse.packing import packed
 from swarm_logistics_env.warehouse.physics import Physics
-from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED, WarehouseState
-from swarm_logistics_env.warehouse.tables import Tables
+from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.warehouse.stepping import StepResult
+from swarm_logistics_env.warehouse.structs import (
+    World,
+    blank_claims,
+    blank_nearby,
+    parameters_of,
+)
 
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
-_NOT_KEPT = ("_physics", "_tables", "_memory", "_log")
+_NOT_KEPT = ("_physics", "_world", "_words", "_memory", "_log")
 
 
 class Warehouse:
@@ -50,7 +57,7 @@ class Warehouse:
         self.scenario = scenario or Scenario()
         self.state = WarehouseState(self.scenario)
         self.faults: tuple[Fault, ...] = ()
-        self._struck: list[NDArray[np.int64]] = []
+        self._affected: list[NDArray[np.int64]] = []
         self.n_removed = 0
         self._n_steps = self.scenario.n_steps
         self._seed: int | None = None
@@ -74,26 +81,29 @@ class Warehouse:
             ScenarioError: items or robots found no room.
         """
         scenario = scenario or self.scenario
-        struck = [failed_robots(fault, seed, scenario.n_robots) for fault in faults]
+        affected = [failed_robots(fault, seed, scenario.n_robots) for fault in faults]
         state = WarehouseState(scenario)
         state.obstacle_position = layout.place_obstacles(scenario, seed)
         state.item_position = layout.place_items(scenario, seed, state.obstacle_position)
         state.robot_position, state.robot_heading = layout.place_robots(
             scenario, seed, state.obstacle_position
         )
+        state.robot_heading_drift = layout.heading_drifts(scenario, seed)
+        state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
+        items = state.items
+        items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
+        items.restock_key[0] = key(seed, "restock")
+        layout.draw_order(items.request_key, 0, items.order)
+        state.requested = int(items.order[0])
         self.scenario, self.state, self._seed = scenario, state, seed
-        self.faults, self._struck, self.n_removed = tuple(faults), struck, 0
-        self._order = layout.request_order(scenario, seed)
-        state.requested, self._asked = int(self._order[0]), 0
-        self._sensor_keys = row_keys(seed, "sensors", scenario.n_robots)
-        self._make_room_to_work(scenario)
-        self._take_constants(scenario)
-        self._build_physics()
+        self.faults, self._affected, self.n_removed = tuple(faults), affected, 0
+        self._make_room_to_work()
+        self._build()
         self._apply_faults()
         self._rows = self._blank_rows()
-        self._perceive()
-        self._log = []
-        self._remember()
+        stepping.perceive(self._address, self._rows)
+        state.anchoring_seconds = 0.0
+        self._save()
         return self.observe()
 
     def step(self, commands: ArrayLike) -> NDArray[np.float32]:
@@ -113,57 +123,39 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         given, rows = self._checked(commands), self._blank_rows()
-        state = self.state
-        outcome = stepping.step(
-            self._tables.addresses, given, state.step + 1, state.requested,
-            self._is_fault_due(self._next_time()), rows,
-        )  # fmt: skip
-        return self.arrive(given, rows, outcome)
+        self.take(given, rows, stepping.step(self._address, given, rows))
+        return rows
 
-    def order(self) -> tuple[int, int, int, int, int, bool]:
-        """Return what `stepping.step` has to know of the next step, for `Crew`.
-
-        The address and length of the tables, N, the step's number, the requested item, and
-        whether to pause before perceiving.
-
-        Raises:
-            SetupError: the world was never reset.
-        """
-        if self._seed is None:
-            raise _not_begun("step")
-        state, tables = self.state, self._tables
-        return (
-            tables.where, len(tables.addresses), len(state.robot_position), state.step + 1,
-            state.requested, self._is_fault_due(self._next_time()),
-        )  # fmt: skip
-
-    def arrive(
-        self, commands: NDArray[np.float64], rows: NDArray[np.float32], outcome: int
-    ) -> NDArray[np.float32]:
-        """Take over what `stepping.step` made of `commands` and returned; returns `rows`.
+    def take(
+        self, commands: NDArray[np.float64], rows: NDArray[np.float32], result: StepResult
+    ) -> None:
+        """Take over a step that compiled code took: what became of `commands` and `rows`.
 
         Raises:
             CommandError: a robot's command is not finite; the world is as it was.
+            ScenarioError: an item that came back to the storage found no room.
         """
-        state, scenario = self.state, self.scenario
-        if outcome == stepping.NOT_FINITE:
-            obeying = state.robot_present & state.obeys
-            bad = np.argwhere(~np.isfinite(commands) & obeying[:, None])[0]
+        if result.refused != NOBODY:
+            robot, column = divmod(result.refused, commands.shape[1])
             raise CommandError(
-                f"commands[{bad[0]}, {bad[1]}] = {commands[bad[0], bad[1]]}: should be finite"
+                f"commands[{robot}, {column}] = {commands[robot, column]}: should be finite"
             )
         self._log.append(commands)
-        self._rows, state.step, state.time = rows, state.step + 1, self._next_time()
-        anchored = outcome
-        if outcome == stepping.TO_BE_PERCEIVED:
-            self._deliver()
-            if self._is_fault_due(state.time):
-                self._apply_faults()
-            anchored = self._perceive()
-        state.anchoring_seconds += anchored * scenario.control_period
+        self._rows, state = rows, self.state
+        if result.n_delivered:
+            robots = self._world.claims.delivered_by[: result.n_delivered]
+            state.delivery_times += [state.time] * result.n_delivered
+            state.delivered_by += robots.tolist()
+        if result.is_paused:
+            self._apply_faults()
+            stepping.perceive(self._address, rows)
         if len(self._log) >= self._longest_log:
             self._remember()
-        return rows
+        if not result.is_room:
+            raise ScenarioError(
+                f"no room for items that come back (delivery {state.delivered}): should be fewer "
+                "items or robots, or a larger warehouse"
+            )
 
     def change(self, **fields: Any) -> None:
         """Change conditions while the robots are at work, from the next step on.
@@ -184,7 +176,6 @@ class Warehouse:
                     f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
                 )
         self.scenario = self.scenario.replace(**fields)
-        self._take_constants(self.scenario)
         self._apply_faults()
         self._remember()
 
@@ -197,8 +188,8 @@ class Warehouse:
         """
         if self._seed is None:
             raise _not_begun("set_faults")
-        struck = [failed_robots(fault, self._seed, self.state.n_robots) for fault in faults]
-        self.faults, self._struck = tuple(faults), struck
+        affected = [failed_robots(fault, self._seed, self.state.n_robots) for fault in faults]
+        self.faults, self._affected = tuple(faults), affected
         self._apply_faults()
         self._remember()
 
@@ -215,7 +206,18 @@ class Warehouse:
     @property
     def struck_robots(self) -> tuple[int, ...]:
         """The robots that any fault of this episode names, ascending."""
-        return tuple(sorted({int(robot) for robots in self._struck for robot in robots}))
+        return tuple(sorted({int(robot) for robots in self._affected for robot in robots}))
+
+    @property
+    def address(self) -> int:
+        """Where compiled code finds the world; another place whenever its bodies are made anew.
+
+        Raises:
+            SetupError: the world was never reset.
+        """
+        if self._seed is None:
+            raise _not_begun("step")
+        return self._address
 
     @property
     def all_delivered(self) -> bool:
@@ -250,26 +252,17 @@ class Warehouse:
             raise CommandError(f"commands of shape {given.shape}: should be {full}")
         return given
 
-    def _make_room_to_work(self, scenario: Scenario) -> None:
-        n, items = scenario.n_robots, scenario.n_items
+    def _make_room_to_work(self) -> None:
+        scenario = self.scenario
+        n, n_items = scenario.n_robots, scenario.n_items
         width, height = scenario.warehouse_width, scenario.warehouse_height
         cell = (scenario.ranger_range + scenario.robot_radius) / 2
-        self._robot_grid = Grid(width, height, cell, n)
-        self._item_grid = Grid(width, height, cell, items)
-        self._claim = np.full(items, NOBODY)
-        self._claim_square = np.zeros(items)
-        self._events = np.zeros((2 * n, 3), np.int64)
-        self._constants = np.zeros(stepping.N_CONSTANTS)
+        self._robot_grid = blank_grid(width, height, cell, n)
+        self._item_grid = blank_grid(width, height, cell, n_items)
         self._command_shape = (n, len(COMMAND_COLUMNS) + scenario.message_size)
+        self._row_shape = (n, n_columns(scenario))
         size = math.prod(self._command_shape)
         self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
-
-    def _take_constants(self, scenario: Scenario) -> None:
-        self._n_steps = scenario.n_steps
-        self._n_columns = n_columns(scenario)
-        self._constants[:] = stepping.constants_of(
-            scenario, self._robot_grid.cell, self._item_grid.cell
-        )
 
     def _remember(self) -> None:
         """Note everything a pickle needs, and rebuild the bodies from it as unpickling will.
@@ -277,8 +270,10 @@ class Warehouse:
         What the engine remembers of contacts cannot be saved, so a pickle holds the world at the
         last such moment and the commands since, which unpickling replays.
         """
-        if self.state.step > 0:
-            self._build_physics()
+        self._build()
+        self._save()
+
+    def _save(self) -> None:
         self._log = []
         kept = {name: value for name, value in self.__dict__.items() if name not in _NOT_KEPT}
         self._memory = pickle.dumps(kept)
@@ -294,55 +289,17 @@ class Warehouse:
             return
         self.__dict__.update(pickle.loads(saved["_memory"]))
         self._memory, self._log = saved["_memory"], []
-        self._build_physics()
+        self._build()
         for commands in saved["_log"]:
             self.step(commands)
-
-    def _deliver(self) -> None:
-        state = self.state
-        while (item := state.requested) != NOBODY:
-            robot = stepping.deliver_requested(
-                item, state.flags, state.links, state.robot_memory, state.item_links
-            )
-            if robot == NOBODY:
-                return
-            self._physics.take_away(robot)
-            state.delivery_times.append(state.time)
-            state.delivered_by.append(robot)
-            if self.scenario.restock:
-                self._restock(item)
-            state.requested = self._next_request()
-
-    def _next_request(self) -> int:
-        status = self.state.item_status
-        if (status == DELIVERED).all():
-            return NOBODY
-        # Past what left for good before `restock` was switched on.
-        while True:
-            self._asked += 1
-            cycle, place = divmod(self._asked, self.scenario.n_items)
-            if place == 0:
-                self._order = layout.request_order(self.scenario, self._seed or 0, cycle)
-            item = int(self._order[place])
-            if status[item] != DELIVERED:
-                return item
-
-    def _restock(self, item: int) -> None:
-        state = self.state
-        free = state.item_position[state.item_status == STORED]
-        taken = np.vstack([free, state.robot_position[state.robot_present]])
-        place = layout.place_restocked(
-            self.scenario, self._seed or 0, state.delivered, taken, state.obstacle_position
-        )
-        state.item_status[item], state.item_covered[item] = STORED, 1
-        state.item_position[item] = place
-        self._physics.place(item, float(place[0]), float(place[1]))
 
     def _apply_faults(self) -> None:
         state = self.state
         times = {time for fault in self.faults for time in fault.changes()}
-        self._fault_times = sorted(time for time in times if time > state.time + 5e-7)
-        gone = apply_faults(state, self.scenario, self.faults, self._struck)
+        later = [time for time in times if time > state.time + 5e-7]
+        # The first step that ends when they have begun or ended.
+        state.progress.pause_step[0] = min(map(self._step_of, later), default=NOBODY)
+        gone = apply_faults(state, self.scenario, self.faults, self._affected)
         for robot in np.flatnonzero(gone & state.robot_present).tolist():
             self._remove(robot)
 
@@ -352,7 +309,7 @@ class Warehouse:
         if item != NOBODY:
             state.item_status[item], state.item_covered[item] = STORED, 1
             state.item_carrier[item] = NOBODY
-            self._physics.put_down(robot, item, *state.item_position[item].tolist())
+            self._physics.release(robot, item, *state.item_position[item].tolist())
         self._physics.remove(robot)
         self.n_removed += 1
         state.robot_present[robot] = False
@@ -362,34 +319,39 @@ class Warehouse:
         for zeroed in (state.robot_position, state.robot_velocity, state.robot_heading):
             zeroed[robot] = 0.0
 
-    def _next_time(self) -> float:
-        return (self.state.step + 1) * self.scenario.control_period
-
-    def _is_fault_due(self, time: float) -> bool:
-        """Return whether a fault begins or ends until then [s]."""
-        return bool(self._fault_times) and self._fault_times[0] <= time + 5e-7
-
-    def _perceive(self) -> int:
-        state = self.state
-        return stepping.perceive(self._tables.addresses, state.step, state.requested, self._rows)
+    def _step_of(self, time: float) -> int:
+        """Return the first step at whose end `time` [s] has come."""
+        period = self.scenario.control_period
+        step = max(math.floor(time / period) - 1, 0)
+        while step * period < time - 5e-7:
+            step += 1
+        return step
 
     def _blank_rows(self) -> NDArray[np.float32]:
         # New memory every time: what was handed out stays as it was.
-        return np.empty((len(self.state.robot_position), self._n_columns), np.float32)
+        return np.empty(self._row_shape, np.float32)
 
-    def _build_physics(self) -> None:
-        self._physics = Physics(self.scenario, self.state)
-        state, physics = self.state, self._physics
-        robots, items = self._robot_grid, self._item_grid
-        # In the order of their places in `stepping`.
-        self._tables = Tables([
-            physics.engine, physics.bodies, physics.velocities, self._claim, self._claim_square,
-            self._events, self._constants, state.robot_position, state.robot_velocity,
-            state.numbers, state.flags, state.links, state.robot_memory, state.item_position,
-            state.item_links, state.obstacle_position, robots.size, robots.start, robots.members,
-            robots.places, items.size, items.start, items.members, items.places,
-            self._sensor_keys, state.robot_message,
-        ])  # fmt: skip
+    def _build(self) -> None:
+        """Make the bodies, and tell compiled code where everything is."""
+        scenario, state = self.scenario, self.state
+        self._n_steps = scenario.n_steps
+        self._physics = Physics(scenario)
+        self._world = World(
+            parameters=parameters_of(scenario),
+            robots=state.robots,
+            able=state.able,
+            items=state.items,
+            obstacles=state.obstacle_position,
+            progress=state.progress,
+            robot_grid=self._robot_grid,
+            item_grid=self._item_grid,
+            nearby=blank_nearby(scenario),
+            claims=blank_claims(scenario),
+            engine=self._physics.engine,
+        )
+        self._words = packed(self._world)
+        self._address: int = self._words.ctypes.data
+        self._physics.begin(self._words)
 
 
 def _not_begun(asked: str) -> SetupError:

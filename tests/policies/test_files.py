@@ -39,6 +39,17 @@ def test_a_card_without_the_latest_fields_is_read(
     assert read_card(file) == card
 
 
+def test_a_card_from_before_there_was_a_drift_reads_it_as_none(
+    card: PolicyCard, tensors: Tensors, file: Path
+) -> None:
+    earlier = card.replace(scenario={"n_robots": 7}).to_json().replace('"heading_drift":0.0,', "")
+    assert "heading_drift" not in earlier
+    rewrite(file, earlier, tensors)
+    assert read_card(file).scenario == {"heading_drift": 0.0, "n_robots": 7}
+    drifting = card.replace(scenario={"heading_drift": 0.1})
+    assert drifting.scenario == {"heading_drift": 0.1}
+
+
 def test_a_file_that_is_cut_short_is_refused(file: Path) -> None:
     whole = file.read_bytes()
     for length in (0, 5, 100, len(whole) // 2, len(whole) - 1):

@@ -17,8 +17,8 @@ from swarm_logistics_env.warehouse import layout
 def build(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Warehouse]:
     """Return a maker of worlds that were just reset, with everything placed by hand.
 
-    Items are requested in the order of their numbers. All robots look along +x, so that forward
-    and left, in commands and observations, are x and y until one turns.
+    Items are requested in the order of their numbers. All robots look along +x and do not drift,
+    so that forward and left, in commands and observations, are x and y until one turns.
     """
 
     def make(
@@ -35,8 +35,9 @@ def build(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Warehouse]:
         monkeypatch.setattr(layout, "place_robots", lambda *_: (places.copy(), np.zeros(n)))
         monkeypatch.setattr(layout, "place_items", lambda *_: item_places.copy())
         monkeypatch.setattr(layout, "place_obstacles", lambda *_: solids.copy())
-        monkeypatch.setattr(layout, "request_order", lambda *_: np.arange(n_items))
-        scenario = Scenario(n_robots=n, n_items=n_items, n_obstacles=len(solids), **fields)
+        monkeypatch.setattr(layout, "draw_order", lambda *_: None)  # in the order of their numbers
+        counts = {"n_robots": n, "n_items": n_items, "n_obstacles": len(solids)}
+        scenario = Scenario(**{"heading_drift": 0.0, **counts, **fields})
         world = Warehouse(scenario)
         world.reset(0, faults)
         return world

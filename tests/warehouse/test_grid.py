@@ -6,14 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from swarm_logistics_env.warehouse.grid import Grid, cell_along, fill
+from swarm_logistics_env.warehouse.grid import blank_grid, cell_along, fill
+from swarm_logistics_env.warehouse.structs import Grid
 
 
 def filled(
     grid: Grid, position: NDArray[np.float64], included: NDArray[np.bool_]
 ) -> list[list[int]]:
     """Return the points of each cell."""
-    fill(position, included, grid.cell, grid.size, grid.start, grid.members, grid.places)
+    fill(grid, position, included)
     listed = grid.members[: grid.start[-1]]
     np.testing.assert_array_equal(grid.places[: len(listed)], position[listed])
     return [
@@ -36,7 +37,7 @@ def test_every_included_point_stands_once_in_the_cell_that_holds_it(
     # Some a little outside, as bodies are that were just pushed into a wall.
     position = rng.uniform([-0.05, -0.05], [width + 0.05, height + 0.05], (n, 2))
     included = rng.random(n) < 0.7
-    grid = Grid(width, height, cell, n)
+    grid = blank_grid(width, height, cell, n)
     cells = filled(grid, position, included)
     assert grid.cell >= cell
     assert (
@@ -44,7 +45,7 @@ def test_every_included_point_stands_once_in_the_cell_that_holds_it(
     )
     for index, members in enumerate(cells):
         assert members == sorted(members)  # so that ties never depend on memory
-        low = np.array([index % grid.size[0], index // grid.size[0]]) * grid.cell
+        low = np.array([index % grid.n_columns, index // grid.n_columns]) * grid.cell
         for point in members:
             inside = np.clip(position[point], 0.0, [width, height])
             assert (inside >= low - 1e-9).all()
@@ -52,7 +53,7 @@ def test_every_included_point_stands_once_in_the_cell_that_holds_it(
 
 
 def test_filling_again_forgets_what_was_there() -> None:
-    grid = Grid(4.0, 4.0, 1.0, 3)
+    grid = blank_grid(4.0, 4.0, 1.0, 3)
     position = np.array([[0.5, 0.5], [1.5, 2.5], [3.5, 3.5]])
     assert sum(map(len, filled(grid, position, np.ones(3, np.bool_)))) == 3
     assert sum(map(len, filled(grid, position, np.array([False, True, False])))) == 1
@@ -67,5 +68,5 @@ def test_outside_counts_as_the_edge(coordinate: float, expected: int) -> None:
 
 
 def test_a_grid_over_a_huge_and_empty_arena_stays_small() -> None:
-    grid = Grid(1000.0, 1000.0, 1.0, 10)
+    grid = blank_grid(1000.0, 1000.0, 1.0, 10)
     assert len(grid.start) < 200

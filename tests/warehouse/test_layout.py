@@ -1,14 +1,20 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from swarm_logistics_env import Scenario
+from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.errors import ScenarioError
+from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.warehouse import layout
+from swarm_logistics_env.warehouse.state import DELIVERED
+
+Build = Callable[..., Warehouse]
 
 NOTHING = np.zeros((0, 2))
 SEEDS = st.integers(-(2**70), 2**70)
@@ -52,20 +58,22 @@ def test_a_place_depends_on_its_own_number_not_on_how_many_follow(seed: int) -> 
     np.testing.assert_array_equal(headings[0], headings[1][:5])
 
 
+def request_order(n_items: int, seed: int, cycle: int) -> NDArray[np.int64]:
+    order = np.zeros(n_items, np.int64)
+    layout.draw_order(row_keys(seed, "requests 0", n_items), cycle, order)
+    return order
+
+
 @given(seed=SEEDS, cycle=st.integers(0, 3))
 @settings(max_examples=30)
 def test_every_item_is_requested_once_and_in_an_order_keyed_by_item(seed: int, cycle: int) -> None:
-    few, many = Scenario(n_items=10), Scenario(n_items=60)
-    order = layout.request_order(many, seed, cycle)
+    order = request_order(60, seed, cycle)
     assert sorted(order) == list(range(60))
-    np.testing.assert_array_equal(order[order < 10], layout.request_order(few, seed, cycle))
+    np.testing.assert_array_equal(order[order < 10], request_order(10, seed, cycle))
 
 
 def test_orders_differ_between_seeds_and_cycles() -> None:
-    scenario = Scenario()
-    orders = {
-        tuple(layout.request_order(scenario, seed, cycle)) for seed in range(5) for cycle in (0, 1)
-    }
+    orders = {tuple(request_order(60, seed, cycle)) for seed in range(5) for cycle in (0, 1)}
     assert len(orders) == 10
 
 
@@ -97,19 +105,28 @@ def test_a_restocked_item_stands_clear_and_each_elsewhere() -> None:
     scenario = Scenario(
         n_robots=20, n_items=20, warehouse_width=5, warehouse_height=3, restock=True
     )
-    robots, _ = layout.place_robots(scenario, 0, NOTHING)
-    taken = np.vstack([layout.place_items(scenario, 0, NOTHING), robots])
-    places = np.array(
-        [layout.place_restocked(scenario, 0, count, taken, NOTHING) for count in range(1, 30)]
-    )
-    assert narrowest(places, taken) >= 0.25
-    assert (places >= 0.125).all()
-    assert (places <= np.array([3.0, 3.0]) - 0.125).all()
+    world = Warehouse(scenario)
+    world.reset(0)
+    items, robots = world.state.items, world.state.robots
+    items.status[0] = DELIVERED
+    taken, places = np.vstack([items.position[1:], robots.position]), []
+    for count in range(1, 30):
+        world.state.progress.n_delivered[0] = count
+        assert layout.place_restocked(world._world, 0)
+        places.append(items.position[0].copy())
+    assert narrowest(np.array(places), taken) >= 0.25
+    assert (np.array(places) >= 0.125).all()
+    assert (np.array(places) <= np.array([3.0, 3.0]) - 0.125).all()
     assert len(np.unique(places, axis=0)) == 29
 
 
-def test_where_nothing_fits_any_more_it_says_what_would_help() -> None:
-    scenario = Scenario(n_robots=2, n_items=2, warehouse_width=3, warehouse_height=1)
-    wall_to_wall = np.array([(x, y) for x in np.arange(0, 3, 0.1) for y in np.arange(0, 1, 0.1)])
+def test_where_nothing_fits_any_more_it_says_what_would_help(build: Build) -> None:
+    # The obstacle takes the middle of the storage, which is as high as wide.
+    world = build(
+        [(1.5, 0.6)], [(1.45, 0.6)], obstacles=[(0.6, 0.6)], warehouse_width=2.4,
+        warehouse_height=1.2, delivery_width=1.2, item_radius=0.25, robot_radius=0.05, restock=True,
+    )  # fmt: skip
     with pytest.raises(ScenarioError, match=r"no room .* items .* should be fewer .* or a larger"):
-        layout.place_restocked(scenario, 0, 1, wall_to_wall, NOTHING)
+        world.step([(0.0, 0.0, 0.0, 1.0)])
+    assert (world.state.delivered, world.state.step) == (1, 1)
+    assert world.all_delivered

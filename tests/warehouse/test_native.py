@@ -55,6 +55,6 @@ def test_a_stored_int_leaves_its_neighbours_alone() -> None:
 
 
 def test_a_pymunk_without_the_functions_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(physics._FUNCTIONS, 0, "cpSpaceLeap")
+    monkeypatch.setitem(physics._FUNCTIONS, "step", "cpSpaceLeap")
     with pytest.raises(SetupError, match=r"pymunk 7.* lacks a function: .*cpSpaceLeap"):
         physics._function_addresses()

@@ -8,9 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env import Fault, Warehouse
 from swarm_logistics_env.warehouse.state import STORED
 
 Build = Callable[..., Warehouse]
@@ -35,44 +34,6 @@ def deepest_in_walls(world: Warehouse) -> float:
     at, scenario = world.state.robot_position, world.scenario
     far = np.array([scenario.warehouse_width, scenario.warehouse_height]) - at
     return float(DIAMETER / 2 - min(at.min(), far.min()))
-
-
-def towards(world: Warehouse, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-    """Return commands that drive everybody to (x, y), or each to its own, at top speed."""
-    away = np.array(np.broadcast_arrays(x, y, np.zeros(world.state.n_robots))[:2]).T
-    away = away - world.state.robot_position
-    angle = np.arctan2(away[:, 1], away[:, 0]) - world.state.robot_heading
-    zeros = np.zeros_like(angle)
-    return np.column_stack([np.cos(angle), np.sin(angle), zeros, zeros])
-
-
-def test_a_jam_of_150_robots_at_a_wall_keeps_their_bodies_apart() -> None:
-    world = Warehouse(Scenario(n_robots=150, n_items=1))
-    world.reset(0)
-    for step in range(120):
-        world.step(towards(world, *(world.state.robot_position + np.array([10.0, 0.0])).T))
-        assert deepest_overlap(world) <= CLOSING
-        if step >= 80:
-            assert deepest_overlap(world) <= SUSTAINED
-            assert deepest_in_walls(world) <= SUSTAINED
-    assert np.median(world.state.robot_position[:, 0]) > 9.0  # it is a jam
-
-
-@pytest.mark.parametrize("corner", [(0.0, 0.0), (10.0, 10.0)])
-def test_a_jam_of_150_robots_in_a_corner_keeps_their_bodies_apart(
-    corner: tuple[float, float],
-) -> None:
-    # All drive at one point, so now and then a part of the pile gives way: never by more than an
-    # impact, and not for long.
-    world = Warehouse(Scenario(n_robots=150, n_items=1))
-    world.reset(0)
-    overlaps = []
-    for _ in range(120):
-        world.step(towards(world, *corner))
-        overlaps.append(deepest_overlap(world))
-    assert max(overlaps) <= CLOSING
-    assert np.median(overlaps[80:]) <= SUSTAINED
-    assert np.median(np.linalg.norm(world.state.robot_position - corner, axis=1)) < 3.0
 
 
 @pytest.mark.parametrize("gap", np.linspace(0.3, 0.45, 7))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.warehouse import crew as crews
-from swarm_logistics_env.warehouse.crew import Crew
+from swarm_logistics_env.warehouse import thread_pool
+from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 
 SMALL: dict[str, Any] = {
     "warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.5, "n_items": 6,
@@ -43,7 +43,9 @@ def commands(step: int) -> NDArray[np.float64]:
 FIRSTS = [0, 2, 7, 8]
 
 
-def step(crew: Crew, made: list[Warehouse], given: NDArray[np.float64]) -> NDArray[np.float32]:
+def step(
+    pool: WorldThreadPool, made: list[Warehouse], given: NDArray[np.float64]
+) -> NDArray[np.float32]:
     rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
     order = []
 
@@ -52,38 +54,38 @@ def step(crew: Crew, made: list[Warehouse], given: NDArray[np.float64]) -> NDArr
         assert np.shares_memory(sensed, rows)
         assert sensed is made[place].observe()
 
-    crew.step(made, FIRSTS, given, rows, arrived)
+    pool.step(made, FIRSTS, given, rows, arrived)
     assert order == [0, 1, 2, 3]
     return rows
 
 
 @pytest.mark.parametrize("n_helpers", [0, 1, 3])
-def test_a_crew_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
-    crew, together, apart = Crew(len(SIZES), n_helpers), worlds(), worlds()
+def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
+    pool, together, apart = WorldThreadPool(len(SIZES), n_helpers), worlds(), worlds()
     for number in range(120):
         given = commands(number)
-        rows = step(crew, together, given)
+        rows = step(pool, together, given)
         for world, first in zip(apart, FIRSTS):
             own = slice(first, first + world.state.n_robots)
             np.testing.assert_array_equal(rows[own], world.step(given[own]))
     for mine, theirs in zip(together, apart):
         assert mine.state.delivery_times == theirs.state.delivery_times
         assert mine.state.anchoring_seconds == theirs.state.anchoring_seconds
-    crew.close()
+    pool.close()
 
 
 @pytest.mark.parametrize("is_closed", [True, False])
-def test_helpers_end_with_the_crew(is_closed: bool) -> None:
+def test_helpers_end_with_the_pool(is_closed: bool) -> None:
     before = set(threading.enumerate())
-    crew, made = Crew(len(SIZES), 2), worlds()
-    step(crew, made, commands(0))
-    helpers = [t for t in set(threading.enumerate()) - before if t.name == "swarm-crew"]
+    pool, made = WorldThreadPool(len(SIZES), 2), worlds()
+    step(pool, made, commands(0))
+    helpers = [t for t in set(threading.enumerate()) - before if t.name == "swarm-helper"]
     assert len(helpers) == 2
     if is_closed:
-        crew.close()
-        crew.close()
-        step(crew, made, commands(1))  # the caller does it alone
-    del crew
+        pool.close()
+        pool.close()
+        step(pool, made, commands(1))  # the caller does it alone
+    del pool
     gc.collect()
     for helper in helpers:
         helper.join(10.0)
@@ -91,53 +93,53 @@ def test_helpers_end_with_the_crew(is_closed: bool) -> None:
 
 
 def test_all_worlds_are_taken_over_when_the_caller_fails_at_one() -> None:
-    crew, made = Crew(len(SIZES), 1), worlds()
+    pool, made = WorldThreadPool(len(SIZES), 1), worlds()
     rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
 
     def arrived(place: int, sensed: NDArray[np.float32]) -> None:
         raise RuntimeError(f"not {place}")
 
     with pytest.raises(RuntimeError, match="not 0"):
-        crew.step(made, FIRSTS, commands(0), rows, arrived)
+        pool.step(made, FIRSTS, commands(0), rows, arrived)
     assert [world.state.step for world in made] == [1, 1, 1, 1]
-    step(crew, made, commands(1))
+    step(pool, made, commands(1))
     assert [world.state.step for world in made] == [2, 2, 2, 2]
-    crew.close()
+    pool.close()
 
 
 def test_what_a_world_refuses_is_raised() -> None:
-    crew, made = Crew(len(SIZES), 1), worlds()
+    pool, made = WorldThreadPool(len(SIZES), 1), worlds()
     given = commands(0)
     given[3, 1] = np.nan
     with pytest.raises(CommandError, match=r"commands\[1, 1\] = nan"):
-        step(crew, made, given)
+        step(pool, made, given)
     assert [world.state.step for world in made] == [1, 0, 1, 1]
 
     unused = Warehouse(Scenario(n_robots=2, **SMALL))
     with pytest.raises(SetupError, match="reset"):
-        step(crew, [unused, *made[1:]], commands(1))
+        step(pool, [unused, *made[1:]], commands(1))
     assert [world.state.step for world in made] == [1, 0, 1, 1]
-    crew.close()
+    pool.close()
 
 
 def test_a_world_that_refuses_keeps_none_of_those_behind_it() -> None:
-    crew, made = Crew(len(SIZES), 1), worlds()
+    pool, made = WorldThreadPool(len(SIZES), 1), worlds()
     given = commands(0)
     given[0, 0] = given[7, 2] = np.inf
     with pytest.raises(CommandError, match=r"commands\[0, 0\] = inf"):
-        step(crew, made, given)
+        step(pool, made, given)
     assert [world.state.step for world in made] == [0, 1, 0, 1]
-    crew.close()
+    pool.close()
 
 
 @pytest.mark.parametrize("n_helpers", [0, 2])
-@pytest.mark.parametrize("kernel", ["give", "exchange_sleepers", "work_once", "result"])
-def test_a_crew_goes_on_after_ctrl_c(
+@pytest.mark.parametrize("kernel", ["submit", "take_sleepers", "run_next_job", "finished_from"])
+def test_a_pool_goes_on_after_ctrl_c(
     n_helpers: int, kernel: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = getattr(crews, kernel)
-    crew, made = Crew(len(SIZES), n_helpers), worlds()
-    step(crew, made, commands(0))
+    original = getattr(thread_pool, kernel)
+    pool, made = WorldThreadPool(len(SIZES), n_helpers), worlds()
+    step(pool, made, commands(0))
     for interrupted in range(3):
         left = [interrupted]
 
@@ -150,12 +152,12 @@ def test_a_crew_goes_on_after_ctrl_c(
                 raise KeyboardInterrupt
             return answer
 
-        monkeypatch.setattr(crews, kernel, interrupting)
+        monkeypatch.setattr(thread_pool, kernel, interrupting)
         # What calls it, and how often, depends on how fast helpers are.
         while left[0] >= 0:
             with contextlib.suppress(KeyboardInterrupt):
-                step(crew, made, commands(1))
-        monkeypatch.setattr(crews, kernel, original)
+                step(pool, made, commands(1))
+        monkeypatch.setattr(thread_pool, kernel, original)
         for seed, world in enumerate(made):
             world.reset(seed)
         alone = worlds()
@@ -163,50 +165,51 @@ def test_a_crew_goes_on_after_ctrl_c(
             world.reset(seed)
         for number in range(10):
             given = commands(number)
-            rows = step(crew, made, given)
+            rows = step(pool, made, given)
             for world, first in zip(alone, FIRSTS):
                 own = slice(first, first + world.state.n_robots)
                 np.testing.assert_array_equal(rows[own], world.step(given[own]))
-    crew.close()
+    pool.close()
 
 
-def play_on(crew: Crew, made: list[Warehouse], expected: NDArray[np.float32]) -> None:
-    """In a process that was forked: the crew's threads stayed behind."""
-    np.testing.assert_array_equal(step(crew, made, commands(1)), expected)
-    assert sum(thread.name == "swarm-crew" for thread in threading.enumerate()) == 2
-    crew.close()
+def play_on(pool: WorldThreadPool, made: list[Warehouse], expected: NDArray[np.float32]) -> None:
+    """In a process that was forked: the pool's threads stayed behind."""
+    np.testing.assert_array_equal(step(pool, made, commands(1)), expected)
+    assert sum(thread.name == "swarm-helper" for thread in threading.enumerate()) == 2
+    pool.close()
 
 
 @pytest.mark.skipif(
     "fork" not in multiprocessing.get_all_start_methods(), reason="the system does not fork"
 )
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
-def test_a_process_that_was_forked_has_a_crew_of_its_own() -> None:
-    crew, made, alone = Crew(len(SIZES), 2), worlds(), Crew(len(SIZES), 0)
-    step(crew, made, commands(0))
+def test_a_process_that_was_forked_has_threads_of_its_own() -> None:
+    pool, made, alone = WorldThreadPool(len(SIZES), 2), worlds(), WorldThreadPool(len(SIZES), 0)
+    step(pool, made, commands(0))
     ahead = worlds()
     step(alone, ahead, commands(0))
     expected = step(alone, ahead, commands(1))
     forked = multiprocessing.get_context("fork").Process(
-        target=play_on, args=(crew, made, expected)
+        target=play_on, args=(pool, made, expected)
     )
     forked.start()
     forked.join(60.0)
     assert forked.exitcode == 0
-    np.testing.assert_array_equal(step(crew, made, commands(1)), expected)
-    crew.close()
+    np.testing.assert_array_equal(step(pool, made, commands(1)), expected)
+    pool.close()
 
 
-def test_a_program_ends_while_its_crew_is_at_work() -> None:
+def test_a_program_ends_while_its_pool_is_at_work() -> None:
     program = (
         "import numpy as np\n"
         "from swarm_logistics_env import Scenario, Warehouse\n"
-        "from swarm_logistics_env.warehouse.crew import Crew\n"
+        "from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool\n"
         "worlds = [Warehouse(Scenario(n_robots=2)) for _ in range(4)]\n"
         "for world in worlds: world.reset(0)\n"
-        "crew, rows = Crew(4, 3), np.zeros((8, worlds[0].observe().shape[1]), np.float32)\n"
+        "rows = np.zeros((8, worlds[0].observe().shape[1]), np.float32)\n"
+        "pool = WorldThreadPool(4, 3)\n"
         "for _ in range(20):\n"
-        "    crew.step(worlds, [0, 2, 4, 6], np.zeros((8, 4)), rows, lambda *_: None)\n"
+        "    pool.step(worlds, [0, 2, 4, 6], np.zeros((8, 4)), rows, lambda *_: None)\n"
         "print(rows.any())\n"
     )
     done = subprocess.run(

@@ -1,0 +1,110 @@
+"""The radio: every robot broadcasts its timer and a message to those in range that hear."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarm_logistics_env.kernels import inlined_kernel, pair_key, uniform
+from swarm_logistics_env.warehouse.kinematics import MESSAGE
+from swarm_logistics_env.warehouse.structs import (
+    NOBODY,
+    Capabilities,
+    Grid,
+    Nearby,
+    NumberRows,
+    Parameters,
+    Robots,
+)
+
+# Purposes of the streams between a robot and another thing: numbers of one step.
+RADIO, ROBOT_SEEN, ITEM_SEEN, N_PURPOSES = range(4)
+
+
+@inlined_kernel
+def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: float) -> bool:
+    """Return whether what `other` offers the robot of that key is lost in this step."""
+    if probability == 0.0:
+        return False
+    return uniform(pair_key(key, other), N_PURPOSES * step + purpose) < probability
+
+
+@inlined_kernel
+def send_messages(commands: NumberRows, robots: Robots, able: Capabilities) -> None:
+    """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
+    message = robots.message
+    is_given = commands.shape[1] == MESSAGE + message.shape[1]
+    for robot in range(len(message)):
+        sends = is_given and robots.present[robot] and able.obeys[robot]
+        for place in range(message.shape[1]):
+            given = commands[robot, MESSAGE + place] if sends else 0.0
+            message[robot, place] = min(max(given, -1.0), 1.0)
+
+
+@inlined_kernel
+def run_timers(robots: Robots, able: Capabilities, parameters: Parameters, step: int) -> None:
+    """Advance every robot's timer and what it tells (NaN: silent) [s].
+
+    Counted in steps, so that rounding never adds up. With gossip a robot tells the lowest of its
+    own timer and of what it heard one period ago, aged. One that is not honest tells 0.
+    """
+    period, limit = parameters.control_period, parameters.timer_limit - 1e-9
+    for robot in range(len(robots.timer)):
+        if robots.in_delivery[robot]:
+            robots.last_in_delivery[robot] = step
+        timer, is_present = math.nan, robots.present[robot]
+        if is_present and robots.last_in_delivery[robot] >= 0:
+            elapsed = (step - robots.last_in_delivery[robot]) * period
+            timer = elapsed if elapsed < limit else timer
+        robots.timer[robot] = timer
+        told = timer
+        aged = robots.heard[robot] + period
+        if parameters.is_gossip and is_present and aged < limit:
+            told = aged if math.isnan(told) else min(told, aged)
+        robots.told[robot] = 0.0 if is_present and not able.honest[robot] else told
+
+
+@inlined_kernel
+def hears(
+    me: int,
+    other: int,
+    square: float,
+    robots: Robots,
+    able: Capabilities,
+    parameters: Parameters,
+    step: int,
+) -> bool:
+    """Return whether `me` hears `other`, at a distance of which `square` [m^2] is the square."""
+    is_in_range = square <= parameters.radio_range**2
+    is_heard = is_in_range & able.sends[other] & able.hears[me]
+    loss = parameters.radio_loss
+    return is_heard and not is_missed(robots.sensor_key[me], other, step, RADIO, loss)
+
+
+@inlined_kernel
+def lowest_timer_heard(
+    me: int,
+    robots: Robots,
+    able: Capabilities,
+    parameters: Parameters,
+    step: int,
+    grid: Grid,
+    nearby: Nearby,
+    n_found: int,
+) -> tuple[int, float]:
+    """Return who of those nearby tells the lowest timer that `me` hears, or NOBODY, and it [s].
+
+    Of several that tell the same it is the nearest.
+    """
+    lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
+    # Without branches, as what they hang on cannot be predicted.
+    for index in range(n_found):
+        other, square = grid.members[nearby.place[index]], nearby.square[index]
+        told = robots.told[other]
+        is_lower = (told < lowest_timer) | ((told == lowest_timer) & (square < lowest_square))
+        is_lower &= hears(me, other, square, robots, able, parameters, step)
+        lowest = other if is_lower else lowest
+        lowest_square = square if is_lower else lowest_square
+        lowest_timer = told if is_lower else lowest_timer
+    return lowest, lowest_timer

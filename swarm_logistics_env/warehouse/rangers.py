@@ -1,0 +1,148 @@
+"""The rangers: 16 beams that measure the distance to robots, to solid things and to items."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.warehouse.structs import Grid, Nearby, NumberRows, Parameters
+
+_N_BEAMS = row.N_BEAMS
+_BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
+_BEAM_Y = np.sin(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
+# Tangents of the angles half-way between the beams of the first quarter.
+_BORDERS = tuple(math.tan((beam + 0.5) * 2.0 * math.pi / _N_BEAMS) for beam in range(_N_BEAMS // 4))
+# Beyond so many squares of its radius a disc meets only the beam nearest to its centre: it looks
+# less wide than the beams stand apart. A little more, so that rounding decides nothing.
+_ONE_BEAM = 1.001 / math.sin(math.pi / _N_BEAMS) ** 2
+
+
+class Pose(NamedTuple):
+    """Where a robot is and which way it looks."""
+
+    x: float  # [m]
+    y: float  # [m]
+    cosine: float  # of its heading
+    sine: float
+
+
+@inlined_kernel
+def in_frame(pose: Pose, x: float, y: float) -> tuple[float, float]:
+    """Return how far (x, y) [m] lies forward and to the left of the robot."""
+    dx, dy = x - pose.x, y - pose.y
+    return dx * pose.cosine + dy * pose.sine, dy * pose.cosine - dx * pose.sine
+
+
+@inlined_kernel
+def scan_disc(
+    forward: float, left: float, square: float, radius: float, scan: NDArray[np.float32]
+) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a disc.
+
+    Args:
+        forward, left: its centre in the robot's frame [m]; `square` is their squares' sum [m^2].
+        radius: of the disc [m].
+        scan: is changed.
+    """
+    clearance = square - radius * radius
+    middle = nearest_beam(forward, left)
+    if square > _ONE_BEAM * radius * radius:
+        # Without a branch: whether it is met cannot be predicted.
+        along = forward * _BEAM_X[middle] + left * _BEAM_Y[middle]
+        inside = along * along - clearance
+        distance = along - math.sqrt(max(inside, 0.0))
+        met = inside > 0.0 and distance < scan[middle]
+        scan[middle] = distance if met else scan[middle]
+        return
+    if clearance <= 0.0:
+        scan[:] = 0.0
+        return
+    # Outwards from the beam that looks nearest to its centre: if that one misses, all do.
+    for way in (1, -1):
+        for turned in range(_N_BEAMS // 2):
+            beam = (middle + way * (turned if way > 0 else turned + 1)) % _N_BEAMS
+            along = forward * _BEAM_X[beam] + left * _BEAM_Y[beam]
+            if along <= 0.0 or along * along <= clearance:
+                break
+            distance = along - math.sqrt(along * along - clearance)
+            if distance < scan[beam]:
+                scan[beam] = distance
+
+
+@inlined_kernel
+def nearest_beam(forward: float, left: float) -> int:
+    """Return the number of the beam that looks nearest to a direction in the robot's frame."""
+    across, ahead = abs(left), abs(forward)
+    beam = 0
+    for border in _BORDERS:
+        beam += across > border * ahead
+    if forward < 0.0:
+        beam = _N_BEAMS // 2 - beam
+    if left < 0.0:
+        beam = _N_BEAMS - beam
+    return beam % _N_BEAMS
+
+
+@inlined_kernel
+def scan_walls(pose: Pose, width: float, height: float, scan: NDArray[np.float32]) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall of the arena."""
+    reach = scan[0]
+    for axis in range(2):
+        if axis == 0:
+            back, front, ahead, aside = pose.x, width - pose.x, pose.cosine, -pose.sine
+        else:
+            back, front, ahead, aside = pose.y, height - pose.y, pose.sine, pose.cosine
+        if min(back, front) >= reach:
+            continue
+        back, front = max(back, 0.0), max(front, 0.0)
+        for beam in range(_N_BEAMS):
+            towards = _BEAM_X[beam] * ahead + _BEAM_Y[beam] * aside
+            # Without a branch: all beams together are a few vector instructions.
+            found = np.float32((front if towards > 0.0 else back) / abs(towards))
+            scan[beam] = found if found < scan[beam] else scan[beam]
+
+
+@inlined_kernel
+def scan_solids(
+    pose: Pose,
+    reach: float,
+    parameters: Parameters,
+    obstacles: NumberRows,
+    scan: NDArray[np.float32],
+) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""
+    scan_walls(pose, parameters.warehouse_width, parameters.warehouse_height, scan)
+    radius = parameters.obstacle_radius
+    for obstacle in range(len(obstacles)):
+        forward, left = in_frame(pose, obstacles[obstacle, 0], obstacles[obstacle, 1])
+        dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y
+        square = dx * dx + dy * dy
+        if square < (reach + radius) ** 2:
+            scan_disc(forward, left, square, radius, scan)
+
+
+@inlined_kernel
+def scan_discs(
+    pose: Pose,
+    reach: float,
+    radius: float,
+    grid: Grid,
+    nearby: Nearby,
+    n_found: int,
+    scan: NDArray[np.float32],
+) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet discs nearby, within `reach` [m]."""
+    limit, n_scanned = (reach + radius) ** 2, 0
+    # Written always and counted only if near: no branch to mispredict.
+    for index in range(n_found):
+        nearby.scanned[n_scanned] = index
+        n_scanned += int(nearby.square[index] < limit)
+    for index in nearby.scanned[:n_scanned]:
+        place, square = nearby.place[index], nearby.square[index]
+        forward, left = in_frame(pose, grid.places[place, 0], grid.places[place, 1])
+        scan_disc(forward, left, square, radius, scan)

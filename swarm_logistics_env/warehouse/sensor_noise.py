@@ -1,0 +1,73 @@
+"""Sensor noise: what turns a true observation row into a measured one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.kernels import gaussian, inlined_kernel, uniform
+from swarm_logistics_env.warehouse.structs import Capabilities, Parameters, Robots
+
+_N_BEAMS = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
+_ITEM_WIDTH, _NEIGHBOUR_WIDTH = len(row.ITEM_FEATURES), len(row.NEIGHBOUR_FEATURES)
+# Things with a place: items, neighbours, and the teller of the lowest timer.
+_N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
+# A robot draws in a step: an error for every beam, whether each is dropped, then errors of places.
+_DROPPED, _PLACES, _DRAWS = _N_BEAMS, 2 * _N_BEAMS, 2 * _N_BEAMS + 2 * _N_THINGS
+
+
+@inlined_kernel
+def disturb(
+    robots: Robots, able: Capabilities, parameters: Parameters, step: int, rows: NDArray[np.float32]
+) -> None:
+    """Add the scenario's noise to rows (N, D) and drop beams, in place.
+
+    What is measured stays within the column's range.
+    """
+    is_exact = parameters.ranger_noise == 0.0 and parameters.position_noise == 0.0
+    if is_exact and parameters.sensor_dropout == 0.0:
+        return
+    for robot in range(len(rows)):
+        if robots.present[robot]:
+            key, first = robots.sensor_key[robot], step * _DRAWS
+            own_range = able.ranger_range[robot]
+            reach = own_range if own_range > 0.0 else parameters.ranger_range
+            disturb_beams(key, first, reach, parameters, rows[robot])
+            if parameters.position_noise > 0.0:
+                disturb_places(key, first + _PLACES, parameters, rows[robot])
+
+
+@inlined_kernel
+def disturb_beams(
+    key: np.uint64, first: int, reach: float, parameters: Parameters, out: NDArray[np.float32]
+) -> None:
+    """Add noise to the beams of a row, from number `first` of the stream, and drop some.
+
+    A beam that is dropped reports what one does that meets nothing within `reach` [m].
+    """
+    dropout, noise = parameters.sensor_dropout, parameters.ranger_noise
+    for beam in range(_N_BEAMS):
+        if dropout > 0.0 and uniform(key, 2 * (first + _DROPPED + beam)) < dropout:
+            out[beam] = reach
+        elif noise > 0.0 and out[beam] < np.float32(reach):
+            noisy = out[beam] + noise * gaussian(key, first + beam)
+            out[beam] = min(max(noisy, 0.0), reach)
+
+
+@inlined_kernel
+def disturb_places(
+    key: np.uint64, first: int, parameters: Parameters, out: NDArray[np.float32]
+) -> None:
+    """Add noise to the places of what is there in a row, from number `first` of the stream."""
+    far = max(parameters.view_range, parameters.radio_range)
+    for thing in range(_N_THINGS):
+        if thing < row.N_ITEMS_IN_VIEW:
+            column, limit = row.ITEMS + _ITEM_WIDTH * thing, parameters.view_range
+        else:
+            column = row.NEIGHBOURS + _NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
+            limit = far
+        if out[column] > 0.5:
+            for axis in range(2):
+                error = parameters.position_noise * gaussian(key, first + 2 * thing + axis)
+                out[column + 1 + axis] = min(max(out[column + 1 + axis] + error, -limit), limit)

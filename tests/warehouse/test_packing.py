@@ -1,0 +1,78 @@
+"""Structures of arrays arrive in compiled code as they are in the interpreter."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.warehouse.packing import packed, unpacked_at
+from swarm_logistics_env.warehouse.structs import (
+    Flags,
+    Keys,
+    NumberRows,
+    Parameters,
+    parameters_of,
+)
+
+
+class Inner(NamedTuple):
+    """A structure in a structure."""
+
+    n_things: int
+    key: Keys
+
+
+class Outer(NamedTuple):
+    """Every kind of field."""
+
+    share: float
+    is_on: bool
+    rows: NumberRows
+    inner: Inner
+    flags: Flags
+
+
+@kernel
+def read_and_write(address: int) -> tuple[float, bool, float, int, int, int]:
+    """Return something of every field, and change two."""
+    outer = unpacked_at(Outer, address)
+    outer.rows[1, 2] += 1.0
+    outer.flags[0] = True
+    key = int(outer.inner.key[1] >> np.uint64(60))
+    return outer.share, outer.is_on, outer.rows.sum(), outer.inner.n_things, key, len(outer.flags)
+
+
+def test_every_kind_of_field_is_read_and_arrays_are_written() -> None:
+    outer = Outer(
+        share=-2.5,
+        is_on=True,
+        rows=np.arange(6.0).reshape(2, 3),
+        inner=Inner(n_things=-7, key=np.array([1, 15 << 60], np.uint64)),
+        flags=np.array([False, True, False]),
+    )
+    words = packed(outer)
+    assert read_and_write(words.ctypes.data) == (-2.5, True, 16.0, -7, 15, 3)
+    assert outer.rows.tolist() == [[0.0, 1.0, 2.0], [3.0, 4.0, 6.0]]
+    assert outer.flags.tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [np.zeros((2, 3), np.float32), np.zeros(3), np.zeros((3, 2)).T, np.zeros((4, 2))[::2]],
+)
+def test_an_array_that_is_not_as_declared_is_refused(rows: Any) -> None:
+    outer = Outer(0.0, False, rows, Inner(0, np.zeros(1, np.uint64)), np.zeros(1, np.bool_))
+    with pytest.raises(TypeError, match=r"Outer\.rows"):
+        packed(outer)
+
+
+def test_parameters_are_the_scenarios_own() -> None:
+    scenario = Scenario(relay="gossip", drive="differential", radio_range=3.5)
+    parameters = parameters_of(scenario)
+    assert isinstance(parameters, Parameters)
+    assert (parameters.is_gossip, parameters.is_holonomic) == (True, False)
+    assert (parameters.radio_range, parameters.n_substeps) == (3.5, 5)

@@ -1,0 +1,27 @@
+"""Functions of the world are short enough to be read and take few parameters."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from swarm_logistics_env import warehouse
+
+MOST_LINES, MOST_PARAMETERS = 80, 12
+FILES = sorted(Path(warehouse.__file__).parent.glob("*.py"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_functions_are_short_and_take_few_parameters(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    too_big = []
+    for function in functions:
+        given = function.args
+        n_parameters = len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
+        n_lines = (function.end_lineno or function.lineno) - function.lineno + 1
+        if n_parameters > MOST_PARAMETERS or n_lines > MOST_LINES:
+            too_big.append(f"{function.name}: {n_parameters} parameters, {n_lines} lines")
+    assert too_big == []
