@@ -56,7 +56,7 @@ def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
     """Return the columns of the requested item in view and of the nearest other; -1: none."""
     requested, other, nearest = -1, -1, math.inf
     for place in range(row.N_ITEMS_IN_VIEW):
-        there = row.ITEMS + 5 * place
+        there = row.ITEMS + row.ITEM_WIDTH * place
         if sensed[there] < 0.5:
             continue
         if sensed[there + 3] > 0.5:

@@ -140,81 +140,108 @@ def read_rows(
 ) -> None:
     """Fill inputs (N, len(INPUTS)) and how far each frame is turned from the body's (N,) [rad]."""
     for robot in range(rows.shape[0]):
-        sensed, own, told = rows[robot], memory[robot], inputs[robot]
+        sensed, own, read = rows[robot], memory[robot], inputs[robot]
         heading = math.atan2(own[known.HEADING_Y], own[known.HEADING_X])
         beams = round(heading / (2.0 * math.pi / row.N_BEAMS)) % row.N_BEAMS
         turned[robot] = 2.0 * math.pi * beams / row.N_BEAMS
         cos, sin = math.cos(turned[robot]), math.sin(turned[robot])
-
-        at = 0
         for beam in range(row.N_BEAMS):
             away = sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS]
-            told[at] = max(0.0, 1.0 - away / WALL_REACH)
-            at += 1
-        for place in range(N_FAR + N_NEAR):
-            is_far = place < N_FAR
-            reach = FAR if is_far else NEAR
-            there = row.NEIGHBOURS + 5 * (place if is_far else place - N_FAR)
-            x, y = sensed[there + 1], sensed[there + 2]
-            away = math.sqrt(x * x + y * y)
-            near = max(0.0, 1.0 - away / reach) / away if away > 0.0 else 0.0
-            told[at], told[at + 1] = near * (cos * x + sin * y), near * (cos * y - sin * x)
-            at += 2
-        delivers = sensed[row.CARRYING_REQUESTED] > 0.5
-        for place in range(N_OBSTACLES):
-            there = row.ITEMS + 5 * place
-            x, y = sensed[there + 1], sensed[there + 2]
-            is_there = 1.0 if delivers and sensed[there] > 0.5 else 0.0
-            told[at] = is_there
-            told[at + 1] = is_there * (cos * x + sin * y)
-            told[at + 2] = is_there * (cos * y - sin * x)
-            at += 3
-        told[at : at + 6] = 0.0
-        for place in range(row.N_ITEMS_IN_VIEW):
-            there = row.ITEMS + 5 * place
-            if sensed[there] > 0.5 and sensed[there + 3] > 0.5:
-                x, y = sensed[there + 1], sensed[there + 2]
-                away = max(math.sqrt(x * x + y * y), 1e-9)
-                told[at] = 1.0
-                told[at + 1] = (cos * x + sin * y) / away
-                told[at + 2] = (cos * y - sin * x) / away
-                told[at + 3] = away
-                told[at + 4] = max(0.0, 1.0 - away / NEAR)
-                told[at + 5] = sensed[there + 4]
-        at += 6
+            read[beam] = max(0.0, 1.0 - away / WALL_REACH)
+        at = read_neighbours(sensed, cos, sin, read, row.N_BEAMS)
+        at = read_items(sensed, cos, sin, read, at)
+        # Whoever tells the lowest timer may lie: it counts less the more the robot knows itself.
         sure = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
-        # The teller of the lowest timer may be a liar: it fades as the robot knows for itself.
-        heard = sensed[row.LOWEST_TIMER] * (1.0 - math.tanh(sure))
-        x, y = sensed[row.LOWEST_TIMER + 1], sensed[row.LOWEST_TIMER + 2]
-        away = math.sqrt(x * x + y * y)
-        unit = heard / away if away > 0.0 else 0.0
-        told[at] = heard
-        told[at + 1], told[at + 2] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
-        told[at + 3] = heard * away / 4.0
-        told[at + 4] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
-        at += 5
-        told[at] = sensed[row.CARRYING]
-        told[at + 1] = sensed[row.CARRYING_REQUESTED]
-        told[at + 2] = sensed[row.IN_DELIVERY_AREA]
-        told[at + 3], told[at + 4] = sensed[row.TIMER_RUNS], sensed[row.TIMER] / 10.0
-        told[at + 5] = sensed[row.CONTACT]
+        at = read_lead(sensed, cos, sin, 1.0 - math.tanh(sure), read, at)
+        read[at] = sensed[row.CARRYING]
+        read[at + 1] = sensed[row.CARRYING_REQUESTED]
+        read[at + 2] = sensed[row.IN_DELIVERY_AREA]
+        read[at + 3], read[at + 4] = sensed[row.TIMER_RUNS], sensed[row.TIMER] / 10.0
+        read[at + 5] = sensed[row.CONTACT]
         at += 6
         x, y = sensed[row.VELOCITY] / 2.0, sensed[row.VELOCITY + 1] / 2.0
-        told[at], told[at + 1] = cos * x + sin * y, cos * y - sin * x
+        read[at], read[at + 1] = cos * x + sin * y, cos * y - sin * x
         at += 2
         x, y = own[known.HEADING_X], own[known.HEADING_Y]
         # At most half a beam aside: as large as the others.
-        told[at], told[at + 1] = cos * x + sin * y, 2.0 * (cos * y - sin * x)
+        read[at], read[at + 1] = cos * x + sin * y, 2.0 * (cos * y - sin * x)
         at += 2
         x, y = own[known.HOME_X], own[known.HOME_Y]
         unit = math.tanh(sure) / sure if sure > 0.0 else 0.0
-        told[at], told[at + 1] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
-        told[at + 2] = math.tanh(sure / 3.0)
+        read[at], read[at + 1] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
+        read[at + 2] = math.tanh(sure / 3.0)
         at += 3
-        told[at], told[at + 1] = own[known.FAILED], own[known.STUCK]
+        read[at], read[at + 1] = own[known.FAILED], own[known.STUCK]
         at += 2
         angle = random_heading(keys[robot], random_headings[robot]) - turned[robot]
-        told[at], told[at + 1] = math.cos(angle), math.sin(angle)
+        read[at], read[at + 1] = math.cos(angle), math.sin(angle)
+
+
+@kernel
+def read_neighbours(
+    sensed: NDArray[np.float32], cos: float, sin: float, read: NDArray[np.float32], at: int
+) -> int:
+    """Fill the inputs of neighbours, from column `at` on; return the column after them."""
+    for place in range(N_FAR + N_NEAR):
+        is_far = place < N_FAR
+        reach = FAR if is_far else NEAR
+        there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (place if is_far else place - N_FAR)
+        x, y = float(sensed[there + 1]), float(sensed[there + 2])
+        away = math.sqrt(x * x + y * y)
+        near = max(0.0, 1.0 - away / reach) / away if away > 0.0 else 0.0
+        read[at], read[at + 1] = near * (cos * x + sin * y), near * (cos * y - sin * x)
+        at += 2
+    return at
+
+
+@kernel
+def read_items(
+    sensed: NDArray[np.float32], cos: float, sin: float, read: NDArray[np.float32], at: int
+) -> int:
+    """Fill the inputs of obstacles and the requested item; return the column after them."""
+    delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+    for place in range(N_OBSTACLES):
+        there = row.ITEMS + row.ITEM_WIDTH * place
+        x, y = float(sensed[there + 1]), float(sensed[there + 2])
+        is_there = 1.0 if delivers and sensed[there] > 0.5 else 0.0
+        read[at] = is_there
+        read[at + 1] = is_there * (cos * x + sin * y)
+        read[at + 2] = is_there * (cos * y - sin * x)
+        at += 3
+    read[at : at + 6] = 0.0
+    for place in range(row.N_ITEMS_IN_VIEW):
+        there = row.ITEMS + row.ITEM_WIDTH * place
+        if sensed[there] > 0.5 and sensed[there + 3] > 0.5:
+            x, y = float(sensed[there + 1]), float(sensed[there + 2])
+            away = max(math.sqrt(x * x + y * y), 1e-9)
+            read[at] = 1.0
+            read[at + 1] = (cos * x + sin * y) / away
+            read[at + 2] = (cos * y - sin * x) / away
+            read[at + 3] = away
+            read[at + 4] = max(0.0, 1.0 - away / NEAR)
+            read[at + 5] = sensed[there + 4]
+    return at + 6
+
+
+@kernel
+def read_lead(
+    sensed: NDArray[np.float32],
+    cos: float,
+    sin: float,
+    trust: float,
+    read: NDArray[np.float32],
+    at: int,
+) -> int:
+    """Fill the inputs of the lowest timer heard, times `trust`; return the column after them."""
+    heard = sensed[row.LOWEST_TIMER] * trust
+    x, y = float(sensed[row.LOWEST_TIMER + 1]), float(sensed[row.LOWEST_TIMER + 2])
+    away = math.sqrt(x * x + y * y)
+    unit = heard / away if away > 0.0 else 0.0
+    read[at] = heard
+    read[at + 1], read[at + 2] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
+    read[at + 3] = heard * away / 4.0
+    read[at + 4] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
+    return at + 5
 
 
 @kernel

@@ -56,7 +56,7 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
         known[FAILED] *= 1.0 - period / FAILURE_TIME
         if known[HELD] > 0.5 and sensed[row.CARRYING] < 0.5:
             for place in range(row.N_ITEMS_IN_VIEW):
-                item = row.ITEMS + 5 * place
+                item = row.ITEMS + row.ITEM_WIDTH * place
                 away = math.sqrt(sensed[item + 1] ** 2 + sensed[item + 2] ** 2)
                 if sensed[item] > 0.5 and sensed[item + 3] > 0.5 and away < SURELY_IN_REACH:
                     known[FAILED] = 1.0

@@ -150,7 +150,7 @@ def away_from_neighbours(sensed: NDArray[np.float32], reach: float) -> tuple[flo
     """Return the sum of the directions away from neighbours, 1 .. 0 at distance 0 .. `reach`."""
     push_x, push_y = 0.0, 0.0
     for place in range(row.N_NEIGHBOURS):
-        there = row.NEIGHBOURS + 5 * place
+        there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * place
         x, y = sensed[there + 1], sensed[there + 2]
         away = math.sqrt(x * x + y * y)
         if 0.0 < away < reach:
@@ -165,7 +165,7 @@ def requested_item(sensed: NDArray[np.float32], own: NDArray[np.float64], is_ins
     if sensed[row.CARRYING] > 0.5 or own[known.FAILED] > 0.5:
         return -1
     for place in range(row.N_ITEMS_IN_VIEW):
-        there = row.ITEMS + 5 * place
+        there = row.ITEMS + row.ITEM_WIDTH * place
         left_here = is_inside and sensed[there + 4] > 0.5
         if sensed[there] > 0.5 and sensed[there + 3] > 0.5 and not left_here:
             return there
@@ -233,7 +233,7 @@ def freest_direction(
         worth = go_x * x + go_y * y
         worth += 0.3 * (go_x * own[known.HEADING_X] + go_y * own[known.HEADING_Y])
         for place in range(row.N_ITEMS_IN_VIEW):
-            there = row.ITEMS + 5 * place
+            there = row.ITEMS + row.ITEM_WIDTH * place
             if sensed[there] < 0.5:
                 break
             along = sensed[there + 1] * go_x + sensed[there + 2] * go_y
