@@ -38,7 +38,7 @@ def main(generations=20, pairs=6, duration=200.0):
             - episode_return(env, logarithms - step, seed=generation * pairs + pair)
             for pair, step in enumerate(steps)
         ]
-        gains = np.array(gains) / (np.std(gains) + 1e-9)
+        gains = np.array(gains) / max(np.abs(gains).max(), 1e-9)
         logarithms = logarithms + 0.3 * (gains @ steps) / pairs
         found = dict(zip(START, np.exp(logarithms).round(2).tolist()))
         print(f"generation {generation}: {found}")

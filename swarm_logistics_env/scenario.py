@@ -299,4 +299,13 @@ SCENARIO_PRESETS: dict[str, Scenario] = {
     # Table I delivers 74 of its items, so it cannot have held 60.
     "paper_scalability": Scenario(n_items=100),
     "dots": Scenario(max_speed=1.0, max_acceleration=2.0),
+    # What robots of that kind have to cope with; the noise is chosen here, nobody published it.
+    "realistic": Scenario(
+        drive="differential",
+        max_acceleration=2.0,
+        ranger_noise=0.03,
+        position_noise=0.05,
+        radio_loss=0.1,
+        heading_drift=0.05,
+    ),
 }

@@ -190,7 +190,7 @@ def test_the_sheet_lists_every_field_with_its_value_unit_and_source() -> None:
 
 
 def test_presets() -> None:
-    assert set(SCENARIO_PRESETS) == {"paper", "paper_scalability", "dots"}
+    assert set(SCENARIO_PRESETS) == {"paper", "paper_scalability", "dots", "realistic"}
     assert Scenario.preset("paper") == Scenario()
     assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
     assert Scenario.preset("dots") == Scenario(max_speed=1.0, max_acceleration=2.0)

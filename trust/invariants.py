@@ -216,7 +216,8 @@ class Watch:
             return
         if not all(mode.honest for mode in modes):
             self._demand(state.robot_told[robot] == 0.0, f"robot {robot} is in FM1, tells no 0")
-        if not all(mode.rangers for mode in modes) and scenario.ranger_noise == 0.0:
+        is_live = all(mode.rangers_refresh for mode in modes) and scenario.ranger_noise == 0.0
+        if not all(mode.rangers for mode in modes) and is_live:
             scans = rows[: 3 * row.N_BEAMS]
             blind = bool((scans == np.float32(scenario.ranger_range)).all())
             self._demand(blind, f"robot {robot}'s blind rangers see")
@@ -235,6 +236,11 @@ class Watch:
         if any(mode.speed == 0.0 for mode in modes):
             turned = state.robot_heading[robot] != before["robot_heading"][robot]
             self._demand(not turned or not state.robot_present[robot], f"robot {robot} turns")
+        jammed = not all(mode.releases_inside for mode in modes)
+        if jammed and state.robot_in_delivery[robot] and state.robot_present[robot]:
+            held = before["robot_item"][robot]
+            kept = held in (NOBODY, state.robot_item[robot])
+            self._demand(kept, f"robot {robot}, jammed inside, lets item {held} go")
         if not all(mode.obeys for mode in modes) and state.robot_present[robot]:
             held = before["robot_item"][robot]
             lost = held != NOBODY and state.robot_item[robot] != held

@@ -74,6 +74,7 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "position_noise": rarely(number(0.01, 1.0), 0.0),
         "sensor_dropout": rarely(source.random(), 0.0),
         "radio_loss": rarely(source.random(), 0.0),
+        "heading_drift": rarely(number(0.01, 1.0), 0.02),
         "message_size": rarely(source.randint(1, 4), 0),
         "control_period": physics_period * source.randint(1, 5),
         "physics_period": physics_period,
@@ -90,7 +91,10 @@ def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> l
         passes = mode != "removed" and source.random() < 0.5
         duration = source.uniform(0.1, seconds) if passes else None
         robots = source.randint(1, scenario.n_robots)
-        faults.append(Fault(mode, robots, onset, duration))
+        breaks = (source.uniform(0.05, 2.0), source.uniform(0.05, 2.0))
+        is_steady = mode == "removed" or source.random() < 0.7
+        intermittent = None if is_steady else breaks
+        faults.append(Fault(mode, robots, onset, duration, intermittent=intermittent))
     return faults
 
 

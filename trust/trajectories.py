@@ -36,8 +36,8 @@ DECIDING = ("numpy", "numba", "pymunk")  # whose versions may change a bit
 NOTED = (0, 1, 2, 5, 10, 25, 50, 100, 200, 300, 650)
 GROUPS: dict[str, tuple[str, ...]] = {
     "robots": (
-        "robot_position", "robot_velocity", "robot_heading", "robot_contact", "robot_present",
-        "robot_in_delivery", "max_speed", "max_turn_rate",
+        "robot_position", "robot_velocity", "robot_heading", "robot_heading_drift",
+        "robot_contact", "robot_present", "robot_in_delivery", "max_speed", "max_turn_rate",
     ),
     "items": (
         "item_position", "item_status", "item_carrier", "item_covered", "robot_item",
@@ -83,6 +83,7 @@ def _stories() -> dict[str, Story]:
         "preset paper": Story(Scenario.preset("paper"), steps=100),
         "preset paper_scalability": Story(Scenario.preset("paper_scalability"), steps=50),
         "preset dots": Story(Scenario.preset("dots"), steps=100),
+        "preset realistic": Story(Scenario.preset("realistic"), steps=100),
         "seed 1": Story(small(), seed=1),
         "long, past the rebuilding of bodies": Story(small(restock=True), steps=650),
         "until all is delivered": Story(small(n_items=2, n_robots=8), steps=300),
@@ -115,6 +116,14 @@ def _stories() -> dict[str, Story]:
         small(),
         (Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)),
     )
+    stories["faults that come and go"] = Story(
+        small(),
+        (
+            Fault("motor_wear", 2, intermittent=(2.0, 1.0)),
+            Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
+        ),
+    )
+    stories["without drift"] = Story(small(heading_drift=0.0))
     stories["changes during the run"] = Story(
         small(delivery_width=0.5),
         events={

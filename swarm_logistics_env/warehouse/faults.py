@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Self
@@ -13,30 +15,68 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_va
 from swarm_logistics_env.errors import FaultError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.streams import generator, row_keys
 from swarm_logistics_env.warehouse.state import WarehouseState
+from swarm_logistics_env.warehouse.structs import LONGEST_RADIO_DELAY
+
+GRACE = 5e-7  # [s]; times are sums of control periods
+_SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
+
+Seconds = Annotated[float, Field(ge=0.01)]
+
+
+# Capabilities that a mode takes away as a whole: fields of `FailureMode` and of `Capabilities`.
+_FLAGS = (
+    "lifts", "delivers", "sends", "hears", "honest", "obeys", "releases_inside", "rangers_refresh",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class FailureMode:
     """What a robot that fails in this mode has lost.
 
-    `speed` and `view` are factors in [0, 1] on its top speed and its cameras' range; where
-    `factor` names one of them, a fault's own factor replaces it.
+    Attributes:
+        description: in a sentence.
+        speed: factor in [0, 1] on its top speed and turn rate.
+        view: factor in [0, 1] on its cameras' range.
+        factor: "speed" or "view": which of the two a fault's own factor replaces; or None.
+        wears: whether the speed falls linearly, from all at the fault's onset to that factor at
+            the end of the episode.
+        rangers: False: they report nothing near.
+        ranger_bias: what they read too far [m].
+        radio_delay: how late its broadcasts come [s], at most `LONGEST_RADIO_DELAY`.
+        present: False: it is out of the arena.
+        lifts, delivers, sends, hears, honest, obeys, releases_inside, rangers_refresh: see
+            `structs.Capabilities`.
+
+    Raises:
+        FaultError: broadcasts cannot come that late.
     """
 
     description: str
     speed: float = 1.0
     view: float = 1.0
+    factor: str | None = None
+    wears: bool = False
     rangers: bool = True
+    ranger_bias: float = 0.0
+    radio_delay: float = 0.0
+    present: bool = True
     lifts: bool = True
     delivers: bool = True
     sends: bool = True
     hears: bool = True
     honest: bool = True
     obeys: bool = True
-    present: bool = True
-    factor: str | None = None
+    releases_inside: bool = True
+    rangers_refresh: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.radio_delay <= LONGEST_RADIO_DELAY:
+            raise FaultError(
+                f"FailureMode.radio_delay = {self.radio_delay}: should be 0 to "
+                f"{LONGEST_RADIO_DELAY} s, for which broadcasts are kept"
+            )
 
 
 FAILURE_MODES: dict[str, FailureMode] = {
@@ -46,16 +86,32 @@ FAILURE_MODES: dict[str, FailureMode] = {
     "FM3_send": FailureMode("does not send", sends=False),
     "FM3_hear": FailureMode("does not hear", hears=False),
     "FM4": FailureMode("its entering the delivery area delivers nothing", delivers=False),
+    "FM4_jam": FailureMode(
+        "as FM4, and what it holds inside the delivery area it cannot let go",
+        delivers=False,
+        releases_inside=False,
+    ),
     "motor_slow": FailureMode(
         "drives and turns at half its speed, or at the fault's factor of it",
         speed=0.5,
         factor="speed",
+    ),
+    "motor_wear": FailureMode(
+        "drives and turns ever slower, at half its speed or the fault's factor of it in the end",
+        speed=0.5,
+        factor="speed",
+        wears=True,
     ),
     "motor_dead": FailureMode("stands still", speed=0.0),
     "view_reduced": FailureMode(
         "sees half as far with its cameras, or the fault's factor of it", view=0.5, factor="view"
     ),
     "rangers_blind": FailureMode("its rangers report nothing near", rangers=False),
+    "rangers_frozen": FailureMode(
+        "its rangers repeat what they read when they failed", rangers_refresh=False
+    ),
+    "rangers_biased": FailureMode("its rangers read 0.2 m too far", ranger_bias=0.2),
+    "radio_delayed": FailureMode("what it broadcasts comes 2 s late", radio_delay=2.0),
     "dead": FailureMode(
         "stands still, senses, sends and lifts nothing, keeps what it carries",
         speed=0.0,
@@ -74,7 +130,7 @@ FAILURE_MODES: dict[str, FailureMode] = {
 
 
 class Fault(Record):
-    """A failure mode that befalls some robots, from a time on.
+    """A failure mode that affects some robots, from a time on.
 
     Args:
         mode: a key of `FAILURE_MODES`.
@@ -82,11 +138,14 @@ class Fault(Record):
             same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
         onset: when [s], from the start of the episode.
         duration: for how long [s]; None: for good. A removed robot does not come back.
-        factor: for `motor_slow` and `view_reduced`: what is left, in [0, 1).
+        factor: for `motor_slow`, `motor_wear` and `view_reduced`: what is left, in [0, 1).
+        intermittent: for how long [s] it holds, and for how long not, both on average, in turn
+            from its onset on; each robot's times are drawn from its own stream (exponential).
+            None: it holds without a break.
 
     Raises:
-        FaultError: an unknown mode, a factor or a duration that the mode does not have, a robot
-            that is named twice.
+        FaultError: an unknown mode, a factor, a duration or breaks that the mode does not have, a
+            robot that is named twice.
 
     Example:
         >>> Fault("FM1", 2, onset=200.0).robots
@@ -100,6 +159,7 @@ class Fault(Record):
     onset: Annotated[float, Field(ge=0)] = 0.0
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
+    intermittent: tuple[Seconds, Seconds] | None = None
 
     def __init__(
         self,
@@ -108,10 +168,12 @@ class Fault(Record):
         onset: float = 0.0,
         duration: float | None = None,
         factor: float | None = None,
+        intermittent: tuple[float, float] | None = None,
     ) -> None:
         if isinstance(robots, Sequence) and not isinstance(robots, str):
             robots = tuple(robots)
-        super().__init__(mode=mode, robots=robots, onset=onset, duration=duration, factor=factor)
+        given = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
+        super().__init__(**given, factor=factor, intermittent=intermittent)
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -122,6 +184,8 @@ class Fault(Record):
             raise ValueError(f"{self.mode} takes no factor; modes that do: {able}")
         if self.mode == "removed" and self.duration is not None:
             raise ValueError("a removed robot does not come back: duration should be None")
+        if self.mode == "removed" and self.intermittent is not None:
+            raise ValueError("a removed robot does not come back: intermittent should be None")
         if isinstance(self.robots, tuple) and not self.robots:
             raise ValueError("robots = (): should name at least one robot")
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
@@ -129,21 +193,84 @@ class Fault(Record):
         return self
 
     def is_active(self, time: float) -> bool:
-        """Return whether the fault holds at `time` [s]."""
-        # Half a microsecond of grace: times are sums of control periods.
-        started = time >= self.onset - 5e-7
-        ended = self.duration is not None and time >= self.onset + self.duration - 5e-7
+        """Return whether `time` [s] lies between its onset and its end, breaks included."""
+        started = time >= self.onset - GRACE
+        ended = self.duration is not None and time >= self.onset + self.duration - GRACE
         return started and not ended
 
-    def changes(self) -> tuple[float, ...]:
-        """Return the times [s] at which it begins and, if ever, ends."""
-        if self.duration is None:
-            return (self.onset,)
-        return (self.onset, self.onset + self.duration)
+
+class Occurrence:
+    """A fault in one episode: which robots it affects, and when.
+
+    Args:
+        fault: which.
+        seed: of the episode.
+        n_robots: how many there are.
+
+    Attributes:
+        robots: the numbers of those affected, ascending.
+
+    Raises:
+        FaultError: as `failed_robots`.
+    """
+
+    def __init__(self, fault: Fault, seed: int, n_robots: int) -> None:
+        self.fault, self._seed = fault, seed
+        self.robots = failed_robots(fault, seed, n_robots)
+        # Of an intermittent fault, by robot, the times at which it begins, ends, begins, ...
+        self._switches: dict[int, list[float]] = {}
+        if fault.intermittent is not None:
+            self._switches = {robot: [fault.onset] for robot in self.robots.tolist()}
+
+    def holds_for(self, time: float) -> NDArray[np.int64]:
+        """Return the robots for which it holds at `time` [s], ascending."""
+        if not self.fault.is_active(time):
+            return self.robots[:0]
+        if not self._switches:
+            return self.robots
+        is_on = [self._n_switches(robot, time) % 2 == 1 for robot in self.robots.tolist()]
+        return self.robots[is_on]
+
+    def next_change(self, time: float, next_step: float) -> float:
+        """Return when after `time` [s] it next changes what robots can do; infinite: never.
+
+        What changes all the time does so at the time of the next step.
+        """
+        fault = self.fault
+        if not fault.is_active(time):
+            return fault.onset if fault.onset > time + GRACE else math.inf
+        changes = [math.inf if fault.duration is None else fault.onset + fault.duration]
+        if FAILURE_MODES[fault.mode].wears:
+            changes.append(next_step)
+        for robot, switches in self._switches.items():
+            changes.append(switches[self._n_switches(robot, time)])
+        return min(changes)
+
+    def left(self, time: float, end: float) -> tuple[float, float]:
+        """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
+        mode, fault = FAILURE_MODES[self.fault.mode], self.fault
+        speed, view = mode.speed, mode.view
+        if fault.factor is not None:
+            speed = fault.factor if mode.factor == "speed" else speed
+            view = fault.factor if mode.factor == "view" else view
+        if mode.wears:
+            share = (time - fault.onset) / max(end - fault.onset, GRACE)
+            speed = 1.0 - (1.0 - speed) * min(max(share, 0.0), 1.0)
+        return speed, view
+
+    def _n_switches(self, robot: int, time: float) -> int:
+        """Return how often it has begun or ended for a robot until `time` [s]."""
+        switches, fault = self._switches[robot], self.fault
+        while switches[-1] <= time + GRACE:
+            about = (robot, len(switches) // _SWITCHES)
+            rng = generator(self._seed, f"intermittent {fault.mode}", *about)
+            means = np.resize(fault.intermittent or (), _SWITCHES)
+            switches += (switches[-1] + np.cumsum(rng.exponential(means))).tolist()
+        return bisect_right(switches, time + GRACE)
 
 
 def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
-    """Return the numbers of the robots that `fault` befalls, ascending.
+    """Return the numbers of the robots that `fault` affects, ascending.
 
     Raises:
         FaultError: it is no fault, of more robots than there are, or of one that is not there.
@@ -164,49 +291,40 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
 
 
 def apply_faults(
-    state: WarehouseState,
-    scenario: Scenario,
-    faults: Sequence[Fault],
-    struck: Sequence[NDArray[np.int64]],
+    state: WarehouseState, scenario: Scenario, occurrences: Sequence[Occurrence]
 ) -> NDArray[np.bool_]:
     """Give every robot what the faults that hold at `state.time` leave it.
-
-    Args:
-        struck: per fault, the robots it befalls.
 
     Returns:
         Which robots a fault takes out of the arena, (N,).
     """
+    able = state.able
     speed = np.resize(scenario.speed_mix, state.n_robots)
     sensing = np.resize(scenario.sensing_mix, state.n_robots)
-    state.max_speed[:] = scenario.max_speed * speed
-    state.max_turn_rate[:] = scenario.max_turn_rate * speed
-    state.ranger_range[:] = scenario.ranger_range * sensing
-    state.view_range[:] = scenario.view_range * sensing
-    for able in (state.lifts, state.delivers, state.sends, state.hears, state.honest, state.obeys):
-        able[:] = True
+    able.max_speed[:] = scenario.max_speed * speed
+    able.max_turn_rate[:] = scenario.max_turn_rate * speed
+    able.ranger_range[:] = scenario.ranger_range * sensing
+    able.view_range[:] = scenario.view_range * sensing
+    able.ranger_bias[:], able.radio_delay[:] = 0.0, 0
+    for name in _FLAGS:
+        getattr(able, name)[:] = True
     gone = np.zeros(state.n_robots, np.bool_)
     modes: list[tuple[str, ...]] = [()] * state.n_robots
-    for fault, robots in zip(faults, struck, strict=True):
-        if not fault.is_active(state.time):
-            continue
-        mode = FAILURE_MODES[fault.mode]
-        left = {"speed": mode.speed, "view": mode.view}
-        if mode.factor is not None and fault.factor is not None:
-            left[mode.factor] = fault.factor
-        state.max_speed[robots] *= left["speed"]
-        state.max_turn_rate[robots] *= left["speed"]
-        state.view_range[robots] *= left["view"]
-        state.ranger_range[robots] *= mode.rangers
-        state.lifts[robots] &= mode.lifts
-        state.delivers[robots] &= mode.delivers
-        state.sends[robots] &= mode.sends
-        state.hears[robots] &= mode.hears
-        state.honest[robots] &= mode.honest
-        state.obeys[robots] &= mode.obeys
+    for occurrence in occurrences:
+        mode, robots = FAILURE_MODES[occurrence.fault.mode], occurrence.holds_for(state.time)
+        speed_left, view_left = occurrence.left(state.time, scenario.duration)
+        able.max_speed[robots] *= speed_left
+        able.max_turn_rate[robots] *= speed_left
+        able.view_range[robots] *= view_left
+        able.ranger_range[robots] *= mode.rangers
+        able.ranger_bias[robots] += mode.ranger_bias
+        delay = round(mode.radio_delay / scenario.control_period)
+        able.radio_delay[robots] = np.maximum(able.radio_delay[robots], delay)
+        for name in _FLAGS:
+            getattr(able, name)[robots] &= getattr(mode, name)
         gone[robots] |= not mode.present
         for robot in robots.tolist():
-            modes[robot] = (*modes[robot], fault.mode)
+            modes[robot] = (*modes[robot], occurrence.fault.mode)
     state.failure_modes = tuple(modes)
     state.failed = np.array([bool(names) for names in modes])
     return gone

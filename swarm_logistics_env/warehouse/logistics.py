@@ -72,6 +72,8 @@ def open_grippers(
             continue
         if robots.in_delivery[robot] and item != requested:
             continue
+        if robots.in_delivery[robot] and not able.releases_inside[robot]:
+            continue
         remember(robots.memory, robot, item)
         robots.item[robot] = NOBODY
         items.status[item] = STORED

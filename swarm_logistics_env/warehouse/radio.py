@@ -31,15 +31,21 @@ def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: 
 
 
 @inlined_kernel
-def send_messages(commands: NumberRows, robots: Robots, able: Capabilities) -> None:
+def send_messages(commands: NumberRows, robots: Robots, able: Capabilities, step: int) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
-    message = robots.message
+    message, before = robots.message, robots.message_before
+    n, n_kept = len(message), len(robots.told_before)
     is_given = commands.shape[1] == MESSAGE + message.shape[1]
-    for robot in range(len(message)):
+    for robot in range(n):
         sends = is_given and robots.present[robot] and able.obeys[robot]
         for place in range(message.shape[1]):
             given = commands[robot, MESSAGE + place] if sends else 0.0
-            message[robot, place] = min(max(given, -1.0), 1.0)
+            given = min(max(given, -1.0), 1.0)
+            before[(step % n_kept) * n + robot, place] = given
+            if able.radio_delay[robot] > 0:
+                then = step - able.radio_delay[robot]
+                given = before[(then % n_kept) * n + robot, place] if then >= 0 else 0.0
+            message[robot, place] = given
 
 
 @inlined_kernel
@@ -47,9 +53,11 @@ def run_timers(robots: Robots, able: Capabilities, parameters: Parameters, step:
     """Advance every robot's timer and what it tells (NaN: silent) [s].
 
     Counted in steps, so that rounding never adds up. With gossip a robot tells the lowest of its
-    own timer and of what it heard one period ago, aged. One that is not honest tells 0.
+    own timer and of what it heard one period ago, aged. Where the radio is delayed, what is told
+    comes late. One that is not honest tells 0.
     """
     period, limit = parameters.control_period, parameters.timer_limit - 1e-9
+    n_kept = len(robots.told_before)
     for robot in range(len(robots.timer)):
         if robots.in_delivery[robot]:
             robots.last_in_delivery[robot] = step
@@ -62,6 +70,10 @@ def run_timers(robots: Robots, able: Capabilities, parameters: Parameters, step:
         aged = robots.heard[robot] + period
         if parameters.is_gossip and is_present and aged < limit:
             told = aged if math.isnan(told) else min(told, aged)
+        robots.told_before[step % n_kept, robot] = told
+        if is_present and able.radio_delay[robot] > 0:
+            then = step - able.radio_delay[robot]
+            told = robots.told_before[then % n_kept, robot] if then >= 0 else math.nan
         robots.told[robot] = 0.0 if is_present and not able.honest[robot] else told
 
 

@@ -20,6 +20,7 @@ from swarm_logistics_env.warehouse.logistics import (
 )
 from swarm_logistics_env.warehouse.packing import unpacked_at
 from swarm_logistics_env.warehouse.radio import run_timers, send_messages
+from swarm_logistics_env.warehouse.ranger_faults import fail_rangers
 from swarm_logistics_env.warehouse.sensing import sense
 from swarm_logistics_env.warehouse.sensor_noise import disturb
 from swarm_logistics_env.warehouse.structs import (
@@ -50,6 +51,7 @@ def perceive(address: int, rows: NDArray[np.float32]) -> None:
     fill(world.item_grid, items.position, items.status == STORED)
     n_anchored = sense(world, step, rows)
     disturb(robots, world.able, world.parameters, step, rows)
+    fail_rangers(robots, world.able, world.parameters, rows)
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
 
 
@@ -67,7 +69,7 @@ def step(address: int, commands: NumberRows, rows: NDArray[np.float32]) -> StepR
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * parameters.control_period
     move(world, commands)
-    send_messages(commands, world.robots, world.able)
+    send_messages(commands, world.robots, world.able, progress.step[0])
     n_delivered, is_room = handle_items(world, commands)
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:

@@ -10,9 +10,11 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.observations import N_BEAMS
 from swarm_logistics_env.scenario import Scenario
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
+LONGEST_RADIO_DELAY = 2.0  # [s] for which broadcasts are kept
 NOBODY = -1
 
 # Arrays of one and of two dimensions, as the annotation tells compiled code.
@@ -71,6 +73,9 @@ class Robots(NamedTuple):
     told: Numbers  # (N,) [s] the timer it broadcasts, NaN when silent
     heard: Numbers  # (N,) [s] the lowest timer it heard, NaN when none
     message: NumberRows  # (N, message_size) in [-1, 1], broadcast
+    told_before: NumberRows  # (L, N) [s] timers of the last L steps, that of step s in row s % L
+    message_before: NumberRows  # (L N, message_size) of the last L steps, step after step
+    frozen_beams: NumberRows  # (N, 3 N_BEAMS) [m] what frozen rangers repeat, NaN when they work
     sensor_key: Keys  # (N,) of the streams of its sensors' noise
 
 
@@ -87,6 +92,10 @@ class Capabilities(NamedTuple):
     hears: Flags  # (N,)
     honest: Flags  # (N,) False: tells timer 0 always
     obeys: Flags  # (N,) False: ignores its commands, the gripper's too
+    releases_inside: Flags  # (N,) False: lets nothing go inside the delivery area
+    rangers_refresh: Flags  # (N,) False: its rangers repeat one reading
+    ranger_bias: Numbers  # (N,) [m] that its rangers read too far
+    radio_delay: Integers  # (N,) control steps that its broadcasts come too late
 
 
 class Items(NamedTuple):
@@ -217,6 +226,7 @@ def parameters_of(scenario: Scenario) -> Parameters:
 def blank_robots(scenario: Scenario) -> Robots:
     """Return robots without places, sound, silent and with empty hands."""
     n = scenario.n_robots
+    n_kept = round(LONGEST_RADIO_DELAY / scenario.control_period) + 1
     return Robots(
         position=np.zeros((n, 2)),
         velocity=np.zeros((n, 2)),
@@ -233,6 +243,9 @@ def blank_robots(scenario: Scenario) -> Robots:
         told=np.full(n, np.nan),
         heard=np.full(n, np.nan),
         message=np.zeros((n, scenario.message_size)),
+        told_before=np.full((n_kept, n), np.nan),
+        message_before=np.zeros((n_kept * n, scenario.message_size)),
+        frozen_beams=np.full((n, 3 * N_BEAMS), np.nan),
         sensor_key=np.zeros(n, np.uint64),
     )
 
@@ -251,6 +264,10 @@ def blank_capabilities(scenario: Scenario) -> Capabilities:
         hears=np.ones(n, np.bool_),
         honest=np.ones(n, np.bool_),
         obeys=np.ones(n, np.bool_),
+        releases_inside=np.ones(n, np.bool_),
+        rangers_refresh=np.ones(n, np.bool_),
+        ranger_bias=np.zeros(n),
+        radio_delay=np.zeros(n, np.int64),
     )
 
 

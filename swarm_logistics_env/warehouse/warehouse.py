@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.observations import n_columns
-from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
+from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.warehouse import layout, stepping
-from swarm_logistics_env.warehouse.faults import Fault, apply_faults, failed_robots
+from swarm_logistics_env.warehouse.faults import GRACE, Fault, Occurrence, apply_faults
 from swarm_logistics_env.warehouse.grid import blank_grid
 from swarm_logistics_env.warehouse.packing import packed
 from swarm_logistics_env.warehouse.physics import Physics
@@ -42,7 +42,7 @@ class Warehouse:
     Attributes:
         scenario: the conditions of this episode.
         state: what is true now, see `WarehouseState`.
-        faults: what befalls whom in this episode.
+        faults: what affects whom in this episode.
         n_removed: how many robots were taken out of the arena so far.
 
     Example:
@@ -57,7 +57,7 @@ class Warehouse:
         self.scenario = scenario or Scenario()
         self.state = WarehouseState(self.scenario)
         self.faults: tuple[Fault, ...] = ()
-        self._affected: list[NDArray[np.int64]] = []
+        self._occurrences: list[Occurrence] = []
         self.n_removed = 0
         self._n_steps = self.scenario.n_steps
         self._seed: int | None = None
@@ -73,7 +73,7 @@ class Warehouse:
 
         Args:
             seed: alone decides layout, requests, start poses and which robots fail.
-            faults: what will befall whom and when; several may befall one robot.
+            faults: what will affect whom and when; several may affect one robot.
             scenario: from now on, instead of the one before.
 
         Raises:
@@ -81,7 +81,7 @@ class Warehouse:
             ScenarioError: items or robots found no room.
         """
         scenario = scenario or self.scenario
-        affected = [failed_robots(fault, seed, scenario.n_robots) for fault in faults]
+        occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in faults]
         state = WarehouseState(scenario)
         state.obstacle_position = layout.place_obstacles(scenario, seed)
         state.item_position = layout.place_items(scenario, seed, state.obstacle_position)
@@ -96,7 +96,7 @@ class Warehouse:
         layout.draw_order(items.request_key, 0, items.order)
         state.requested = int(items.order[0])
         self.scenario, self.state, self._seed = scenario, state, seed
-        self.faults, self._affected, self.n_removed = tuple(faults), affected, 0
+        self.faults, self._occurrences, self.n_removed = tuple(faults), occurrences, 0
         self._make_room_to_work()
         self._build()
         self._apply_faults()
@@ -188,8 +188,9 @@ class Warehouse:
         """
         if self._seed is None:
             raise _not_begun("set_faults")
-        affected = [failed_robots(fault, self._seed, self.state.n_robots) for fault in faults]
-        self.faults, self._affected = tuple(faults), affected
+        seed, n = self._seed, self.state.n_robots
+        occurrences = [Occurrence(fault, seed, n) for fault in faults]
+        self.faults, self._occurrences = tuple(faults), occurrences
         self._apply_faults()
         self._remember()
 
@@ -206,7 +207,7 @@ class Warehouse:
     @property
     def struck_robots(self) -> tuple[int, ...]:
         """The robots that any fault of this episode names, ascending."""
-        return tuple(sorted({int(robot) for robots in self._affected for robot in robots}))
+        return tuple(sorted({int(robot) for each in self._occurrences for robot in each.robots}))
 
     @property
     def address(self) -> int:
@@ -295,11 +296,13 @@ class Warehouse:
 
     def _apply_faults(self) -> None:
         state = self.state
-        times = {time for fault in self.faults for time in fault.changes()}
-        later = [time for time in times if time > state.time + 5e-7]
-        # The first step that ends when they have begun or ended.
-        state.progress.pause_step[0] = min(map(self._step_of, later), default=NOBODY)
-        gone = apply_faults(state, self.scenario, self.faults, self._affected)
+        now, next_step = state.time, (state.step + 1) * self.scenario.control_period
+        change = min(
+            (each.next_change(now, next_step) for each in self._occurrences), default=math.inf
+        )
+        # The first step that ends when it has come.
+        state.progress.pause_step[0] = self._step_of(change)
+        gone = apply_faults(state, self.scenario, self._occurrences)
         for robot in np.flatnonzero(gone & state.robot_present).tolist():
             self._remove(robot)
 
@@ -320,12 +323,15 @@ class Warehouse:
             zeroed[robot] = 0.0
 
     def _step_of(self, time: float) -> int:
-        """Return the first step at whose end `time` [s] has come."""
+        """Return the first step at whose end `time` [s] has come, or NOBODY: in no episode."""
+        if time > LARGEST:
+            return NOBODY
         period = self.scenario.control_period
-        step = max(math.floor(time / period) - 1, 0)
-        while step * period < time - 5e-7:
-            step += 1
-        return step
+        step = math.ceil((time - GRACE) / period)
+        # Rounding may have taken it one too far, or not far enough.
+        if (step - 1) * period >= time - GRACE:
+            return step - 1
+        return step if step * period >= time - GRACE else step + 1
 
     def _blank_rows(self) -> NDArray[np.float32]:
         # New memory every time: what was handed out stays as it was.

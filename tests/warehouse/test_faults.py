@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import json
 from collections.abc import Callable
 from typing import Any
@@ -12,14 +13,16 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import FaultError
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.observations import N_BEAMS
+from swarm_logistics_env.warehouse.faults import FailureMode, failed_robots
+from swarm_logistics_env.warehouse.state import NOBODY
 
 Build = Callable[..., Warehouse]
 
 STAY = (0.0, 0.0, 0.0, 0.0)
 HOLD = (0.0, 0.0, 0.0, 1.0)
 OPEN = (0.0, 0.0, 0.0, -1.0)
-EAST = (1.0, 0.0, 0.0, 0.0)
+EAST, WEST = (1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0)
 FAR = (1.0, 9.0)
 SMALL = Scenario(n_robots=8, n_items=12, warehouse_width=5, warehouse_height=4)
 
@@ -87,9 +90,15 @@ def test_faults_that_cannot_be_are_refused_at_the_reset(fault: Any, complaint: s
         ({"mode": "FM1", "onset": -1.0}, "Fault.onset = -1.0: should be greater than or equal"),
         ({"mode": "FM1", "onset": float("nan")}, "Fault.onset = nan: should be a finite"),
         ({"mode": "FM1", "duration": 0.0}, "Fault.duration = 0.0: should be greater than 0"),
-        ({"mode": "FM1", "factor": 0.5}, "FM1 takes no factor; modes that do: motor_slow, view"),
+        (
+            {"mode": "FM1", "factor": 0.5},
+            "FM1 takes no factor; modes that do: motor_slow, motor_wear",
+        ),
         ({"mode": "motor_slow", "factor": 1.0}, "Fault.factor = 1.0: should be less than 1"),
         ({"mode": "removed", "duration": 5.0}, "does not come back: duration should be None"),
+        ({"mode": "removed", "intermittent": (5, 5)}, "back: intermittent should be None"),
+        ({"mode": "FM1", "intermittent": (0.0, 5.0)}, "= 0.0: should be greater than or equal"),
+        ({"mode": "FM1", "intermittent": 5.0}, "Fault.intermittent = 5.0: should be a list"),
     ],
 )
 def test_an_impossible_fault_is_refused_with_the_reason(
@@ -105,6 +114,7 @@ def test_an_impossible_fault_is_refused_with_the_reason(
         Fault("FM1"),
         Fault("FM4", [3, 7]),
         Fault("motor_slow", 2, onset=200.0, duration=50.0, factor=0.1),
+        Fault("rangers_blind", 2, intermittent=(5.0, 2.5)),
     ],
 )
 def test_a_fault_survives_json_and_is_hashable(fault: Fault) -> None:
@@ -115,7 +125,8 @@ def test_a_fault_survives_json_and_is_hashable(fault: Fault) -> None:
 
 ABILITIES = (
     "robot_present", "max_speed", "max_turn_rate", "ranger_range", "view_range", "lifts",
-    "delivers", "sends", "hears", "honest", "obeys",
+    "delivers", "sends", "hears", "honest", "obeys", "releases_inside", "rangers_refresh",
+    "ranger_bias", "radio_delay",
 )  # fmt: skip
 
 
@@ -125,6 +136,8 @@ def test_every_mode_has_a_description_and_takes_something_from_its_robots_only(m
     healthy, failing = Warehouse(SMALL), Warehouse(SMALL)
     healthy.reset(0)
     failing.reset(0, [Fault(mode, (0, 5))])
+    for world in (healthy, failing):
+        world.step(np.zeros((8, 4)))  # as wear shows after a while only
     lost = [
         np.flatnonzero(getattr(healthy.state, name) != getattr(failing.state, name)).tolist()
         for name in ABILITIES
@@ -187,6 +200,92 @@ def test_fm4_delivers_nothing_and_a_healthy_robot_does(build: Build) -> None:
         assert world.state.delivered == delivered
 
 
+INSIDE = 8.5  # x in the delivery area, which begins at 8 m
+
+
+def test_fm4_jam_lets_nothing_go_inside_and_does_outside(build: Build) -> None:
+    for mode, held in (("FM4", NOBODY), ("FM4_jam", 0)):
+        world = build([(INSIDE, 5.0)], [(INSIDE, 5.1), FAR], [Fault(mode, (0,))])
+        world.step([HOLD])
+        world.step([OPEN])
+        assert world.state.robot_item[0] == held
+        assert world.state.delivered == 0
+    while world.state.robot_in_delivery[0]:
+        world.step([WEST])
+    world.step([OPEN])
+    assert world.state.robot_item[0] == NOBODY
+
+
+def beams(rows: NDArray[np.float32], robot: int = 0) -> NDArray[np.float32]:
+    return rows[robot, : 3 * N_BEAMS]
+
+
+def test_frozen_rangers_repeat_what_they_read_at_the_onset_until_they_recover(
+    build: Build,
+) -> None:
+    fault = Fault("rangers_frozen", (0,), onset=0.3, duration=0.5)
+    world = build([(2.0, 5.0), (9.0, 1.0)], [FAR], [fault], ranger_noise=0.01)
+    sound = build([(2.0, 5.0), (9.0, 1.0)], [FAR], ranger_noise=0.01)
+    seen = [(beams(world.step([WEST, STAY])), beams(sound.step([WEST, STAY]))) for _ in range(12)]
+    for step, (failed, true) in enumerate(seen, start=1):
+        if 3 <= step < 8:
+            np.testing.assert_array_equal(failed, seen[2][1])
+        else:
+            np.testing.assert_array_equal(failed, true)
+    assert not np.array_equal(seen[3][1], seen[6][1])
+
+
+def test_biased_rangers_read_too_far_and_at_most_their_range(build: Build) -> None:
+    places = [(1.0, 5.0), (1.8, 5.0), (5.0, 5.0)]
+    true = build(places, [FAR]).observe()
+    biased = build(places, [FAR], [Fault("rangers_biased", (0,))]).observe()
+    meets = beams(true) < 2.0
+    assert meets.any()
+    assert not meets.all()
+    expected = np.minimum(beams(true)[meets] + 0.2, 2.0)
+    np.testing.assert_allclose(beams(biased)[meets], expected, atol=1e-6)
+    assert (beams(biased)[~meets] == 2.0).all()
+    np.testing.assert_array_equal(biased[1:], true[1:])
+
+
+def test_a_delayed_radio_tells_and_sends_what_was_so_two_seconds_ago(build: Build) -> None:
+    fault = Fault("radio_delayed", (0,))
+    world = build([(7.9, 5.0), (6.0, 5.0)], [FAR], [fault], message_size=1)
+    told, sent = [], []
+    for step in range(40):
+        drive = 1.0 if step < 3 else -1.0 if step < 6 else 0.0
+        world.step([(drive, 0.0, 0.0, 0.0, step / 100), (0.0, 0.0, 0.0, 0.0, 0.5)])
+        told.append((float(world.state.robot_timer[0]), float(world.state.robot_told[0])))
+        sent.append(world.state.robot_message[:, 0].tolist())
+    timers = [timer for timer, _ in told]
+    assert not np.isnan(timers).all()
+    assert np.isnan([late for _, late in told[:20]]).all()
+    np.testing.assert_array_equal([late for _, late in told[20:]], timers[:20])
+    assert [mine for mine, _ in sent[20:]] == [step / 100 for step in range(20)]
+    assert all(other == 0.5 for _, other in sent)
+
+
+def test_a_mode_may_delay_no_longer_than_is_kept() -> None:
+    with pytest.raises(FaultError, match=r"radio_delay = 3\.0: should be 0 to 2\.0 s"):
+        FailureMode("later still", radio_delay=3.0)
+
+
+@pytest.mark.parametrize("factor", [None, 0.2])
+def test_a_worn_motor_slows_down_linearly_until_the_end(build: Build, factor: float | None) -> None:
+    fault = Fault("motor_wear", (0,), onset=1.0, factor=factor)
+    world = build([(2.0, 5.0), (2.0, 8.0)], [FAR], [fault], duration=5.0)
+    speeds = [world.state.max_speed.copy()]
+    for _ in range(50):
+        world.step([STAY, STAY])
+        speeds.append(world.state.max_speed.copy())
+    worn, sound = np.array(speeds).T
+    left = 0.5 if factor is None else factor
+    expected = 2.0 * np.interp(np.arange(51) * 0.1, [1.0, 5.0], [1.0, left])
+    np.testing.assert_allclose(worn, expected, atol=1e-9)
+    assert (sound == 2.0).all()
+    assert world.state.max_turn_rate[0] == pytest.approx(6.0 * left)
+
+
 def test_faults_of_one_robot_add_up() -> None:
     world = Warehouse(SMALL)
     world.reset(0, [Fault("FM2", (3,)), Fault("motor_slow", (3,)), Fault("motor_slow", (3, 4))])
@@ -209,6 +308,13 @@ def test_a_fault_holds_from_its_onset_for_its_duration(build: Build) -> None:
     assert world.state.honest[0]
 
 
+def test_a_fault_that_begins_in_no_episode_never_holds(build: Build) -> None:
+    world = build([(2.0, 5.0)], [FAR], [Fault("FM1", (0,), onset=1e308)])
+    for _ in range(3):
+        world.step([STAY])
+    assert not world.state.failed.any()
+
+
 def test_recovery_gives_everything_back_unless_another_fault_holds(build: Build) -> None:
     faults = [
         Fault("dead", (0,), onset=0.1, duration=0.2),
@@ -223,6 +329,51 @@ def test_recovery_gives_everything_back_unless_another_fault_holds(build: Build)
         world.step([EAST])
     assert world.state.view_range[0] == 1.0
     assert world.state.failure_modes == ((),)
+
+
+def held(fault: Fault, n_robots: int = 8, seed: int = 5, steps: int = 400) -> NDArray[np.bool_]:
+    """Return whether each robot has failed after each step, (steps, N)."""
+    world = Warehouse(SMALL.replace(n_robots=n_robots))
+    world.reset(seed, [fault])
+    failed = np.zeros((steps, n_robots), np.bool_)
+    for step in range(steps):
+        world.step(np.zeros((n_robots, 4)))
+        failed[step] = world.state.failed
+    return failed
+
+
+def test_an_intermittent_fault_comes_and_goes_at_times_of_each_robots_own() -> None:
+    fault = Fault("rangers_blind", (1, 4), onset=2.0, intermittent=(1.0, 0.5))
+    failed = held(fault)
+    assert not failed[:, [0, 2, 3, 5, 6, 7]].any()
+    assert not failed[:19].any()
+    assert failed[19, [1, 4]].all()  # it begins with its onset
+    for robot in (1, 4):
+        assert np.count_nonzero(np.diff(failed[:, robot])) > 10
+        assert 0.45 < failed[19:, robot].mean() < 0.9  # two thirds are expected
+    assert (failed[:, 1] != failed[:, 4]).any()
+    # Neither the number of robots nor who else fails changes a robot's times.
+    other = held(Fault("rangers_blind", (4, 6), onset=2.0, intermittent=(1.0, 0.5)), 10)
+    np.testing.assert_array_equal(other[:, 4], failed[:, 4])
+    assert (held(fault, seed=6)[:, 1] != failed[:, 1]).any()
+
+
+def test_an_intermittent_fault_ends_for_good_after_its_duration() -> None:
+    failed = held(Fault("FM1", (0,), onset=1.0, duration=10.0, intermittent=(0.5, 0.5)))
+    assert failed[:109].any()
+    assert not failed[109:].any()
+
+
+def test_a_copy_meets_the_same_breaks() -> None:
+    world = Warehouse(SMALL)
+    world.reset(1, [Fault("motor_wear", 3, intermittent=(0.5, 0.5))])
+    commands = np.tile(EAST, (8, 1))
+    for _ in range(20):
+        world.step(commands)
+    copied = copy.deepcopy(world)
+    for _ in range(100):
+        np.testing.assert_array_equal(world.step(commands), copied.step(commands))
+        assert world.state.failure_modes == copied.state.failure_modes
 
 
 def test_a_removed_robot_does_not_come_back_when_other_faults_begin_and_end(build: Build) -> None:
@@ -266,8 +417,11 @@ def test_nothing_changes_by_a_bit_before_the_onset(mode: str) -> None:
     healthy = history((), 60)
     failing = history((Fault(mode, 4, onset=2.0),), 60)
     assert all(same(*pair) for pair in zip(healthy[:20], failing[:20]))
-    # FM4 does not show in one's senses until somebody carries the requested item in.
-    assert mode == "FM4" or not all(same(*pair) for pair in zip(healthy, failing))
+    # FM4 does not show in one's senses until somebody carries the requested item in, nor does a
+    # delayed radio until somebody was there.
+    assert mode in ("FM4", "FM4_jam", "radio_delayed") or not all(
+        same(*pair) for pair in zip(healthy, failing)
+    )
 
 
 def test_faults_do_not_move_where_things_start() -> None:
