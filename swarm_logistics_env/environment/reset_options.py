@@ -8,7 +8,7 @@ from typing import Any
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
 
 OPTIONS = ("faults", "scenario")
 
@@ -81,8 +81,7 @@ def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -
     """
     gone = set[int]()
     for fault in faults:
-        # Half a microsecond of grace, as in the warehouse.
-        if fault.onset <= 5e-7 and not FAILURE_MODES[fault.mode].present:
+        if fault.onset <= GRACE and not FAILURE_MODES[fault.mode].present:
             gone.update(failed_robots(fault, seed, n_robots).tolist())
     if len(gone) == n_robots:
         raise SetupError(
