@@ -120,7 +120,7 @@ class SwarmLogisticsEnv(DictView):
                     f"max_robots = {max_robots!r}: should be None or a whole number of at least "
                     f"n_robots = {self.scenario.n_robots}"
                 )
-            self.cover(self.scenario.replace(n_robots=int(max_robots)))
+            self.declare_spaces(self.scenario.replace(n_robots=int(max_robots)))
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""
@@ -146,7 +146,7 @@ class SwarmLogisticsEnv(DictView):
             SetupError: a seed or option is of the wrong type; no robot would be there; or such a
                 scenario has more robots than `possible_agents`, or observations or states that
                 could leave their spaces, which are those of the environment's own (and of those
-                given to `cover`).
+                given to `declare_spaces`).
         """
         options = checked_options(options)
         for unknown in options.keys() - set(OPTIONS):
@@ -227,7 +227,7 @@ class SwarmLogisticsEnv(DictView):
         """
         return {"delivered": self.warehouse.state.delivered}
 
-    def cover(self, scenario: Scenario) -> None:
+    def declare_spaces(self, scenario: Scenario) -> None:
         """Widen the observation space so that episodes may also be played in `scenario`.
 
         For wrappers, when they are made: spaces must not change once they were handed out.
@@ -235,7 +235,7 @@ class SwarmLogisticsEnv(DictView):
         Raises:
             SetupError: its rows or commands are longer or shorter than this environment's.
         """
-        self._spaces.cover(scenario)
+        self._spaces.widen(scenario)
         if scenario.n_robots > len(self.possible_agents):
             self.possible_agents = agent_names(range(scenario.n_robots))
 

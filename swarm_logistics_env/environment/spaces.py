@@ -10,14 +10,14 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.scenario import Scenario
 
-# Fields that bound the state: an episode's value is at most the largest of those covered.
+# Fields that bound the state: an episode's value is at most the largest of those declared.
 _BOUND_THE_STATE = (
     "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
 )  # fmt: skip
 
 
 class Spaces:
-    """What observations, commands and states lie in, whichever covered scenario is played.
+    """What observations, commands and states lie in, whichever declared scenario is played.
 
     Args:
         scenario: the environment's own.
@@ -33,9 +33,9 @@ class Spaces:
         self.observation = Box(low, high, dtype=np.float32)
         self.action = Box(-1.0, 1.0, (4 + scenario.message_size,), dtype=np.float32)
         self.n_items = scenario.n_items
-        self._covered = [scenario]
+        self._declared = [scenario]
 
-    def cover(self, scenario: Scenario) -> None:
+    def widen(self, scenario: Scenario) -> None:
         """Widen the spaces for `scenario`.
 
         Raises:
@@ -45,18 +45,18 @@ class Spaces:
         if low.shape != self.observation.shape:
             raise SetupError(
                 f"message_size = {scenario.message_size}: should be the environment's own, "
-                f"{self._covered[0].message_size}, which its spaces are made for"
+                f"{self._declared[0].message_size}, which its spaces are made for"
             )
         low = np.minimum(low, self.observation.low)
         high = np.maximum(high, self.observation.high)
         self.observation = Box(low, high, dtype=np.float32)
         self.n_items = max(self.n_items, scenario.n_items)
-        self._covered.append(scenario)
+        self._declared.append(scenario)
 
     def state(self, n_robots: int) -> Box:
         """Return the space of the state with rows for `n_robots` and the most items."""
         lows, highs = zip(
-            *(global_state_bounds(known, n_robots, self.n_items) for known in self._covered),
+            *(global_state_bounds(known, n_robots, self.n_items) for known in self._declared),
             strict=True,
         )
         return Box(np.min(lows, axis=0), np.max(highs, axis=0), dtype=np.float32)
@@ -78,7 +78,7 @@ class Spaces:
                 f"possible_agents never change; make the environment with "
                 f"max_robots={scenario.n_robots} or wrap it in SwarmSize"
             )
-        if scenario in self._covered:
+        if scenario in self._declared:
             return
         low, high = bounds(scenario)
         seen = self.observation
@@ -86,7 +86,7 @@ class Spaces:
             (low >= seen.low).all() and (high <= seen.high).all()
         )
         is_state_within = all(
-            getattr(scenario, name) <= max(getattr(known, name) for known in self._covered)
+            getattr(scenario, name) <= max(getattr(known, name) for known in self._declared)
             for name in _BOUND_THE_STATE
         )
         if is_seen_within and is_state_within:
@@ -94,9 +94,9 @@ class Spaces:
         changed = [
             f"{name} = {value}"
             for name, value in scenario.model_dump().items()
-            if value != getattr(self._covered[0], name)
+            if value != getattr(self._declared[0], name)
         ]
         raise SetupError(
             f"{', '.join(changed)}: observations or states could leave their spaces; should be "
-            "within what the environment was built for, or announced by env.cover(scenario)"
+            "within what the environment was built for, or announced by env.declare_spaces(scenario)"
         )

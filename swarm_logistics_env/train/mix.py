@@ -37,7 +37,7 @@ class EpisodeMix(Wrapper):
         for kind in kinds:
             for name, values in kind.scenario.items():
                 for value in values:
-                    self.env.cover(own.replace(**{name: value}))
+                    self.env.declare_spaces(own.replace(**{name: value}))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's conditions among them."""

@@ -99,14 +99,14 @@ class FaultInjection(Wrapper):
         """Note this episode's faults."""
         self.injected = self._drawn(seed, self.warehouse.state.n_robots)
 
-    def cover(self, scenario: Scenario) -> None:
-        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.cover`.
+    def declare_spaces(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
             FaultError: it has fewer robots than are to fail.
         """
         self._check(scenario)
-        self.env.cover(scenario)
+        self.env.declare_spaces(scenario)
 
     def _check(self, scenario: Scenario) -> None:
         failed_robots(self._fault, 0, scenario.n_robots)

@@ -84,7 +84,7 @@ class ParameterChange(Wrapper):
         before = self.env.scenarios
         after = [known.replace(**{name: value}) for known in before for value in self._values.ends]
         for scenario in after:
-            self.cover(scenario)
+            self.declare_spaces(scenario)
         known = after if at is None else [*before, *after]
         self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys(known))
 

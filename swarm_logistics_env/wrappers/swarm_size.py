@@ -79,7 +79,7 @@ class SwarmSize(Wrapper):
             )
         )
         for scenario in self.scenarios:
-            self.cover(scenario)
+            self.declare_spaces(scenario)
         sizes_announced = (scenario.n_robots for scenario in self.scenarios)
         largest = max(self.unwrapped.max_robots or 0, *sizes_announced)
         self.unwrapped.possible_agents = agent_names(range(largest))
@@ -91,8 +91,8 @@ class SwarmSize(Wrapper):
         scenario = {"n_robots": size, **scenario_fields(options)}
         return {**options, "scenario": scenario, "faults": faults}
 
-    def cover(self, scenario: Scenario) -> None:
-        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.cover`.
+    def declare_spaces(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
             SetupError: more robots are to leave than it has, or all of them at 0 s.
@@ -107,7 +107,7 @@ class SwarmSize(Wrapper):
                 f"leave: {self._leaving} robots in all, should be at most n_robots = "
                 f"{scenario.n_robots}"
             )
-        self.env.cover(scenario)
+        self.env.declare_spaces(scenario)
 
 
 def _departures(leave: Sequence[tuple[int, float]]) -> list[tuple[int, float]]:
