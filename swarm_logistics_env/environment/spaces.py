@@ -98,5 +98,5 @@ class Spaces:
         ]
         raise SetupError(
             f"{', '.join(changed)}: observations or states could leave their spaces; should be "
-            "within what the environment was built for, or announced by env.declare_spaces(scenario)"
+            "within what the environment was built for, or declared by env.declare_spaces(scenario)"
         )

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, NonNegativeInt, PositiveInt, field_validator
 
-from swarm_logistics_env import policies
+from swarm_logistics_env import policies, spi
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.policies.tuned import TunedPolicy
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.train.confirmation import confirm
-from swarm_logistics_env.train.evaluation import Evaluated, evaluate
+from swarm_logistics_env.train.evaluation import Evaluated, evaluate, performances
 from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, versions
 from swarm_logistics_env.train.settings import Evaluation
@@ -160,6 +160,40 @@ def values_of(asked: Tuning, found: Evaluated) -> tuple[float, ...]:
         "FT": np.mean([found.under_faults[mode] - p_s for mode in modes]) / p_o if p_o else -1.0,
     }
     return tuple(float(values[objective]) for objective in asked.objectives)
+
+
+def confirm(
+    policy: str, parameters: dict[str, Any], scenario: Scenario, n_seeds: int, threads: int
+) -> tuple[Score, ...]:
+    """Return P with these parameters and with the policy's own, and the change, on seeds 0, 1, ..
+
+    The best of many trials looks better than it is, on the seeds of the search.
+    """
+    p_own, p_best = (
+        performances(made, scenario, [()], range(n_seeds), threads)[0]
+        for made in (policies.load(policy), policies.load(policy, **parameters))
+    )
+    condition = f"N = {scenario.n_robots}, no fault"
+    scores = [
+        Score(measure="P", condition=f"{condition}, {whose}", seeds=n_seeds, **interval._asdict())
+        for whose, interval in (
+            ("tuned", spi.mean_interval(p_best)),
+            ("own parameters", spi.mean_interval(p_own)),
+        )
+    ]
+    if p_own.any():
+        change = spi.relative_change(p_own, p_best)
+        scores.append(
+            Score(
+                measure="change",
+                condition=f"{condition}, tuned against own parameters",
+                value=change.value,
+                low=change.low,
+                high=change.high,
+                seeds=n_seeds,
+            )
+        )
+    return tuple(scores)
 
 
 def _try(study: optuna.Study, asked: Tuning, done: int) -> tuple[float, ...]:
