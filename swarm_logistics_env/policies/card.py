@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -60,7 +61,7 @@ class Network(_Part):
 
 
 class Score(_Part):
-    """One measured value with its 95 % interval.
+    """One measured value with its 95 % interval; a limit that is infinite becomes None.
 
     Args:
         measure: "P", or an indicator: "R", "FT", "S", "A".
@@ -74,6 +75,11 @@ class Score(_Part):
     low: float | None
     high: float | None
     seeds: PositiveInt
+
+    @field_validator("low", "high", mode="before")
+    @classmethod
+    def _finite(cls, limit: Any) -> Any:
+        return None if isinstance(limit, float) and math.isinf(limit) else limit
 
 
 class PolicyCard(_Part):
