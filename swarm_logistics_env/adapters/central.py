@@ -61,10 +61,10 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.metadata = self.env.metadata
         self.render_mode = self.env.render_mode
         robot = self.env.possible_agents[0]
-        seen, told = self.env.observation_space(robot), self.env.action_space(robot)
+        row, command = self.env.observation_space(robot), self.env.action_space(robot)
         rows = (self._rows.n_rows, 1)
-        self.observation_space = Box(np.tile(seen.low, rows), np.tile(seen.high, rows))
-        self.action_space = Box(np.tile(told.low, rows), np.tile(told.high, rows))
+        self.observation_space = Box(np.tile(row.low, rows), np.tile(row.high, rows))
+        self.action_space = Box(np.tile(command.low, rows), np.tile(command.high, rows))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

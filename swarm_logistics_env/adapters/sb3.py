@@ -178,7 +178,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         step = self._worlds.step(self._actions)
         dones = step.terminated | step.truncated
         infos = self._infos()
-        # In the worlds' order: what episodes share must not depend on the threads.
+        # In the order of the worlds, so that what episodes share does not depend on the threads.
         if dones.any() or any(self._worlds.is_over):
             for world, rows in enumerate(self._worlds.rows):
                 if self._worlds.is_over[world] or dones[rows].any():
@@ -272,7 +272,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         return infos
 
     def _end(self, world: int, step: RowsStep, dones: NDArray[np.bool_], infos: Infos) -> None:
-        """Tell of the rows that are done, and begin the next episode if the world is over."""
+        """Complete the infos of rows that are done; begin the next episode if the world is over."""
         rows = self._worlds.rows[world]
         if self._worlds.is_over[world]:
             dones[rows] = True

@@ -22,9 +22,9 @@ ArrayStep = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], N
 
 
 class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # type: ignore[misc]  # PettingZoo ships no types
-    """`reset` and `step` of whoever has `reset_arrays` and `step_arrays`.
+    """`reset` and `step` for classes that have `reset_arrays` and `step_arrays`.
 
-    So that what a wrapper does to the arrays holds for the dicts as well.
+    What a wrapper does to the arrays so holds for the dicts as well.
     """
 
     agents: list[str]
@@ -38,12 +38,12 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         raise NotImplementedError
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
-        """Take one control period; leaves in `agents` who goes on."""
+        """Take one control period; `agents` are then those that go on."""
         raise NotImplementedError
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """What the `infos` of every agent say of the episode; the same keys at every step."""
+        """The part of every agent's infos that is about the episode; always of the same keys."""
         raise NotImplementedError
 
     @property
@@ -117,7 +117,7 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         )
 
     def _infos(self, agents: list[str]) -> Infos:
-        # The robots are not told who failed; whoever trains or judges them is.
+        # Robots do not sense who failed; infos are for those who train or evaluate them.
         sound = {"failed": 0, **self.episode_info}
         infos = {agent: sound.copy() for agent in agents}
         modes = self.warehouse.state.failure_modes

@@ -32,7 +32,7 @@ from swarm_logistics_env.warehouse import Fault, Warehouse
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer
 
-# What other environments call an argument.
+# Names that other environments give to an argument of this one.
 _OTHER_NAMES = {
     "num_agents": "n_robots",
     "n_agents": "n_robots",
@@ -50,7 +50,7 @@ class SwarmLogisticsEnv(DictView):
 
     Args:
         scenario: the conditions; default: the paper's.
-        faults: what befalls which robots in every episode.
+        faults: the faults that are scheduled in every episode.
         rewards: reward term -> weight; default: 1 to everybody for each delivery.
         render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
@@ -208,7 +208,7 @@ class SwarmLogisticsEnv(DictView):
         terminations, truncations = np.zeros((2, len(was_present)), np.bool_)
         is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
         is_over_time = is_cut or world.is_over_time
-        # Seldom, so that the other steps do not pay for it.
+        # These cases are rare; the other steps save the work.
         if is_over_time or world.all_delivered or world.n_removed != self._n_removed:
             self._n_removed = world.n_removed
             self._present = world.state.robot_present.copy()
@@ -221,7 +221,7 @@ class SwarmLogisticsEnv(DictView):
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """What the `infos` of every agent say of the episode; the same keys at every step.
+        """The part of every agent's infos that is about the episode; it always has the same keys.
 
         "delivered": items delivered so far, the paper's performance P.
         """

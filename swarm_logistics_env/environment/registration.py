@@ -10,7 +10,7 @@ PETTINGZOO_ID = "swarm_logistics_v0"
 
 
 def register() -> None:
-    """Register by name of the module alone: nothing is imported before somebody makes one."""
+    """Register the names; the modules are imported when somebody makes an environment."""
     if GYMNASIUM_ID not in gymnasium.registry:
         gymnasium.register(GYMNASIUM_ID, "swarm_logistics_env.adapters.central:CentralEnv")
     if not hasattr(pettingzoo, "register"):

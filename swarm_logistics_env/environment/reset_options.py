@@ -1,4 +1,4 @@
-"""The options of a reset, checked: what the environment and its wrappers read of them."""
+"""Checks of a reset's options, for the environment and its wrappers."""
 
 from __future__ import annotations
 

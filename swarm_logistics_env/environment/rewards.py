@@ -38,7 +38,7 @@ class RewardTerms:
         self._follows_carrier = not _OF_CARRIER.isdisjoint(self.weights)
 
     def begin(self, world: Warehouse) -> None:
-        """Note how an episode starts."""
+        """Store the state at the start of an episode."""
         self._before = Before()
         self._before.note(world, self._follows_carrier)
 
@@ -54,12 +54,12 @@ class RewardTerms:
 
 
 class Before:
-    """What the terms compare a step's outcome with: how things stood before it."""
+    """The state before a step, with which the terms compare the state after it."""
 
     __slots__ = ("carrier", "carrier_x", "delivered", "requested")
 
     def note(self, world: Warehouse, follows_carrier: bool) -> None:
-        """Note how things stand; who carries the requested item only if a term asks for it."""
+        """Store the state; the carrier of the requested item only if a term reads it."""
         self.delivered = len(world.state.delivery_times)
         self.requested = world.state.requested
         self.carrier, self.carrier_x = NOBODY, 0.0
@@ -88,7 +88,8 @@ def own_delivery(world: Warehouse, before: Before) -> Earned:
 def lift_requested(world: Warehouse, before: Before) -> Earned:
     """1 to the robot that took up the requested item, -1 to the one that let go of it."""
     carrier = carrier_of_requested(world)
-    # Not the requested item's number: with `restock` the same item may be asked for again.
+    # Deliveries tell that the request changed; the item's number does not, as the same item may be
+    # asked for again with `restock`.
     if world.state.delivered != before.delivered or carrier == before.carrier:
         return None
     paid = np.zeros(world.state.n_robots)

@@ -10,14 +10,14 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.scenario import Scenario
 
-# Fields that bound the state: an episode's value is at most the largest of those declared.
+# These fields bound the state: an episode may have at most the largest value declared.
 _BOUND_THE_STATE = (
     "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
 )  # fmt: skip
 
 
 class Spaces:
-    """What observations, commands and states lie in, whichever declared scenario is played.
+    """The spaces of observations, commands and states in all declared scenarios.
 
     Args:
         scenario: the environment's own.

@@ -1,4 +1,4 @@
-"""What a caged robot does: amid items closer to each other than it is wide, it cannot leave.
+"""The way out for a caged robot: it stands amid items with gaps that are narrower than it is.
 
 It lets the requested item go, lifts one of those that stand around it, which an empty robot can
 drive under, and carries it away. Then the way is open for whoever lifts the requested item next.

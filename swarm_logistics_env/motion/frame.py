@@ -1,4 +1,4 @@
-"""What a network reads and commands: in the frame of its robot's motion.
+"""The inputs and outputs of a network, in the frame of its robot's motion.
 
 A swarm has no compass, so what is to the left of a robot's motion matters, not what is to the
 left of its body. The frame is turned by whole beams, so that scans need no interpolation.
@@ -150,7 +150,7 @@ def read_rows(
             read[beam] = max(0.0, 1.0 - away / WALL_REACH)
         at = read_neighbours(sensed, cos, sin, read, row.N_BEAMS)
         at = read_items(sensed, cos, sin, read, at)
-        # Whoever tells the lowest timer may lie: it counts less the more the robot knows itself.
+        # The robot that tells the lowest timer may lie: it counts less the more this robot knows.
         sure = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
         at = read_lead(sensed, cos, sin, 1.0 - math.tanh(sure), read, at)
         read[at] = sensed[row.CARRYING]
@@ -163,7 +163,7 @@ def read_rows(
         read[at], read[at + 1] = cos * x + sin * y, cos * y - sin * x
         at += 2
         x, y = own[known.HEADING_X], own[known.HEADING_Y]
-        # At most half a beam aside: as large as the others.
+        # The heading is at most half a beam aside, so it is doubled to be as large as other inputs.
         read[at], read[at + 1] = cos * x + sin * y, 2.0 * (cos * y - sin * x)
         at += 2
         x, y = own[known.HOME_X], own[known.HOME_Y]

@@ -1,4 +1,4 @@
-"""What a robot remembers beside its sensors: all of it from its own observations and commands.
+"""A robot's memory, made of its own observations and commands alone.
 
 Directions are in the robot's own frame, which drifts; so what it remembers of them fades.
 """
@@ -19,7 +19,7 @@ HOME_X, HOME_Y = 2, 3  # fading sum of its directions into the delivery area, le
 WAS_INSIDE = 4  # the delivery area
 FAILED = 5  # 1: it just met its own failure; fades over FAILURE_TIME
 STUCK = 6  # 1: it just stood still with the requested item; falls to 0 in STUCK_TIME
-HELD = 7  # what its gripper was told: 0 open, 1 hold, 2 hold the requested item it carries
+HELD = 7  # the last gripper command: 0 open, 1 hold, 2 hold the requested item it carries
 STANDING = 8  # [s] that it stood still with the requested item, less those that it moved
 CLEARING = 9  # [s] that are left to clear its way out of a cage of items; see `clearing`
 N_COLUMNS = 10

@@ -1,4 +1,4 @@
-"""What a trained policy's file says of itself: how it decides, how it was made, how good it is."""
+"""The card in a trained policy's file: how it decides, how it was made, how good it is."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class _Part(Record):
 
 
 class Network(_Part):
-    """What a trained policy reads, computes and commands.
+    """The inputs, layers and outputs of a trained policy.
 
     Args:
         inputs: what it reads, in this order: `motion.INPUTS`.
@@ -83,7 +83,7 @@ class Score(_Part):
 
 
 class PolicyCard(_Part):
-    """All that a policy file says beside its weights.
+    """Everything in a policy file beside the weights.
 
     Args:
         format: of the file.

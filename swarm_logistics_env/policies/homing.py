@@ -33,7 +33,7 @@ from swarm_logistics_env.motion.frame import (
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-# All fitted: found by trying, for deliveries. Gains in top speeds, ranges in m.
+# All values are fitted: they were tried for the most deliveries. Gains in top speeds, ranges in m.
 SPREAD_GAIN, SPREAD_RANGE = 0.8, 2.0  # away from neighbours, while searching
 AVOID_GAIN, AVOID_RANGE = 2.0, 0.5  # away from near neighbours, always
 WALL_GAIN, WALL_RANGE, MIRROR_RANGE = 1.5, 0.6, 0.2
@@ -71,7 +71,7 @@ class Homing:
         """Return commands (N, 4) for observation rows (N, D).
 
         Raises:
-            PolicyError: there are more or fewer rows than `reset` was told.
+            PolicyError: there are more or fewer rows than robots at `reset`.
         """
         if len(observations) != len(self._frame.keys):
             raise PolicyError(

@@ -41,7 +41,7 @@ def load_tuned(path: Path, **parameters: Any) -> Policy:
 SCRIPTED: dict[str, Callable[..., Policy]] = {
     "swarm-dt": SwarmDT,
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
-    # Swarm D-T without its taxis: the ablation.
+    # This is Swarm D-T without its taxis, for ablations.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
     "homing": Homing,
     "central": Central,
@@ -49,7 +49,7 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
 
 NAMES: dict[str, Callable[..., Policy]] = {
     **SCRIPTED,
-    # Trained or tuned, each by the command that its file names.
+    # These are trained or tuned; each file names the command that made it.
     **{
         path.stem: functools.partial(read_policy, path)
         for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))

@@ -1,4 +1,4 @@
-"""What a policy is: the one interface between whatever decides and the warehouse."""
+"""The interface between a policy and the warehouse."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Policy(Protocol):
 
 
 def start(policy: Policy, scenario: Scenario, seed: int) -> None:
-    """Tell `policy` of an episode that begins.
+    """Let `policy` begin an episode.
 
     Raises:
         PolicyError: it is none.

@@ -1,4 +1,4 @@
-"""Policies as stable-baselines3 saves them: files that execute code when they are read."""
+"""Policies that stable-baselines3 saved: reading such a file executes the code in it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SUFFIX = ".zip"
 
 
 class StableBaselinesPolicy:
-    """A PPO model that was saved by stable-baselines3, its most likely command each time.
+    """A PPO model that stable-baselines3 saved; it gives its most likely command each time.
 
     It should have learned from bare observation rows (D,) to give commands (4,), as from
     `adapters.SwarmVecEnv`; what normalised its observations is not in the file.

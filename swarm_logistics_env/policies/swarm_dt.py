@@ -58,7 +58,7 @@ class SwarmDTParameters(Record):
 
 
 class StepConstants(NamedTuple):
-    """What compiled code reads of the parameters, for one control period.
+    """The parameters for one control period, as compiled code reads them.
 
     Attributes:
         widest_turn: of the stored heading by diffusion [rad].
@@ -96,7 +96,7 @@ class SwarmDT:
         self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows, period and drive; nothing of the surroundings."""
+        """Take what the maker of a robot knows: its control period and its drive."""
         parameters, period = self.parameters, scenario.control_period
         is_differential = scenario.drive == "differential"
         self._constants = StepConstants(

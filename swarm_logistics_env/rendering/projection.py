@@ -1,4 +1,4 @@
-"""Where the warehouse lies on the picture: metres to pixels."""
+"""The projection of the warehouse onto the picture, from metres to pixels."""
 
 from __future__ import annotations
 

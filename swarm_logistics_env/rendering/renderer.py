@@ -131,7 +131,7 @@ def load_pygame() -> None:
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
         with warnings.catch_warnings():
-            # pygame's own use of old parts of setuptools is nothing the caller can mend.
+            # pygame uses old parts of setuptools, which the caller cannot change.
             warnings.simplefilter("ignore")
             for module in ("pygame", "pygame.font", "pygame.pkgdata"):
                 importlib.import_module(module)

@@ -1,4 +1,4 @@
-"""The window of the human mode."""
+"""The window that render_mode "human" opens."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Window:
             pygame.display.init()
         except pygame.error as error:
             raise _no_display(str(error)) from error
-        # What SDL falls back to by itself shows nothing to anybody.
+        # SDL falls back to a driver that shows nothing.
         if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
             pygame.display.quit()
             raise _no_display("SDL found none")

@@ -20,7 +20,7 @@ FILE_NAME = "checkpoint.pt"
 
 
 def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) -> None:
-    """Write a checkpoint, whole or not at all; the one before stands until then.
+    """Write a checkpoint, whole or not at all; until then the one before stays.
 
     To be called between updates: after learning from a batch, before collecting the next; or
     before the first.

@@ -1,4 +1,4 @@
-"""The scores on a policy's card: a study like any other, on seeds that nothing was learned from."""
+"""The scores on a policy's card: a study on seeds that the training did not use."""
 
 from __future__ import annotations
 

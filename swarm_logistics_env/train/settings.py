@@ -1,4 +1,4 @@
-"""The tables of a training file: what it mixes, imitates, learns by and measures."""
+"""The tables of a training file: conditions, imitation, PPO and what is measured."""
 
 from __future__ import annotations
 

@@ -57,11 +57,11 @@ def train(
         SetupError, ScenarioError, FaultError: worlds that cannot be.
     """
     out = Path(out)
-    # First what may be refused, so that nothing is begun that cannot be.
+    # Everything that may be refused comes first, before anything is written.
     device, begun = device_of(device), _new_view(training)
     enter(out, training, command)
-    # Such small networks gain little from more, lose much where cores are shared, and sums would
-    # depend on their number.
+    # Small networks gain little from more threads and lose much if cores are shared; the sums would
+    # depend on the number of threads as well.
     torch.set_num_threads(1)
     state = read_checkpoint(out)
     view, log = begun, TrainingLog()
@@ -74,7 +74,7 @@ def train(
         restore(learner, state)
     elif training.imitation is not None:
         imitate(learner.policy, training, training.imitation)
-        # Its seeds, so that what follows does not depend on how long it took.
+        # Seeded anew, so that PPO does not depend on how long the imitation took.
         learner.set_random_seed(training.seed)
         save_checkpoint(out, learner, view, log)
     if learner.num_timesteps < training.agent_steps:
@@ -116,7 +116,7 @@ def _write(
         seed=training.seed,
         agent_steps=agent_steps,
     )
-    # Before the scores, which take minutes.
+    # The file is written before the scores are measured, which takes minutes.
     write_policy(path, card, tensors)
     scores = score(LearnedPolicy(card, tensors), training, out / "scores")
     if scores:
@@ -126,5 +126,5 @@ def _write(
 
 def _changed(scenario: Scenario) -> dict[str, Any]:
     changed = scenario.model_dump(mode="json", exclude_defaults=True)
-    # Always: a card that does not name it is from before there was one.
+    # The field is always written, because a card without it is from before there was one.
     return {"heading_drift": scenario.heading_drift, **changed}

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 STORAGE = "trials.sqlite"
 RESULT = "result.json"
 
-# Where each parameter of Swarm D-T is looked for: (lowest, highest), around what it is by default.
+# The range (lowest, highest) in which each parameter of Swarm D-T is searched, around its default.
 RANGES: Mapping[str, tuple[float, float]] = {
     "diffusion": (0.05, 3.0),
     "avoidance_gain": (0.0, 5.0),
@@ -44,7 +44,7 @@ Objective = Literal["P", "R", "FT"]
 
 
 class Tuning(Record):
-    """What is searched for.
+    """The specification of a search.
 
     Args:
         policy: name of the scripted policy.
@@ -93,7 +93,7 @@ class Tuning(Record):
 
 @dataclass(frozen=True)
 class Trial:
-    """Parameters that were tried, and what came of them, objective by objective."""
+    """Parameters that were tried, and their value for each objective."""
 
     number: int
     parameters: dict[str, float]
@@ -199,7 +199,7 @@ def confirm(
 def _try(study: optuna.Study, asked: Tuning, done: int) -> tuple[float, ...]:
     import optuna
 
-    # A sampler for each trial: a search that was cut short goes on as it would have.
+    # Each trial has its own sampler, so that a search that was stopped goes on as it would have.
     study.sampler = optuna.samplers.TPESampler(seed=(asked.seed * 100_003 + done) % 2**32)
     trial = study.ask()
     parameters: dict[str, Any] = {name: trial.suggest_float(name, *RANGES[name]) for name in RANGES}

@@ -74,8 +74,9 @@ class FixedAgents(Wrapper):
         wanted = (self.n_rows, *self.action_space("robot_0").shape)
         if given.shape != wanted:
             raise CommandError(f"commands of shape {given.shape}: should be {wanted}")
-        told = super().step_arrays(given[: self.warehouse.state.n_robots])
-        observations, rewards, _, truncations = told
+        observations, rewards, _, truncations = super().step_arrays(
+            given[: self.warehouse.state.n_robots]
+        )
         is_over = not self.env.agents
         is_cut = is_over and bool(truncations.any())
         if is_over:

@@ -1,4 +1,4 @@
-"""Surroundings that change."""
+"""Changes of a scenario's parameters, in an episode or during it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from swarm_logistics_env.environment.reset_options import scenario_fields
 from swarm_logistics_env.errors import ScenarioError, suggest
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
 from swarm_logistics_env.streams import generator
+from swarm_logistics_env.warehouse.faults import GRACE
 from swarm_logistics_env.wrappers.sampling import Sampler
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
@@ -93,12 +94,12 @@ class ParameterChange(Wrapper):
         value, time = self._drawn(seed)
         if time is None:
             return {**options, "scenario": {self.name: value, **scenario_fields(options)}}
-        # It cannot be tried too early: a change that fails in mid-run has cost the run.
+        # The change is tried now, because an error in mid-run would cost the run.
         self.env.scenario_of(seed, options).replace(**{self.name: value})
         return options
 
     def begun(self, seed: int) -> None:
-        """Note this episode's value and time."""
+        """Store this episode's value and time."""
         self.value, self.time = self._drawn(seed)
         present = getattr(self.warehouse.scenario, self.name)
         if self.time is None:
@@ -107,8 +108,7 @@ class ParameterChange(Wrapper):
 
     def before_step(self, commands: ArrayLike) -> ArrayLike:
         """Make the change if it is due."""
-        # Half a microsecond of grace: times are sums of control periods.
-        if self._is_due and self.warehouse.state.time >= (self.time or 0.0) - 5e-7:
+        if self._is_due and self.warehouse.state.time >= (self.time or 0.0) - GRACE:
             self.warehouse.change(**{self.name: self.value})
             self._is_due = False
         return commands

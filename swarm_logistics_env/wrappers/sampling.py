@@ -13,7 +13,7 @@ Distribution = Callable[[np.random.Generator], Any]
 
 
 class Sampler:
-    """A value for each episode.
+    """Samples a value for each episode.
 
     Args:
         name: what it is, for errors.

@@ -66,7 +66,7 @@ class SwarmSize(Wrapper):
         pairs = _departures(leave)
         self._leaving = sum(robots for robots, _ in pairs)
         self._absent = sum(robots for robots, time in pairs if time == 0.0)
-        # The sets are nested, so the first m + k take with them the m who have left.
+        # The sets are nested: the first m + k robots contain the m that have left.
         in_all = np.cumsum([robots for robots, _ in pairs], dtype=np.int64).tolist()
         self._departures = tuple(
             Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)

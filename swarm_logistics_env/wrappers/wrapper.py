@@ -1,4 +1,4 @@
-"""What the wrappers have in common."""
+"""The base of all wrappers."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         return observations
 
     def begun(self, seed: int) -> None:
-        """Note what there is to note of an episode that has begun."""
+        """Store what a subclass needs to know of the episode that has begun."""
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
         """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
@@ -98,7 +98,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """What the `infos` of every agent say of the episode; the same keys at every step.
+        """The part of every agent's infos that is about the episode; it always has the same keys.
 
         For wrappers that have more to say: `{**self.env.episode_info, "key": number}`.
         """

@@ -21,7 +21,7 @@ class Key:
 
     @property
     def label(self) -> str:
-        """What help calls the key."""
+        """The name of the key in the help."""
         return {" ": "space", "ArrowRight": "right arrow", "Escape": "Esc"}.get(
             self.name, self.name
         )

@@ -1,4 +1,4 @@
-"""What the page may ask of a session."""
+"""The orders that the page may give to a session."""
 
 from __future__ import annotations
 

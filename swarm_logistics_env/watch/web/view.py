@@ -1,4 +1,4 @@
-"""A session as JSON: what the page draws."""
+"""The data of a session that the page draws, as JSON."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def observation_words(row: NDArray[np.float32], scenario: Scenario) -> list[tupl
             if column.name.endswith("_present") and len(values) > 1:
                 text = f"{int((values > 0.5).sum())} of {len(values)}"
         else:
-            # + 0.0: no minus before a zero.
+            # Adding 0.0 turns a negative zero into zero.
             text = " ".join(f"{round(float(value), 2) + 0.0:.2f}" for value in values)
         unit = "" if column.unit in ("flag", "1") else f" [{column.unit}]"
         words.append((column.name + unit, text or "–"))
