@@ -33,7 +33,7 @@ _SCRIPT = """
 import pickle, sys
 from benchmarks.floor import ForceFloor
 from swarm_logistics_env import Warehouse
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 with open(sys.argv[1], "rb") as file:
     recording = pickle.load(file)
 {}

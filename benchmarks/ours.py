@@ -12,7 +12,7 @@ from benchmarks.floor import ForceFloor, JointFloor
 from benchmarks.recording import Recording, record
 from benchmarks.timing import Contestant
 from swarm_logistics_env import Scenario, Warehouse, policies
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.policies.policy import start
 
 FLOOR, JOINTS, ARRAYS = "force floor", "joint floor", "env.step_arrays"

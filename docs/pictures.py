@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -32,29 +31,6 @@ def scene(seconds: float, faults: tuple[Fault, ...] = ()) -> NDArray[np.uint8]:
     while world.state.time < seconds:
         observations = world.step(decide(policy, observations, world.state))
         picture = renderer.frame(world.state, scenario)
-    return picture
-
-
-def window() -> NDArray[np.uint8]:
-    """Return a picture of the window of `swarm-logistics watch`, after two robots were broken."""
-    os.environ["SDL_VIDEODRIVER"] = "dummy"  # no display needed
-    import pygame
-
-    from swarm_logistics_env.watch import Session
-    from swarm_logistics_env.watch.window import WatchWindow
-
-    session = Session(Scenario(), lambda: policies.load("swarm-dt"), seed=1)
-    shown = WatchWindow(session, "swarm-dt", size=(1000, 700))
-    for seconds, robot in ((40.0, 7), (60.0, 3)):
-        while session.run.world.state.time < seconds:
-            session.play(0.1)
-        session.toggle_robot(robot)
-    while session.run.world.state.time < 200.0:
-        session.play(0.1)
-    shown.turn(0.0)
-    surface = pygame.display.get_surface()
-    picture = np.ascontiguousarray(pygame.surfarray.array3d(surface).swapaxes(0, 1))
-    shown.close()
     return picture
 
 
@@ -92,5 +68,4 @@ if __name__ == "__main__":
     MEDIA.mkdir(exist_ok=True)
     save(scene(30.0), "warehouse.png")
     save(scene(60.0, (Fault("FM1", 2), Fault("FM4", [0, 5]))), "faults.png")
-    save(window(), "watch.png")
     figures()

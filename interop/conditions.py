@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from swarm_logistics_env import swarm_logistics_v0
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.wrappers import FaultInjection, FixedAgents, SwarmSize, Wrapper
 
 N_ROBOTS = 5

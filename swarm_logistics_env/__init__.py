@@ -10,8 +10,8 @@ import importlib.metadata
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from swarm_logistics_env.environment.registration import register
 from swarm_logistics_env.episode import Episode, run_episode
-from swarm_logistics_env.registration import register
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
 

@@ -57,7 +57,7 @@ def run_episode(
 
     Args:
         seed: decides the layout, the requests, which robots fail and the policy's own randomness.
-        faults: what befalls which robots, and when.
+        faults: the faults that are scheduled in the episode.
         policy_seed: decides the policy's own randomness instead of `seed`; the same world with
             another behaviour.
 

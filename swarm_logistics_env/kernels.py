@@ -20,7 +20,7 @@ R = TypeVar("R")
 def _digest_of_sources() -> str:
     here = Path(__file__).parent
     digest = hashlib.blake2b(digest_size=6)
-    for pattern in ("*.py", "warehouse/*.py", "policies/*.py"):
+    for pattern in ("*.py", "warehouse/*.py", "motion/*.py", "policies/*.py"):
         for path in sorted(here.glob(pattern)):
             source = path.read_bytes()
             # Kernels, what they are made of, and the files whose constants and arrays they use.

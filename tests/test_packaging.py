@@ -15,7 +15,6 @@ import pytest
 
 PACKAGE = "swarm_logistics_env"
 ROOT = Path(__file__).parents[1]
-LINKS = ("policies", "train")
 
 # One worker builds once for the whole file.
 pytestmark = pytest.mark.xdist_group("packaging")
@@ -83,8 +82,7 @@ def test_sdist_is_enough_to_run_the_gate(built: Built) -> None:
     assert tests <= built.sdist
 
 
-@pytest.mark.parametrize("link", [link for link in LINKS if (ROOT / link).is_symlink()])
-def test_links_show_parts_of_the_package(built: Built, link: str) -> None:
-    target = ROOT / PACKAGE / link
-    assert (ROOT / link).resolve() == target.resolve()
-    assert f"{PACKAGE}/{link}/__init__.py" in built.sdist
+def test_links_at_the_top_show_parts_of_the_package() -> None:
+    links = [path for path in ROOT.iterdir() if path.is_symlink()]  # a checkout may have none
+    assert {path.name for path in links} <= {"policies", "train"}
+    assert [path.resolve() for path in links] == [ROOT / PACKAGE / path.name for path in links]

@@ -13,7 +13,7 @@ __all__ = ["CentralEnv", "SwarmVecEnv"]
 
 
 def __getattr__(name: str) -> type[SwarmVecEnv]:
-    # When first asked for: it loads stable-baselines3, and that torch.
+    # It loads stable-baselines3 and torch, so it is imported when somebody asks for it.
     if name == "SwarmVecEnv":
         from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 

@@ -1,4 +1,4 @@
-"""Memory that is used again."""
+"""Arrays whose memory is used again."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def _references(arrays: Sequence[NDArray[np.float32]], place: int) -> int:
     return sys.getrefcount(arrays[place])
 
 
-# Of an array that only a list holds. Counted, not written down: a call's own references are not
-# the same number in every Python.
+# The number of references to an array that only a list holds. It is counted here, because a call
+# adds another number of references in each version of Python.
 _HELD_BY_NOBODY = _references([np.empty(0, np.float32)], 0)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.commands import as_array
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.commands import as_array
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.hearing import as_heard
+from swarm_logistics_env.policies.policy import mask_unreachable_commands
 from swarm_logistics_env.wrappers import FixedAgents
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     largest swarm there may be; rows of robots that are absent are zeros, their commands ignored.
     The reward is the mean of the rewards of the robots present: 1 per delivery by default. An
     episode terminates when everything is delivered or nobody is left, and is truncated when the
-    time is up. A robot that hears nothing gets no commands, see `as_heard`.
+    time is up. A robot that hears nothing gets no commands, see `mask_unreachable_commands`.
 
     Infos are numbers, with the same keys at every step: "failed" (N,), 1 for each robot in which
     any failure mode holds, else 0; "delivered", items so far; what wrappers add.
@@ -61,10 +61,10 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.metadata = self.env.metadata
         self.render_mode = self.env.render_mode
         robot = self.env.possible_agents[0]
-        seen, told = self.env.observation_space(robot), self.env.action_space(robot)
+        row, command = self.env.observation_space(robot), self.env.action_space(robot)
         rows = (self._rows.n_rows, 1)
-        self.observation_space = Box(np.tile(seen.low, rows), np.tile(seen.high, rows))
-        self.action_space = Box(np.tile(told.low, rows), np.tile(told.high, rows))
+        self.observation_space = Box(np.tile(row.low, rows), np.tile(row.high, rows))
+        self.action_space = Box(np.tile(command.low, rows), np.tile(command.high, rows))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -91,7 +91,7 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 f"{self.action_space.shape} numbers"
             )
         n_present = np.count_nonzero(state.robot_present)
-        commands[: state.n_robots] = as_heard(commands[: state.n_robots], state)
+        commands[: state.n_robots] = mask_unreachable_commands(commands[: state.n_robots], state)
         observations, rewards, terminations, truncations = self._rows.step_arrays(commands)
         reward = float(rewards.sum() / max(n_present, 1))
         return observations, reward, bool(terminations.any()), bool(truncations.any()), self._info()

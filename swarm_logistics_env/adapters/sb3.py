@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.adapters.worlds import RowsStep, World, Worlds, checked_count, maker
+from swarm_logistics_env.environment.reset_options import checked_seed
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.reset_options import checked_seed
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 
@@ -73,7 +73,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         20
         >>> PPO("MlpPolicy", env, n_steps=32, seed=0).learn(640).num_timesteps
         640
-        >>> from swarm_logistics_env.env import SwarmLogisticsEnv
+        >>> from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
         >>> from swarm_logistics_env.wrappers import FaultInjection
         >>> def make_env(world):
         ...     return FaultInjection(SwarmLogisticsEnv(n_robots=5), "FM1", robots=world + 1)
@@ -178,7 +178,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         step = self._worlds.step(self._actions)
         dones = step.terminated | step.truncated
         infos = self._infos()
-        # In the worlds' order: what episodes share must not depend on the threads.
+        # In the order of the worlds, so that what episodes share does not depend on the threads.
         if dones.any() or any(self._worlds.is_over):
             for world, rows in enumerate(self._worlds.rows):
                 if self._worlds.is_over[world] or dones[rows].any():
@@ -272,7 +272,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         return infos
 
     def _end(self, world: int, step: RowsStep, dones: NDArray[np.bool_], infos: Infos) -> None:
-        """Tell of the rows that are done, and begin the next episode if the world is over."""
+        """Complete the infos of rows that are done; begin the next episode if the world is over."""
         rows = self._worlds.rows[world]
         if self._worlds.is_over[world]:
             dones[rows] = True

@@ -11,9 +11,9 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.adapters.buffers import Buffers
-from swarm_logistics_env.commands import as_array
-from swarm_logistics_env.dict_view import ArrayStep
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.commands import as_array
+from swarm_logistics_env.environment.dict_view import ArrayStep
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
@@ -23,7 +23,7 @@ World: TypeAlias = SwarmLogisticsEnv | Wrapper
 
 
 class RowsStep(NamedTuple):
-    """What a step of all worlds gives; arrays of the caller's own."""
+    """The outcome of a step of all worlds; the caller may change the arrays."""
 
     observations: NDArray[np.float32]  # (R, D)
     rewards: NDArray[np.float32]  # (R,)
@@ -34,8 +34,8 @@ class RowsStep(NamedTuple):
 class Worlds:
     """Worlds whose robots are R rows: world 0's possible agents first, then world 1's, ...
 
-    Rows without a robot are zeros. Who is over is begun anew by the caller, so that what worlds
-    share is touched in one thread only.
+    Rows without a robot are zeros. The caller begins the next episode of a world that is over, so
+    that one thread alone touches what worlds share.
 
     Args:
         make_env: world number -> environment.
@@ -67,7 +67,7 @@ class Worlds:
         self._n_robots = [0] * n_worlds
         self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
         self._layers = [_layers(env) for env in self.envs]
-        # Largest first, so that no thread is left with much work at the end.
+        # The largest worlds are stepped first, so that all threads end at about the same time.
         order = sorted(range(n_worlds), key=lambda world: -sizes[world])
         self._shared_out = [world for world in order if self._layers[world]]
         self._alone = [world for world in order if not self._layers[world]]
@@ -95,7 +95,7 @@ class Worlds:
         self.note_present(world)
 
     def note_present(self, world: int) -> None:
-        """Take over which robots of a world are there."""
+        """Update which rows of a world are robots that are there."""
         there, rows = self.envs[world].warehouse.state.robot_present, self.rows[world]
         self.present[rows] = False
         self.present[rows.start : rows.start + len(there)] = there
@@ -126,7 +126,7 @@ class Worlds:
 
     def step(self, commands: NDArray[Any]) -> RowsStep:
         """Take one control period in every world, with `checked` commands (R, 4)."""
-        # Memory of the caller's own: what was handed out stays as it was.
+        # New arrays, because the caller may still hold those of the step before.
         outcome = RowsStep(
             self.blank() if self._has_padding() else self._buffers.used(),
             np.zeros(self.n_rows, np.float32),
@@ -137,9 +137,9 @@ class Worlds:
             outcome = self._step_together(commands, outcome)
         for world in self._alone:
             given = commands[self._robots(world)]
-            told = self.envs[world].step_arrays(given)
-            outcome.observations[self._robots(world)] = told[0]
-            self._take(world, told, outcome)
+            step = self.envs[world].step_arrays(given)
+            outcome.observations[self._robots(world)] = step[0]
+            self._take(world, step, outcome)
         return outcome
 
     def close(self) -> None:
@@ -164,12 +164,12 @@ class Worlds:
             *wrappers, core = self._layers[world]
             if not wrappers and core.is_uneventful(is_eventful):
                 return  # everything else is zeros
-            told = core.outcome(sensed)
+            step = core.outcome(sensed)
             for wrapper in reversed(wrappers):
-                told = wrapper.after_step(told)
-            if told[0] is not sensed:
-                changed[world] = told[0]
-            self._take(world, told, outcome)
+                step = wrapper.after_step(step)
+            if step[0] is not sensed:
+                changed[world] = step[0]
+            self._take(world, step, outcome)
 
         self._pool.step(warehouses, firsts, given, outcome.observations, arrived)
         if changed:
@@ -178,9 +178,9 @@ class Worlds:
                 outcome.observations[self._robots(world)] = rows
         return outcome
 
-    def _take(self, world: int, told: ArrayStep, outcome: RowsStep) -> None:
+    def _take(self, world: int, step: ArrayStep, outcome: RowsStep) -> None:
         robots = self._robots(world)
-        _, rewards, terminated, truncated = told
+        _, rewards, terminated, truncated = step
         outcome.rewards[robots] = rewards
         outcome.terminated[robots], outcome.truncated[robots] = terminated, truncated
         self.is_over[world] = not self.envs[world].agents
@@ -222,16 +222,16 @@ def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
     if len({id(env.unwrapped) for env in worlds}) < len(worlds):
         raise SetupError("make_env gave the same environment twice: should make one each time")
     seen = [env.observation_space("robot_0") for env in worlds]
-    told = [env.action_space("robot_0") for env in worlds]
-    if len({(space.shape, command.shape) for space, command in zip(seen, told)}) > 1:
+    commands = [env.action_space("robot_0") for env in worlds]
+    if len({(space.shape, command.shape) for space, command in zip(seen, commands)}) > 1:
         raise SetupError(
             f"observations {[space.shape for space in seen]} and commands "
-            f"{[command.shape for command in told]}: should be of one length in all worlds, so of "
-            "one message_size"
+            f"{[command.shape for command in commands]}: should be of one length in all worlds, "
+            "so of one message_size"
         )
     low = np.min([space.low for space in seen], axis=0)
     high = np.max([space.high for space in seen], axis=0)
-    return Box(low, high, dtype=np.float32), told[0]
+    return Box(low, high, dtype=np.float32), commands[0]
 
 
 def maker(

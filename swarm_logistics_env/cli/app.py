@@ -1,4 +1,4 @@
-"""`swarm-logistics run` and `scenario`, and where the other commands are joined on."""
+"""`swarm-logistics run` and `scenario`, and the place where the other commands are added."""
 
 from __future__ import annotations
 
@@ -88,12 +88,12 @@ def run_command(
     from swarm_logistics_env.episode import run_episode
 
     scenario = scenario_of(preset, changes)
-    befalling = [fault_of(text) for text in faults or []]
+    scheduled = [fault_of(text) for text in faults or []]
     player = policies.load(policy, trust_code=trust_code)
-    # Compiles the kernels, so that the time below is the episode's.
+    # This compiles the kernels, so that the time below is that of the episode alone.
     run_episode(scenario.replace(duration=scenario.control_period), player, seed)
     start = time.perf_counter()
-    episode = run_episode(scenario, player, seed, befalling)
+    episode = run_episode(scenario, player, seed, scheduled)
     wall = time.perf_counter() - start
     times = episode.delivery_times
     typer.echo(

@@ -22,7 +22,8 @@ class Application(typer.Typer):
 
     def run(self, arguments: list[str] | None = None) -> int:
         """Run a command line and return the exit code."""
-        # A policy of one's own lies where the command is run. Last: it shadows nothing installed.
+        # A user's own policy lies in the folder in which the command is run. The folder comes last,
+        # so that its modules hide no installed ones.
         if "" not in sys.path:
             sys.path.append("")
         try:
@@ -40,8 +41,8 @@ class Application(typer.Typer):
 
 
 def _sentence(error: Exception) -> str | None:
-    """Return what to tell the user; None: a fault of ours, to be seen with its traceback."""
-    # Typer's own errors of usage, whichever click they come from.
+    """Return what to tell the user, or None for a bug of ours, whose traceback should be seen."""
+    # These are Typer's own errors of usage, whichever click they come from.
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
         return str(format_message())
@@ -54,7 +55,7 @@ def _sentence(error: Exception) -> str | None:
 
 
 def _of_a_policy(error: Exception) -> str | None:
-    """Return what a policy from outside the package raised, and where; None: it was no such one."""
+    """Return what a user's own policy raised, and where; None if none of those raised the error."""
     from swarm_logistics_env.policies import policy
 
     frames = traceback.extract_tb(error.__traceback__)
@@ -74,7 +75,7 @@ def _of_a_policy(error: Exception) -> str | None:
 
 
 def _complain(sentence: str, code: int) -> int:
-    # It may repeat what was typed, which neither breaks the line nor steers the terminal.
+    # The sentence may repeat what was typed: signs that steer a terminal are escaped.
     shown = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)
     sys.stderr.write(f"swarm-logistics: {shown}\n")
     return code

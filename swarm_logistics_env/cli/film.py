@@ -63,8 +63,8 @@ def film_command(
     from swarm_logistics_env.rendering.video import check_film, write_film
 
     scenario = scenario_of(preset, changes)
-    befalling = [fault_of(text) for text in faults or []]
-    if twin and not befalling:
+    scheduled = [fault_of(text) for text in faults or []]
+    if twin and not scheduled:
         raise SetupError("--twin: is the run without its faults, so --fault should be given")
     check_film(out)
     load_pygame()
@@ -73,9 +73,9 @@ def film_command(
 
     takes = []
     for name in policies or ["swarm-dt"]:
-        for these in ([], befalling) if twin else (befalling,):
+        for these in ([], scheduled) if twin else (scheduled,):
             policy = known.load(name, trust_code=trust_code)
-            title = _title(name, these, bool(befalling))
+            title = _title(name, these, bool(scheduled))
             takes.append(Take(title, Play(scenario, policy, seed, these)))
     film = Film(
         takes,
@@ -93,7 +93,7 @@ def film_command(
 
 
 def _title(policy: str, faults: list[Fault], tells_faults: bool) -> str:
-    # Of a policy of one's own the end of its path says enough.
+    # A long path of a user's own policy is cut at its beginning.
     short = policy if len(policy) <= 24 else f"…{policy[-23:]}"
     what = ", ".join(f"{fault.mode} × {_count(fault)}" for fault in faults) or "no fault"
     return f"{short}, {what}" if tells_faults else short

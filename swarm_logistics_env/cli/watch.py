@@ -27,17 +27,15 @@ def watch_command(
     changes: SetOption = None,
     faults: FaultOption = None,
     speed: Annotated[float, typer.Option(help="Times real time.")] = 1.0,
-    web: Annotated[
-        bool, typer.Option("--web", help="In the browser, for machines without a display.")
-    ] = False,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Of --web, on this machine only; 0: any free.")
+        int, typer.Option(min=0, max=65535, help="On this machine only; 0: any free one.")
     ] = 8765,
     trust_code: TrustPolicyOption = False,
 ) -> None:
-    """Watch a run beside its fault-free twin; click robots to inspect, break and repair them."""
+    """Watch a run in the browser beside its fault-free twin; inspect, break and repair robots."""
     from swarm_logistics_env import policies
     from swarm_logistics_env.watch import Session
+    from swarm_logistics_env.watch.web import serve
 
     session = Session(
         scenario_of(preset, changes),
@@ -46,14 +44,4 @@ def watch_command(
         [fault_of(text) for text in faults or []],
         speed,
     )
-    if web:
-        from swarm_logistics_env.watch.web import serve
-
-        serve(session, policy, port, announce=typer.echo)
-        return
-    from swarm_logistics_env.rendering.renderer import load_pygame
-
-    load_pygame(instead=", or use --web")
-    from swarm_logistics_env.watch.window import WatchWindow
-
-    WatchWindow(session, policy).run()
+    serve(session, policy, port, announce=typer.echo)

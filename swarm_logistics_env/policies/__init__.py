@@ -4,8 +4,9 @@
 """
 
 from swarm_logistics_env.policies.card import PolicyCard
+from swarm_logistics_env.policies.code_identity import identity
 from swarm_logistics_env.policies.files import read_card
-from swarm_logistics_env.policies.loading import NAMES, identity, load
+from swarm_logistics_env.policies.loading import NAMES, load
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT, SwarmDTParameters
 

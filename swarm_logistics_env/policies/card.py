@@ -1,7 +1,8 @@
-"""What a trained policy's file says of itself: how it decides, how it was made, how good it is."""
+"""The card in a trained policy's file: how it decides, how it was made, how good it is."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -14,7 +15,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.policies.motion_frame import INPUTS, OUTPUTS
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
 from swarm_logistics_env.records import Record
 
 Width = Annotated[int, Field(ge=1, le=4096)]
@@ -25,11 +26,11 @@ class _Part(Record):
 
 
 class Network(_Part):
-    """What a trained policy reads, computes and commands.
+    """The inputs, layers and outputs of a trained policy.
 
     Args:
-        inputs: what it reads, in this order: `motion_frame.INPUTS`.
-        outputs: what it says, in this order: `motion_frame.OUTPUTS`.
+        inputs: what it reads, in this order: `motion.INPUTS`.
+        outputs: what it says, in this order: `motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
         activation: between layers.
@@ -60,7 +61,7 @@ class Network(_Part):
 
 
 class Score(_Part):
-    """One measured value with its 95 % interval.
+    """One measured value with its 95 % interval; a limit that is infinite becomes None.
 
     Args:
         measure: "P", or an indicator: "R", "FT", "S", "A".
@@ -75,9 +76,14 @@ class Score(_Part):
     high: float | None
     seeds: PositiveInt
 
+    @field_validator("low", "high", mode="before")
+    @classmethod
+    def _finite(cls, limit: Any) -> Any:
+        return None if isinstance(limit, float) and math.isinf(limit) else limit
+
 
 class PolicyCard(_Part):
-    """All that a policy file says beside its weights.
+    """Everything in a policy file beside the weights.
 
     Args:
         format: of the file.

@@ -1,4 +1,4 @@
-"""A central controller that sees the whole warehouse: what a swarm is compared with.
+"""A central controller that sees the whole warehouse, for comparison with swarms.
 
 One robot at a time works on the request: the best one fetches the item and takes it home, on the
 cheapest way around free items and other robots. All others wait right under free items, spread
@@ -44,7 +44,7 @@ class Central:
         self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
-        """Take the building's plan and the robots' build."""
+        """Take the sizes of the warehouse and of the robots."""
         self._scenario = scenario
 
     def reset(self, n_robots: int, seed: int) -> None:
@@ -62,7 +62,7 @@ class Central:
         """Return commands (N, 4) from the state alone.
 
         Raises:
-            PolicyError: there is no state, or one of more or fewer robots than `reset` was told.
+            PolicyError: there is no state, or it has another number of robots than `reset` got.
         """
         if state is None:
             raise PolicyError("state = None: should be the WarehouseState, as needs_state says")
@@ -111,7 +111,7 @@ class Central:
         return int(np.where(able, away, np.inf).argmin())
 
     def _judge(self, state: WarehouseState) -> None:
-        """Lose trust in a worker that gets no nearer to where it should."""
+        """Stop trusting a worker that gets no nearer to its goal."""
         left = self._left(state)
         if left < self._best - 0.05:
             self._best, self._best_at = left, state.time
@@ -201,7 +201,7 @@ class Central:
             push[:, worker] *= 3.0
         shove = np.einsum("ij,ijk->ik", push, between)
         is_there = is_under_item & (np.linalg.norm(position - goals, axis=1) < 0.1)
-        # Whoever waits under an item is in nobody's way that the item is not in.
+        # A robot that waits under an item blocks nobody whom the item does not block as well.
         shove[is_there] = 0.0
         # Pass on the right, so that two who meet get past each other.
         velocity += shove + 0.5 * np.stack([shove[:, 1], -shove[:, 0]], axis=1)

@@ -69,8 +69,8 @@ def _contents(path: Path) -> tuple[PolicyCard, dict[str, NDArray[np.float32]]]:
         size = path.stat().st_size
     except OSError as error:
         raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
-    # A pickle, or a zip as torch and stable-baselines3 wrap them: not even looked into. Behind its
-    # length, which may begin like a pickle, a safetensors header begins with a brace.
+    # A pickle, or the zip in which torch and stable-baselines3 wrap one, is refused unread. The
+    # length at the start of a safetensors file may look like a pickle, but a brace follows it.
     is_pickle = start[:1] == b"\x80" and start[8:] != b"{"
     if is_pickle or start.startswith(b"PK\x03\x04"):
         raise PolicyError(

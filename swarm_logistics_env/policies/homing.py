@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.policies import robot_memory as known
-from swarm_logistics_env.policies.motion_frame import (
+from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion.frame import (
     RANDOM_HEADING_TIME,
     MotionFrame,
     random_heading,
@@ -33,7 +33,7 @@ from swarm_logistics_env.policies.motion_frame import (
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-# All fitted: found by trying, for deliveries. Gains in top speeds, ranges in m.
+# All values are fitted: they were tried for the most deliveries. Gains in top speeds, ranges in m.
 SPREAD_GAIN, SPREAD_RANGE = 0.8, 2.0  # away from neighbours, while searching
 AVOID_GAIN, AVOID_RANGE = 2.0, 0.5  # away from near neighbours, always
 WALL_GAIN, WALL_RANGE, MIRROR_RANGE = 1.5, 0.6, 0.2
@@ -71,7 +71,7 @@ class Homing:
         """Return commands (N, 4) for observation rows (N, D).
 
         Raises:
-            PolicyError: there are more or fewer rows than `reset` was told.
+            PolicyError: there are more or fewer rows than robots at `reset`.
         """
         if len(observations) != len(self._frame.keys):
             raise PolicyError(
@@ -105,7 +105,7 @@ def decide_homing(
     period: float,
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) from rows (N, D) and memories (N, robot_memory.N_COLUMNS).
+    """Fill the commands (N, 4) from rows (N, D) and memories (N, memory.N_COLUMNS).
 
     `random_headings` (N,) are the numbers of the random directions whose turn it is.
     """
@@ -150,7 +150,7 @@ def away_from_neighbours(sensed: NDArray[np.float32], reach: float) -> tuple[flo
     """Return the sum of the directions away from neighbours, 1 .. 0 at distance 0 .. `reach`."""
     push_x, push_y = 0.0, 0.0
     for place in range(row.N_NEIGHBOURS):
-        there = row.NEIGHBOURS + 5 * place
+        there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * place
         x, y = sensed[there + 1], sensed[there + 2]
         away = math.sqrt(x * x + y * y)
         if 0.0 < away < reach:
@@ -165,7 +165,7 @@ def requested_item(sensed: NDArray[np.float32], own: NDArray[np.float64], is_ins
     if sensed[row.CARRYING] > 0.5 or own[known.FAILED] > 0.5:
         return -1
     for place in range(row.N_ITEMS_IN_VIEW):
-        there = row.ITEMS + 5 * place
+        there = row.ITEMS + row.ITEM_WIDTH * place
         left_here = is_inside and sensed[there + 4] > 0.5
         if sensed[there] > 0.5 and sensed[there + 3] > 0.5 and not left_here:
             return there
@@ -233,7 +233,7 @@ def freest_direction(
         worth = go_x * x + go_y * y
         worth += 0.3 * (go_x * own[known.HEADING_X] + go_y * own[known.HEADING_Y])
         for place in range(row.N_ITEMS_IN_VIEW):
-            there = row.ITEMS + 5 * place
+            there = row.ITEMS + row.ITEM_WIDTH * place
             if sensed[there] < 0.5:
                 break
             along = sensed[there + 1] * go_x + sensed[there + 2] * go_y

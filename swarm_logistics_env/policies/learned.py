@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.kernels import gaussian, kernel, pair_key
+from swarm_logistics_env.motion.frame import MotionFrame
 from swarm_logistics_env.policies.card import Network, PolicyCard
-from swarm_logistics_env.policies.exploration import explore
-from swarm_logistics_env.policies.motion_frame import MotionFrame
 from swarm_logistics_env.policies.network import FeedForward
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -76,6 +76,20 @@ class LearnedPolicy:
             explore(self._keys, self._step, self._deviations, outputs)
         self._step += 1
         return self._frame.command(outputs)
+
+
+@kernel
+def explore(
+    keys: NDArray[np.uint64],
+    count: int,
+    deviations: NDArray[np.float32],
+    outputs: NDArray[np.float32],
+) -> None:
+    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k) of decision `count`."""
+    for robot in range(outputs.shape[0]):
+        for place in range(outputs.shape[1]):
+            drawn = gaussian(pair_key(keys[robot], place), count)
+            outputs[robot, place] += np.float32(deviations[place] * drawn)
 
 
 def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:

@@ -1,12 +1,9 @@
-"""Policies by name, and what names a policy's behaviour."""
+"""Policies by name."""
 
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib
-import inspect
-import json
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -14,15 +11,14 @@ from typing import Any
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
-from swarm_logistics_env.policies.executable import SUFFIX as EXECUTABLE
-from swarm_logistics_env.policies.executable import StableBaselinesPolicy
 from swarm_logistics_env.policies.files import SUFFIX, read_policy
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
+from swarm_logistics_env.policies.sb3_policy import StableBaselinesPolicy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.policies.tuned import SUFFIX as TUNED
 from swarm_logistics_env.policies.tuned import read_tuned
-from swarm_logistics_env.records import Record
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
 WEIGHTS = Path(__file__).parent / "weights"
@@ -45,7 +41,7 @@ def load_tuned(path: Path, **parameters: Any) -> Policy:
 SCRIPTED: dict[str, Callable[..., Policy]] = {
     "swarm-dt": SwarmDT,
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
-    # Swarm D-T without its taxis: the ablation.
+    # This is Swarm D-T without its taxis, for ablations.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
     "homing": Homing,
     "central": Central,
@@ -53,7 +49,7 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
 
 NAMES: dict[str, Callable[..., Policy]] = {
     **SCRIPTED,
-    # Trained or tuned, each by the command that its file names.
+    # These are trained or tuned; each file names the command that made it.
     **{
         path.stem: functools.partial(read_policy, path)
         for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))
@@ -99,30 +95,6 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     return policy
 
 
-def identity(policy: Policy) -> str:
-    """Return text that changes whenever the policy's behaviour may have changed.
-
-    Its own `identity` where it has one; else its class, its `parameters`, and a digest of the
-    source of its module (of this package's policies together, which build on one another).
-    """
-    own = getattr(policy, "identity", None)
-    if own is not None:
-        return str(own)
-    kind = type(policy)
-    parameters = getattr(policy, "parameters", {})
-    if isinstance(parameters, Record):
-        parameters = parameters.model_dump(mode="json")
-    return json.dumps(
-        {
-            "class": f"{kind.__module__}:{kind.__qualname__}",
-            "parameters": parameters,
-            "source": _source_digest(kind),
-        },
-        sort_keys=True,
-        default=repr,
-    )
-
-
 def _declared(name: str) -> Callable[..., Policy] | None:
     for point in entry_points(group=ENTRY_POINTS, name=name):
         made: Callable[..., Policy] = point.load()
@@ -134,13 +106,13 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
     path = Path(name)
     if path.suffix == SUFFIX:
         return functools.partial(read_policy, path)
-    if path.suffix == EXECUTABLE:
+    if path.suffix == SB3_SUFFIX:
         return functools.partial(StableBaselinesPolicy, path, trust_code=trust_code)
     if path.suffix == TUNED:
         return functools.partial(load_tuned, path)
     if path.is_file():
         raise PolicyError(
-            f"{name} is no policy file: should end in {SUFFIX}, {TUNED} or {EXECUTABLE}"
+            f"{name} is no policy file: should end in {SUFFIX}, {TUNED} or {SB3_SUFFIX}"
         )
     return None
 
@@ -167,17 +139,3 @@ def _imported(name: str) -> Callable[..., Policy] | None:
         raise PolicyError(f"policy {name!r} is a {type(found).__name__}: should be a class")
     made: Callable[..., Policy] = found
     return made
-
-
-@functools.cache
-def _source_digest(kind: type) -> str:
-    here = Path(__file__).parent
-    try:
-        file = Path(inspect.getfile(kind))
-    except (TypeError, OSError):
-        return ""
-    files = sorted(here.glob("*.py")) if file.is_relative_to(here) else [file]
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]

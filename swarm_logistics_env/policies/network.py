@@ -1,4 +1,4 @@
-"""A feed-forward network in compiled loops: no torch, and each row for itself."""
+"""A feed-forward network in compiled loops, without torch; each row is computed on its own."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class FeedForward:
         *,
         rectify: bool,
     ) -> None:
-        # Transposed: the inner loop runs over a layer's outputs, which lie side by side.
+        # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
         self._weights = np.concatenate([np.ascontiguousarray(w.T).ravel() for w in weights])
         self._biases = np.concatenate(list(biases))
         self._widths = np.array([weights[0].shape[1], *(len(bias) for bias in biases)])
@@ -86,7 +86,7 @@ def run_network(
             total[:] = biases[bias : bias + n_out]
             for place in range(n_in):
                 value = here[place]
-                # Most things are not in view: their columns are zero.
+                # Most inputs are zero, because most things are not in view.
                 if value != np.float32(0.0):
                     column = weights[weight : weight + n_out]
                     for out in range(n_out):

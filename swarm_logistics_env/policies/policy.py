@@ -1,14 +1,13 @@
-"""What a policy is: the one interface between whatever decides and the warehouse."""
+"""The interface between a policy and the warehouse."""
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.hearing import as_heard
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -21,7 +20,7 @@ class Policy(Protocol):
 
     * `needs_state = True`: `act` gets the WarehouseState as a second argument (a central
       controller that sees everything); robots that do not hear get no commands then, see
-      `as_heard`;
+      `mask_unreachable_commands`;
     * `configure(scenario)`: called before `reset`, for what a robot's maker writes into it, such
       as its control period;
     * `identity`: text that names everything its behaviour depends on (see `identity`).
@@ -35,7 +34,7 @@ class Policy(Protocol):
 
 
 def start(policy: Policy, scenario: Scenario, seed: int) -> None:
-    """Tell `policy` of an episode that begins.
+    """Let `policy` begin an episode.
 
     Raises:
         PolicyError: it is none.
@@ -61,5 +60,25 @@ def decide(
     """
     if getattr(policy, "needs_state", False):
         # The protocol knows the one argument that all policies take.
-        return as_heard(policy.act(observations, state), state)  # type: ignore[call-arg]
+        return mask_unreachable_commands(policy.act(observations, state), state)  # type: ignore[call-arg]
     return policy.act(observations)
+
+
+def mask_unreachable_commands(commands: NDArray[Any], state: WarehouseState) -> NDArray[Any]:
+    """Return a central controller's commands (N, 4) with zeros for the robots that do not hear.
+
+    A command of zeros lets a robot stand still, leaves its gripper as it is and broadcasts
+    nothing new. So the failure modes FM3 and FM3_hear act on central control as they would in
+    reality. The controller sees from above and reaches every robot that hears, wherever it is:
+    it makes no difference whether a robot sends, nor do radio range, loss and sensor noise.
+    """
+    deaf = state.robot_present & ~state.hears
+    if not deaf.any():
+        return commands
+    try:
+        masked = np.array(commands, dtype=np.float64)
+    except (TypeError, ValueError):
+        return commands  # the warehouse says what is wrong with them
+    if masked.shape[:1] == deaf.shape:
+        masked[deaf] = 0.0
+    return masked

@@ -12,7 +12,7 @@ timer, moves towards the one that tells the lowest.
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,26 @@ class SwarmDTParameters(Record):
     )
 
 
+class StepConstants(NamedTuple):
+    """The parameters for one control period, as compiled code reads them.
+
+    Attributes:
+        widest_turn: of the stored heading by diffusion [rad].
+        drop_probability: of an item that is not requested.
+        avoidance_gain, avoidance_range, wall_distance, taxis_gain, heading_follows: as given.
+        widest_step: how far a differential robot turns its body [rad]; 0 for a holonomic one.
+    """
+
+    widest_turn: float
+    drop_probability: float
+    avoidance_gain: float
+    avoidance_range: float
+    wall_distance: float
+    taxis_gain: float
+    heading_follows: bool
+    widest_step: float
+
+
 class SwarmDT:
     """Swarm Diffusion-Taxis with the given parameters (see `SwarmDTParameters`).
 
@@ -76,11 +96,19 @@ class SwarmDT:
         self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows, period and drive; nothing of the surroundings."""
-        self._control_period = scenario.control_period
-        self._widest_step = 0.0
-        if scenario.drive == "differential":
-            self._widest_step = scenario.max_turn_rate * scenario.control_period
+        """Take what the maker of a robot knows: its control period and its drive."""
+        parameters, period = self.parameters, scenario.control_period
+        is_differential = scenario.drive == "differential"
+        self._constants = StepConstants(
+            widest_turn=math.sqrt(3.0 * parameters.diffusion * period),
+            drop_probability=-math.expm1(-parameters.drop_rate * period),
+            avoidance_gain=parameters.avoidance_gain,
+            avoidance_range=parameters.avoidance_range,
+            wall_distance=parameters.wall_distance,
+            taxis_gain=parameters.taxis_gain,
+            heading_follows=parameters.heading_follows,
+            widest_step=scenario.max_turn_rate * period if is_differential else 0.0,
+        )
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode with random stored headings."""
@@ -96,19 +124,11 @@ class SwarmDT:
                 f"{self._heading.shape[0]}"
             )
         commands = np.empty((observations.shape[0], 4))
-        parameters, period = self.parameters, self._control_period
         decide_swarm_dt(
             observations,
             self._keys,
             self._step,
-            math.sqrt(3.0 * parameters.diffusion * period),
-            -math.expm1(-parameters.drop_rate * period),
-            parameters.avoidance_gain,
-            parameters.avoidance_range,
-            parameters.wall_distance,
-            parameters.taxis_gain,
-            parameters.heading_follows,
-            self._widest_step,
+            self._constants,
             self._heading,
             commands,
         )
@@ -121,21 +141,11 @@ def decide_swarm_dt(
     observations: NDArray[np.float32],
     keys: NDArray[np.uint64],
     step: int,
-    widest_turn: float,
-    drop_probability: float,
-    avoidance_gain: float,
-    avoidance_range: float,
-    wall_distance: float,
-    taxis_gain: float,
-    heading_follows: bool,
-    widest_step: float,
+    constants: StepConstants,
     heading: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading.
-
-    `widest_step` is how far a differential robot turns in a period [rad]; 0: holonomic.
-    """
+    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading."""
     for robot in range(observations.shape[0]):
         sensed = observations[robot]
         carries = sensed[row.CARRYING] > 0.5
@@ -144,12 +154,12 @@ def decide_swarm_dt(
         if math.isnan(heading[robot]):
             heading[robot] = (2.0 * uniform(keys[robot], 0) - 1.0) * math.pi
         drawn = uniform(keys[robot], 2 * step + 1)
-        heading[robot] += widest_turn * (2.0 * drawn - 1.0)
+        heading[robot] += constants.widest_turn * (2.0 * drawn - 1.0)
         x, y = math.cos(heading[robot]), math.sin(heading[robot])
 
         walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
         nearest = np.argmin(walls)
-        if walls[nearest] < wall_distance:
+        if walls[nearest] < constants.wall_distance:
             towards = 2.0 * math.pi * nearest / row.N_BEAMS
             wall_x, wall_y = math.cos(towards), math.sin(towards)
             approach = x * wall_x + y * wall_y
@@ -158,40 +168,41 @@ def decide_swarm_dt(
                 y -= 2.0 * approach * wall_y
                 heading[robot] = math.atan2(y, x)
 
-        push_x, push_y = avoid(
-            sensed, row.NEIGHBOURS, row.N_NEIGHBOURS, avoidance_gain, avoidance_range
-        )
+        gain, reach = constants.avoidance_gain, constants.avoidance_range
+        push_x, push_y = avoid(sensed, row.NEIGHBOURS, row.N_NEIGHBOURS, gain, reach)
         x += push_x
         y += push_y
         if carries:
-            push_x, push_y = avoid(
-                sensed, row.ITEMS, row.N_ITEMS_IN_VIEW, avoidance_gain, avoidance_range
-            )
+            push_x, push_y = avoid(sensed, row.ITEMS, row.N_ITEMS_IN_VIEW, gain, reach)
             x += push_x
             y += push_y
         if delivers and sensed[row.LOWEST_TIMER] > 0.5:
             lead_x, lead_y = sensed[row.LOWEST_TIMER + 1], sensed[row.LOWEST_TIMER + 2]
             distance = math.sqrt(lead_x * lead_x + lead_y * lead_y)
             if distance > 0.0:
-                x += taxis_gain * lead_x / distance
-                y += taxis_gain * lead_y / distance
-        if heading_follows:
+                x += constants.taxis_gain * lead_x / distance
+                y += constants.taxis_gain * lead_y / distance
+        if constants.heading_follows:
             heading[robot] = math.atan2(y, x)
 
         norm = max(math.sqrt(x * x + y * y), 1.0)
         commands[robot, 0] = x / norm
         commands[robot, 1] = y / norm
         commands[robot, 2] = 0.0
-        if widest_step > 0.0:
+        if constants.widest_step > 0.0:
             # It turns towards where it wants to go and drives as far as it then faces that way;
             # the stored heading is kept in the robot's frame, so it turns back by as much.
             wanted, speed = math.atan2(y, x), math.sqrt(x * x + y * y) / norm
-            turned = min(max(wanted, -widest_step), widest_step)
+            turned = min(max(wanted, -constants.widest_step), constants.widest_step)
             commands[robot, 0] = speed * max(math.cos(wanted - turned), 0.0)
             commands[robot, 1] = 0.0
-            commands[robot, 2] = turned / widest_step
+            commands[robot, 2] = turned / constants.widest_step
             heading[robot] -= turned
-        lets_go = carries and not delivers and uniform(keys[robot], 2 * step + 2) < drop_probability
+        lets_go = (
+            carries
+            and not delivers
+            and uniform(keys[robot], 2 * step + 2) < constants.drop_probability
+        )
         commands[robot, 3] = -1.0 if lets_go else 1.0
 
 
@@ -202,7 +213,7 @@ def avoid(
     """Return the push away from the things in a block of (present, x, y, ..) columns."""
     push_x, push_y = 0.0, 0.0
     for place in range(count):
-        column = first + 5 * place
+        column = first + row.ITEM_WIDTH * place  # neighbours are as wide
         if sensed[column] < 0.5:
             break
         x, y = sensed[column + 1], sensed[column + 2]

@@ -1,4 +1,4 @@
-"""Where robots wait that a central controller has no work for."""
+"""The places at which robots wait while a central controller has no work for them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 
 class WaitingPlaces:
-    """An item to wait under for each robot, spread out; the wall for those that find none.
+    """Gives each robot an item to wait under, spread out, or a place at the wall.
 
     Unladen robots drive under items, which laden ones have to go around anyway.
     """

@@ -1,4 +1,4 @@
-"""What does not move: floor, metre lines, delivery area and walls."""
+"""The part of a picture that does not move: floor, metre lines, delivery area and walls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the sensor beams of one robot end: the world's own scan, for one robot."""
+"""The ends of one robot's sensor beams, by the scan that the world itself makes."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from swarm_logistics_env.rendering.palette import RGB
 
 Point = tuple[float, float]  # [px]
 
-# Bytes in the order red, green, blue, as in sprites: ten times faster than SDL's own order.
+# The bytes are in the order red, green, blue, as in sprites: drawing is ten times faster so.
 _MASKS = (0xFF, 0xFF00, 0xFF0000, 0)
 
 
@@ -32,7 +32,7 @@ def stamp(canvas: pygame.Surface, stamps: Iterable[tuple[pygame.Surface, Point]]
 
 
 def draw_line(canvas: pygame.Surface, colour: RGB, start: Point, end: Point, width: float) -> None:
-    """Draw a line of that width [px] as a sheaf of thin ones: pygame smooths only those."""
+    """Draw a line of that width [px] as several thin ones, because pygame smooths only those."""
     length = math.hypot(end[0] - start[0], end[1] - start[1])
     if length == 0.0:
         return

@@ -19,7 +19,7 @@ from swarm_logistics_env.rendering.sprites import badge, blank, halo, item, robo
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
-# As wide as these get: a picture's size must not change with what happens.
+# The widest texts there may be, so that a picture's size does not change with what happens.
 _WIDEST = ("time 0000.0 s", "N = 000", "P = 000 of 000", "requested: item 000")
 _MOST_LEGEND_LINES = 2
 

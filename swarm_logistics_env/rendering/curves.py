@@ -1,4 +1,4 @@
-"""What is drawn of a run over time. No pygame: the view in the browser has it too."""
+"""Deliveries and failures of a run over time; without pygame, for the browser view."""
 
 from __future__ import annotations
 
@@ -35,5 +35,5 @@ class Event:
 
     @property
     def label(self) -> str:
-        """What the mark says."""
+        """The text of the mark."""
         return "ok" if self.mode is None else MARKS.get(self.mode, self.mode)

@@ -1,4 +1,4 @@
-"""Which robot follows which: the neighbour that tells the lowest timer."""
+"""The neighbour that a robot follows: the one that tells the lowest timer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     """Return the neighbour whose timer is the lowest that `robot` hears, or NOBODY.
 
-    The nearest of several that tell the same.
+    If several tell the same, it is the nearest of them.
     """
     if not (state.robot_present[robot] and state.hears[robot]):
         return NOBODY

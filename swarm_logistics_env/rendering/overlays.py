@@ -1,4 +1,4 @@
-"""What is drawn between the things: trails, radio links, sensor beams."""
+"""Lines that are drawn over the floor: trails, radio links, sensor beams."""
 
 from __future__ import annotations
 

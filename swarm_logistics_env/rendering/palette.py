@@ -36,7 +36,7 @@ RUNS: tuple[tuple[RGB, float], ...] = (
     (LINK, 2.0),
 )
 
-# What a robot that fails in a mode wears. A removed robot is not there to wear anything.
+# The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.
 MARKS = {
     "FM1": "1",
     "FM2": "2",
@@ -44,14 +44,19 @@ MARKS = {
     "FM3_send": "3s",
     "FM3_hear": "3h",
     "FM4": "4",
+    "FM4_jam": "4j",
     "motor_slow": "S",
+    "motor_wear": "W",
     "motor_dead": "M",
     "view_reduced": "V",
     "rangers_blind": "R",
+    "rangers_frozen": "F",
+    "rangers_biased": "B",
+    "radio_delayed": "D",
     "dead": "X",
 }
 
-# Where edges of one colour on another are smooth, and in how many steps.
+# Pairs of colours with smooth edges between them, and the number of steps in between.
 _EDGES = (
     (FLOOR, TIMER, 8), (DELIVERY_AREA, TIMER, 6), (DELIVERY_AREA, DELIVERY_HATCH, 3),
     (FLOOR, INK, 6), (INK, SEARCHING, 3),
@@ -76,7 +81,7 @@ def film_colours() -> list[RGB]:
 
 
 def mark(modes: tuple[str, ...]) -> str:
-    """Return what a robot wears that fails in these modes, `1+V`; an unknown mode, its name."""
+    """Return the mark of a robot that fails in these modes, as `1+V`; other modes by name."""
     return "+".join(MARKS.get(mode, mode) for mode in modes)
 
 

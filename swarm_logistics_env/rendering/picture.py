@@ -12,13 +12,12 @@ from swarm_logistics_env.rendering.caption import Caption
 from swarm_logistics_env.rendering.overlays import draw_beams, draw_links, draw_trails
 from swarm_logistics_env.rendering.palette import (
     DELIVERING,
-    INK,
     RGB,
     SEARCHING,
     SHUFFLING,
     mark,
 )
-from swarm_logistics_env.rendering.projection import LEAST_SIZE, Projection
+from swarm_logistics_env.rendering.projection import Projection
 from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
@@ -28,8 +27,6 @@ class Picture:
     """Draws states of a warehouse; see `Renderer` for the arguments.
 
     Attributes:
-        show_beams_of, all_links: as the arguments; may change between two pictures.
-        selected: a robot that is ringed, or None.
         trails: where robots were, to which each state that is noted or drawn is added, or None.
         projection: where the warehouse lies on the picture.
     """
@@ -42,21 +39,9 @@ class Picture:
         trails: bool,
         all_links: bool,
     ) -> None:
-        self._size, self.show_beams_of, self.all_links = size, show_beams_of, all_links
-        self.selected: int | None = None
+        self._size, self._show_beams_of, self._all_links = size, show_beams_of, all_links
         self.trails = Trails() if trails else None
         self._lay_out(scenario)
-
-    @classmethod
-    def fitting(cls, scenario: Scenario, width: int, height: int) -> Picture:
-        """Return the largest picture, caption included, for that room [px]; 100 px at least."""
-        size = max(width, height)
-        while True:
-            picture = cls(scenario, size, None, False, False)
-            over = max(picture.width - width, picture.height - height)
-            if over <= 0 or size == LEAST_SIZE:
-                return picture
-            size = max(LEAST_SIZE, size - max(2, over // 2))
 
     @property
     def width(self) -> int:
@@ -89,13 +74,12 @@ class Picture:
         self._draw_obstacles(state)
         self._draw_halos(state, scenario, robots)
         self._draw_stored_items(state, items)
-        draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self.all_links)
-        watched = self.show_beams_of
+        draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self._all_links)
+        watched = self._show_beams_of
         if watched is not None and watched < state.n_robots and state.robot_present[watched]:
             draw_beams(canvas, state, scenario, robots[watched], watched, projection)
         canvas.set_clip(None)
         self._draw_robots(state, robots)
-        self._draw_selection(state, robots)
         self._draw_requested(state, items)
         self._draw_badges(state, robots)
         self._caption.draw(canvas, state, scenario)
@@ -161,12 +145,6 @@ class Picture:
             if carried[robot] not in (NOBODY, state.requested):
                 stamps.append((load, robots[robot]))
         stamp(self._canvas, stamps)
-
-    def _draw_selection(self, state: WarehouseState, robots: list[Point]) -> None:
-        robot = self.selected
-        if robot is not None and robot < state.n_robots and state.robot_present[robot]:
-            ring = sprites.circle(1.6 * self._robot_radius + 2.0, 2.0, INK)
-            stamp(self._canvas, [(ring, robots[robot])])
 
     def _draw_requested(self, state: WarehouseState, items: list[Point]) -> None:
         if state.requested == NOBODY:

@@ -1,4 +1,4 @@
-"""Where the warehouse lies on the picture: metres to pixels."""
+"""The projection of the warehouse onto the picture, from metres to pixels."""
 
 from __future__ import annotations
 
@@ -58,7 +58,3 @@ class Projection:
         """Return positions (K, 2) [m] as K pixels, not rounded."""
         pixels = positions * (self.scale, -self.scale) + (self.left, self.bottom)
         return [(x, y) for x, y in pixels.tolist()]
-
-    def position(self, point: tuple[float, float]) -> tuple[float, float]:
-        """Return the position [m] that is drawn at a pixel, in the warehouse or beyond it."""
-        return (point[0] - self.left) / self.scale, (self.bottom - point[1]) / self.scale

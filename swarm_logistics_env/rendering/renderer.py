@@ -122,11 +122,8 @@ class Renderer:
         return functools.partial(Renderer, **self._arguments), ()
 
 
-def load_pygame(instead: str = "") -> None:
+def load_pygame() -> None:
     """Import pygame, without the greeting that it prints.
-
-    Args:
-        instead: ends the error's sentence with what else one could do.
 
     Raises:
         SetupError: it is not installed.
@@ -134,11 +131,11 @@ def load_pygame(instead: str = "") -> None:
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
         with warnings.catch_warnings():
-            # pygame's own use of old parts of setuptools is nothing the caller can mend.
+            # pygame uses old parts of setuptools, which the caller cannot change.
             warnings.simplefilter("ignore")
             for module in ("pygame", "pygame.font", "pygame.pkgdata"):
                 importlib.import_module(module)
     except ImportError as error:
         raise SetupError(
-            f"rendering needs pygame ({error}): pip install 'swarm-logistics-env[render]'{instead}"
+            f"rendering needs pygame ({error}): pip install 'swarm-logistics-env[render]'"
         ) from error

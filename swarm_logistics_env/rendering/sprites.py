@@ -1,4 +1,4 @@
-"""What stands in the warehouse and on its caption, as small pictures, each painted once."""
+"""Small pictures of what is drawn in the warehouse and its caption; each is painted once."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def heading_step(angle: float) -> int:
 
 
 def _fast(surface: pygame.Surface) -> pygame.Surface:
-    # Bytes in the order of the picture's own, which are blitted ten times as fast.
+    # The bytes are in the order of the picture's own, which is drawn ten times as fast.
     pixels = pygame.image.tobytes(surface, "RGBA")
     return pygame.image.frombytes(pixels, surface.get_size(), "RGBA")
 
@@ -162,9 +162,9 @@ def _fast(surface: pygame.Surface) -> pygame.Surface:
 @lru_cache(maxsize=512)
 def words(text: str, height: int, colour: RGB) -> pygame.Surface:
     """Return a line of text of that height [px], in the font that pygame brings along."""
-    # A font is not kept: it would die with a pygame.quit() of somebody else's.
+    # A font is not kept, because a pygame.quit() elsewhere would make it unusable.
     pygame.font.init()
-    # Drawn larger and shrunk: small letters are hinted until an i has no dot and words fall apart.
+    # Text is drawn larger and shrunk, because pygame draws small letters without the dot of an i.
     large = pygame.font.Font(None, _LETTERS * height).render(text, True, colour)
     width, tall = large.get_size()
     size = max(1, round(width / _LETTERS)), max(1, round(tall / _LETTERS))

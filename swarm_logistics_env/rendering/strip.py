@@ -69,11 +69,11 @@ def draw_strip(
         x = round(place(time, 0)[0])
         pygame.draw.line(canvas, INK, (x, plot.top), (x, plot.bottom))
         sign = badge(label, round(0.75 * text_height))
-        # Marks that would lie on one another hang in a ladder.
+        # Marks that would lie on one another are drawn one below the other.
         row = (row + 1) % 4 if x - last < sign.get_width() else 0
         last, y = x, plot.top + 2 + row * sign.get_height()
         canvas.blit(sign, sign.get_rect(midtop=(x, y)).clamp(plot))
-    # Thin over thick: where two runs are the same, both are seen.
+    # Thin curves are drawn over thick ones, so that both are seen where two runs are the same.
     for curve in sorted(curves, key=lambda curve: -RUNS[curve.style % len(RUNS)][1]):
         colour, thick = RUNS[curve.style % len(RUNS)]
         _draw_staircase(canvas, curve, place, colour, thick * max(1.0, text_height / 18))

@@ -1,4 +1,4 @@
-"""Where robots have been lately."""
+"""The paths of the robots over the last seconds."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from swarm_logistics_env.rendering.palette import film_colours
 Frame = NDArray[np.uint8]  # (H, W, 3), both even
 SUFFIXES = (".mp4", ".gif")
 
-# Same frames, same bytes: no dates, no encoder's name.
+# Neither date nor the encoder's name is written, so that the same frames give the same bytes.
 _EXACT = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"]
 _MP4 = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart", *_EXACT]
 # Between two frames only the rectangle that changed is stored.
@@ -67,7 +67,7 @@ def _palette() -> bytes:
     colours = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
     known = film_colours()
     colours[: len(known), :3], colours[: len(known), 3] = known, 255
-    # The rest is one transparent colour: what did not change.
+    # The last colour is transparent and stands for what did not change.
     return colours.tobytes()
 
 

@@ -1,4 +1,4 @@
-"""The window of the human mode."""
+"""The window that render_mode "human" opens."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ import os
 import pygame
 
 from swarm_logistics_env.errors import SetupError
-
-_TITLE = "swarm-logistics"
-_UNSEEN = "use render_mode = 'rgb_array', or set SDL_VIDEODRIVER=dummy to go without"
 
 
 class Window:
@@ -20,7 +17,15 @@ class Window:
     """
 
     def __init__(self) -> None:
-        open_display(_TITLE, instead=_UNSEEN)
+        try:
+            pygame.display.init()
+        except pygame.error as error:
+            raise _no_display(str(error)) from error
+        # SDL falls back to a driver that shows nothing.
+        if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
+            pygame.display.quit()
+            raise _no_display("SDL found none")
+        pygame.display.set_caption("swarm-logistics")
         self._clock = pygame.time.Clock()
 
     def show(self, picture: pygame.Surface, rate: float) -> bool:
@@ -38,22 +43,8 @@ class Window:
         pygame.display.quit()
 
 
-def open_display(title: str, instead: str) -> None:
-    """Ready SDL's display for a window of that title.
-
-    Raises:
-        SetupError: there is none; it says what to do `instead`.
-    """
-    try:
-        pygame.display.init()
-    except pygame.error as error:
-        raise _no_display(str(error), instead) from error
-    # What SDL falls back to by itself shows nothing to anybody.
-    if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
-        pygame.display.quit()
-        raise _no_display("SDL found none", instead)
-    pygame.display.set_caption(title)
-
-
-def _no_display(reason: str, instead: str) -> SetupError:
-    return SetupError(f"a window needs a display ({reason}): {instead}")
+def _no_display(reason: str) -> SetupError:
+    return SetupError(
+        f"a window needs a display ({reason}): use render_mode = 'rgb_array', or set "
+        "SDL_VIDEODRIVER=dummy to go without"
+    )

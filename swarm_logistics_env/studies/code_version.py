@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 from functools import cache
 from pathlib import Path
+
+from swarm_logistics_env.policies.code_identity import without_prose
 
 # No policy is here, only what calls them: each has an identity of its own.
 SOURCES = (
@@ -13,7 +14,6 @@ SOURCES = (
     "streams.py",
     "kernels.py",
     "observations.py",
-    "hearing.py",
     "episode.py",
     "policies/policy.py",
     "warehouse",
@@ -39,19 +39,3 @@ def code_version() -> str:
             digest.update(path.encode() + b"\0")
             digest.update(without_prose(file.read_text(encoding="utf-8")).encode() + b"\0")
     return digest.hexdigest()[:16]
-
-
-def without_prose(source: str) -> str:
-    """Return Python source without docstrings, lines that only comment, and blank lines."""
-    prose: set[int] = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-            first = node.body[0] if node.body else None
-            if isinstance(first, ast.Expr) and ast.get_docstring(node, clean=False) is not None:
-                prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
-    lines = enumerate(source.splitlines(), start=1)
-    return "\n".join(
-        line.rstrip()
-        for number, line in lines
-        if number not in prose and line.strip() and not line.lstrip().startswith("#")
-    )

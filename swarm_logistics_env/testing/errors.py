@@ -1,4 +1,4 @@
-"""What the checks raise: one kind of AssertionError each."""
+"""The errors of the checks: each raises its own kind of AssertionError."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class SpaceError(ConformanceError):
 
 
 class ConservationError(ConformanceError):
-    """An item was lost, doubled or conjured up."""
+    """An item was lost, doubled or created."""
 
 
 class OverlapError(ConformanceError):

@@ -14,7 +14,7 @@ from swarm_logistics_env.warehouse.state import NOBODY
 def check_faults(
     make: Make, policy: Policy | str = "swarm-dt", seed: int = 0, steps: int = 500
 ) -> None:
-    """Check that failures are honoured.
+    """Check that failed robots do not do what their failure modes exclude.
 
     Robots in FM2 (and dead) lift nothing anew, those in FM4 (and dead) deliver nothing, those
     removed are gone from the arena and from `agents` for good.

@@ -1,4 +1,4 @@
-"""No item is lost, doubled or conjured up."""
+"""The check that no item is lost, doubled or created."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def wrong_count(world: Warehouse, before: Count | None) -> str | None:
         return f"{now.delivered} items are delivered, but {before.delivered} were a step before"
     if len(state.delivered_by) != now.delivered:
         return f"{len(state.delivered_by)} robots are noted for {now.delivered} deliveries"
-    # Where `restock` changed in between, either may have held.
+    # If `restock` changed during the step, either value may have held.
     news = now.delivered - before.delivered
     expected = {before.gone + (0 if restock else news) for restock in (now.restock, before.restock)}
     if now.gone not in expected:

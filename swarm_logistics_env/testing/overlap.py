@@ -1,4 +1,4 @@
-"""Robots are solid."""
+"""The check that robots do not overlap."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def check_overlap(
     speed = 0.0
     for moment in played(make, policy, seed, steps):
         world = moment.world
-        # What held while the step was taken: its speed is that before or after a change.
+        # A step may begin before a change of the speed limit and end after it.
         allowed = max(speed, world.scenario.max_speed) * 2.0
         _check(world, allowed * world.scenario.physics_period, moment.step)
         speed = world.scenario.max_speed
@@ -42,7 +42,7 @@ def _check(world: Warehouse, allowed: float, step: int) -> None:
         return
     depth = 2.0 * world.scenario.robot_radius - gaps
     deepest = np.unravel_index(int(np.argmax(depth)), depth.shape)
-    # Written so that a position that is no number fails too.
+    # Negated, so that a position that is NaN fails too.
     if not depth[deepest] <= allowed:
         one, other = (int(here[place]) for place in deepest)
         raise OverlapError(

@@ -19,14 +19,14 @@ from swarm_logistics_env.train.network_view import NetworkView
 FILE_NAME = "checkpoint.pt"
 
 
-def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, notes: Any) -> None:
-    """Write a checkpoint, whole or not at all; the one before stands until then.
+def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) -> None:
+    """Write a checkpoint, whole or not at all; until then the one before stays.
 
     To be called between updates: after learning from a batch, before collecting the next; or
     before the first.
 
     Args:
-        notes: whatever else is to be found again; picklable.
+        log: what else the training remembers; picklable.
     """
     state = {
         "policy": learner.policy.state_dict(),
@@ -41,7 +41,7 @@ def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, notes: Any
         # stable-baselines3 shuffles minibatches by numpy's global generator.
         "numpy": np.random.get_state(),  # noqa: NPY002
         "python": random.getstate(),
-        "notes": notes,
+        "log": log,
     }
     part = directory / f"{FILE_NAME}.part"
     with part.open("wb") as file:

@@ -1,4 +1,4 @@
-"""How good the policy in training is, by the same episodes as any other policy."""
+"""Evaluation of the policy in training, by the same episodes as any other policy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.warehouse import Fault
 
-# Far from those that scores are measured on, which are 0, 1, ..; a training's are 63 bits long.
+# Scores are measured on seeds 0, 1, .. and trainings use seeds of 63 bits: these are neither.
 FIRST_SEED = 1_000_000
 
 
@@ -69,7 +69,7 @@ def performances(
 
     def played(job: tuple[Sequence[Fault], int]) -> int:
         faults, seed = job
-        # A policy of its own: one that remembers must not meet another episode's robots.
+        # Each episode gets a copy of the policy, because a policy may remember robots.
         return run_episode(scenario, deepcopy(policy), seed, faults).delivered
 
     with ThreadPoolExecutor(threads) as pool:

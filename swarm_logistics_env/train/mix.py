@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swarm_logistics_env.reset_options import faults_among, scenario_fields
+from swarm_logistics_env.environment.reset_options import faults_among, scenario_fields
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.wrappers import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class EpisodeMix(Wrapper):
@@ -37,7 +37,7 @@ class EpisodeMix(Wrapper):
         for kind in kinds:
             for name, values in kind.scenario.items():
                 for value in values:
-                    self.env.cover(own.replace(**{name: value}))
+                    self.env.declare_spaces(own.replace(**{name: value}))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's conditions among them."""

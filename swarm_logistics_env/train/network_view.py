@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from swarm_logistics_env.adapters import SwarmVecEnv
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.policies.learned import STREAM
-from swarm_logistics_env.policies.motion_frame import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key, row_keys
 
@@ -43,11 +43,12 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        # What the base class notes of the class itself cannot be pickled.
+        # The base class stores members of the class, which cannot be pickled.
         return {name: value for name, value in vars(self).items() if name != "class_attributes"}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
-        # First: the base class looks for what it lacks in `venv`, endlessly while that is lacking.
+        # This comes first, because the base class looks up missing attributes in `venv`: endlessly
+        # if that is missing too.
         self.__dict__.update(saved)
         self.class_attributes = dict(inspect.getmembers(type(self)))
 
@@ -79,6 +80,6 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         return self.frame.read(self.observations), rewards, dones, infos
 
     def _keys(self) -> NDArray[np.uint64]:
-        # Another stream for every episode of every row.
+        # Every episode of every row gets a stream of its own.
         self._begun += 1
         return row_keys(key(self._seed, "training episode", self._begun), STREAM, self.num_envs)

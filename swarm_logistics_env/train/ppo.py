@@ -9,7 +9,7 @@ from pathlib import Path
 
 def main() -> int:
     """Train what the command line asks for; returns the exit code."""
-    # Started by its path, Python looks for modules here instead of in the clone.
+    # Python looks for modules in the folder of a script; the package is in the clone above it.
     sys.path[0] = str(Path(__file__).resolve().parents[2])
     from swarm_logistics_env.errors import SwarmLogisticsError
     from swarm_logistics_env.train.preset_files import preset_names

@@ -1,4 +1,4 @@
-"""What a training's directory says of how it was made."""
+"""The record in a training's directory of how it was made."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.studies.code_version import code_version
 
 FILE_NAME = "training.json"
-# What a training or search may go on with: it changes nothing of what was done.
+# Fields that may change when a training goes on, because they change nothing of what was done.
 MAY_CHANGE = frozenset({"about", "threads", "scores", "trials", "confirm"})
 PACKAGES = (
     "swarm-logistics-env", "torch", "stable-baselines3", "numpy", "numba", "pymunk", "gymnasium",

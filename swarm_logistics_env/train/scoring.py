@@ -1,4 +1,4 @@
-"""The scores on a policy's card: a study like any other, on seeds that nothing was learned from."""
+"""The scores on a policy's card: a study on seeds that the training did not use."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def scores_of(findings: Findings) -> tuple[Score, ...]:
                 measure=comparison.indicator,
                 condition=_in_words(comparison.changed),
                 value=estimate.value,
-                low=_finite(estimate.low),
-                high=_finite(estimate.high),
+                low=estimate.low,
+                high=estimate.high,
                 seeds=estimate.n_seeds,
             )
         )
@@ -84,7 +84,3 @@ def scores_of(findings: Findings) -> tuple[Score, ...]:
 def _in_words(arm: Arm) -> str:
     level = str(arm.level)
     return level if arm.level.kind == "size" else f"N = {arm.condition.scenario.n_robots}, {level}"
-
-
-def _finite(limit: float | None) -> float | None:
-    return None if limit is None or abs(limit) == float("inf") else limit

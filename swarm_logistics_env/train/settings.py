@@ -1,4 +1,4 @@
-"""The tables of a training file: what it mixes, imitates, learns by and measures."""
+"""The tables of a training file: conditions, imitation, PPO and what is measured."""
 
 from __future__ import annotations
 
@@ -97,15 +97,15 @@ class Indicators(Part):
 
 
 class Imitation(Part):
-    """A start from imitating the scripted policy `homing`, its teacher, by DAgger.
+    """A start from imitating the scripted policy `homing`, the expert, by DAgger.
 
     Args:
         rounds: of play and fit.
         seconds: of play in a round [s].
         sizes: swarm sizes that play side by side.
-        teacher_share: of decisions that the teacher takes in the first rounds; later ones 0.
+        beta: the share of decisions that the expert takes, round by round; 0 in later rounds.
         noise: standard deviation of what is added to the outputs played, one for each.
-        common_share: of the moments kept in which nothing rare happens.
+        common_share: the share that is kept of the moments in which nothing rare happens.
         fit, last_fit: gradient steps after a round, and after the last.
         batch: samples in each.
         learning_rate: of Adam; a fifth of it in the last 30 % of the steps.
@@ -114,13 +114,21 @@ class Imitation(Part):
     rounds: PositiveInt = 6
     seconds: PositiveFloat = 60.0
     sizes: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (25, 10, 50, 5, 25, 15, 40)
-    teacher_share: tuple[Share, ...] = (1.0, 0.3)
+    beta: tuple[Share, ...] = (1.0, 0.3)
     noise: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat] = (0.15, 0.15, 0.05)
     common_share: Share = 0.12
     fit: PositiveInt = 1200
     last_fit: PositiveInt = 3000
     batch: PositiveInt = 1024
     learning_rate: PositiveFloat = 2e-3
+
+    @model_validator(mode="before")
+    @classmethod
+    def _older_name(cls, given: Any) -> Any:
+        # Training files that were written before the field had DAgger's own name.
+        if isinstance(given, dict) and "teacher_share" in given and "beta" not in given:
+            return {"beta" if name == "teacher_share" else name: given[name] for name in given}
+        return given
 
 
 class PPOSettings(Part):

@@ -1,4 +1,4 @@
-"""What a training is: one validated record, read from TOML."""
+"""The specification of a training: one validated record, read from TOML."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
+from swarm_logistics_env.environment.rewards import RewardTerms
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.rewards import RewardTerms
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
@@ -21,7 +21,7 @@ from swarm_logistics_env.train.settings import (
     Scores,
 )
 
-# What numpy's global generator takes, by which stable-baselines3 shuffles.
+# stable-baselines3 shuffles with numpy's global generator, which takes seeds of 32 bits.
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
 
 
@@ -31,7 +31,7 @@ def as_scenario(value: object) -> object:
 
 
 def _one(record: type[Record]) -> Callable[[object], object]:
-    # Through the record's own constructor, whose errors suggest the field that was meant.
+    # The record's own constructor raises errors that suggest the field that was meant.
     return lambda value: record(**value) if isinstance(value, dict) else value
 
 
@@ -43,7 +43,7 @@ def _each(record: type[Record]) -> Callable[[object], object]:
 
 
 class Training(Part):
-    """All that decides what a training gives.
+    """Everything that decides the result of a training.
 
     Args:
         name: of the policy.

@@ -28,11 +28,11 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
 )
 from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.progress import Notes, Progress
-from swarm_logistics_env.train.reporting import Report
+from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, simulation, versions
 from swarm_logistics_env.train.scoring import score
 from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training_callback import TrainingCallback, TrainingLog
 from swarm_logistics_env.train.worlds import make_worlds
 
 
@@ -57,39 +57,39 @@ def train(
         SetupError, ScenarioError, FaultError: worlds that cannot be.
     """
     out = Path(out)
-    # First what may be refused, so that nothing is begun that cannot be.
+    # Everything that may be refused comes first, before anything is written.
     device, begun = device_of(device), _new_view(training)
     enter(out, training, command)
-    # Such small networks gain little from more, lose much where cores are shared, and sums would
-    # depend on their number.
+    # Small networks gain little from more threads and lose much if cores are shared; the sums would
+    # depend on the number of threads as well.
     torch.set_num_threads(1)
     state = read_checkpoint(out)
-    view, notes = begun, Notes()
+    view, log = begun, TrainingLog()
     if state is not None:
         begun.close()
-        view, notes = view_of(state), state["notes"]
+        view, log = view_of(state), state["log"]
     learner = make_learner(training, view, device, goes_on=state is not None)
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
         restore(learner, state)
     elif training.imitation is not None:
         imitate(learner.policy, training, training.imitation)
-        # Its seeds, so that what follows does not depend on how long it took.
+        # Seeded anew, so that PPO does not depend on how long the imitation took.
         learner.set_random_seed(training.seed)
-        save_checkpoint(out, learner, view, notes)
+        save_checkpoint(out, learner, view, log)
     if learner.num_timesteps < training.agent_steps:
-        notes.versions = versions()
-        with Report(training.name, training.agent_steps, learner.num_timesteps) as report:
-            watch = Progress(training, view, notes, out, report)
+        log.versions = versions()
+        with ProgressBar(training.name, training.agent_steps, learner.num_timesteps) as bar:
+            callback = TrainingCallback(training, view, log, out, bar)
             learner.learn(
-                training.agent_steps - learner.num_timesteps, watch, reset_num_timesteps=False
+                training.agent_steps - learner.num_timesteps, callback, reset_num_timesteps=False
             )
-            watch.end()
+            callback.end()
     view.close()
     tensors = tensors_of(learner.policy)
-    if training.evaluation.keep == "best" and notes.best is not None:
-        tensors = notes.best[1]
-    return _write(training, out, command, learner.num_timesteps, tensors, notes.versions)
+    if training.evaluation.keep == "best" and log.best is not None:
+        tensors = log.best[1]
+    return _write(training, out, command, learner.num_timesteps, tensors, log.versions)
 
 
 def _new_view(training: Training) -> NetworkView:
@@ -116,7 +116,7 @@ def _write(
         seed=training.seed,
         agent_steps=agent_steps,
     )
-    # Before the scores, which take minutes.
+    # The file is written before the scores are measured, which takes minutes.
     write_policy(path, card, tensors)
     scores = score(LearnedPolicy(card, tensors), training, out / "scores")
     if scores:
@@ -126,5 +126,5 @@ def _write(
 
 def _changed(scenario: Scenario) -> dict[str, Any]:
     changed = scenario.model_dump(mode="json", exclude_defaults=True)
-    # Always: a card that does not name it is from before there was one.
+    # The field is always written, because a card without it is from before there was one.
     return {"heading_drift": scenario.heading_drift, **changed}

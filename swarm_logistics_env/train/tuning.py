@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, NonNegativeInt, PositiveInt, field_validator
 
-from swarm_logistics_env import policies
+from swarm_logistics_env import policies, spi
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.policies.tuned import TunedPolicy
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.train.confirmation import confirm
-from swarm_logistics_env.train.evaluation import Evaluated, evaluate
-from swarm_logistics_env.train.reporting import Report
+from swarm_logistics_env.train.evaluation import Evaluated, evaluate, performances
+from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, versions
 from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.train.specification import Seed, as_scenario
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 STORAGE = "trials.sqlite"
 RESULT = "result.json"
 
-# Where each parameter of Swarm D-T is looked for: (lowest, highest), around what it is by default.
+# The range (lowest, highest) in which each parameter of Swarm D-T is searched, around its default.
 RANGES: Mapping[str, tuple[float, float]] = {
     "diffusion": (0.05, 3.0),
     "avoidance_gain": (0.0, 5.0),
@@ -44,7 +44,7 @@ Objective = Literal["P", "R", "FT"]
 
 
 class Tuning(Record):
-    """What is searched for.
+    """The specification of a search.
 
     Args:
         policy: name of the scripted policy.
@@ -93,7 +93,7 @@ class Tuning(Record):
 
 @dataclass(frozen=True)
 class Trial:
-    """Parameters that were tried, and what came of them, objective by objective."""
+    """Parameters that were tried, and their value for each objective."""
 
     number: int
     parameters: dict[str, float]
@@ -126,12 +126,12 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
     if not study.get_trials():
         study.enqueue_trial(_own_parameters(asked.policy))
     done = len(_completed(study))
-    with Report(f"tuning {asked.policy}", asked.trials, done, unit="trials") as report:
+    with ProgressBar(f"tuning {asked.policy}", asked.trials, done, unit="trials") as bar:
         while done < asked.trials:
             values = _try(study, asked, done)
             done = len(_completed(study))
             shown = (f"{name} = {value:.3g}" for name, value in zip(asked.objectives, values))
-            report.reach(done, ", ".join(shown))
+            bar.reach(done, ", ".join(shown))
     trials = _trials(study)
     best = max(trials, key=lambda trial: trial.values[0])
     record = TunedPolicy(
@@ -162,10 +162,44 @@ def values_of(asked: Tuning, found: Evaluated) -> tuple[float, ...]:
     return tuple(float(values[objective]) for objective in asked.objectives)
 
 
+def confirm(
+    policy: str, parameters: dict[str, Any], scenario: Scenario, n_seeds: int, threads: int
+) -> tuple[Score, ...]:
+    """Return P with these parameters and with the policy's own, and the change, on seeds 0, 1, ..
+
+    The best of many trials looks better than it is, on the seeds of the search.
+    """
+    p_own, p_best = (
+        performances(made, scenario, [()], range(n_seeds), threads)[0]
+        for made in (policies.load(policy), policies.load(policy, **parameters))
+    )
+    condition = f"N = {scenario.n_robots}, no fault"
+    scores = [
+        Score(measure="P", condition=f"{condition}, {whose}", seeds=n_seeds, **interval._asdict())
+        for whose, interval in (
+            ("tuned", spi.mean_interval(p_best)),
+            ("own parameters", spi.mean_interval(p_own)),
+        )
+    ]
+    if p_own.any():
+        change = spi.relative_change(p_own, p_best)
+        scores.append(
+            Score(
+                measure="change",
+                condition=f"{condition}, tuned against own parameters",
+                value=change.value,
+                low=change.low,
+                high=change.high,
+                seeds=n_seeds,
+            )
+        )
+    return tuple(scores)
+
+
 def _try(study: optuna.Study, asked: Tuning, done: int) -> tuple[float, ...]:
     import optuna
 
-    # A sampler for each trial: a search that was cut short goes on as it would have.
+    # Each trial has its own sampler, so that a search that was stopped goes on as it would have.
     study.sampler = optuna.samplers.TPESampler(seed=(asked.seed * 100_003 + done) % 2**32)
     trial = study.ask()
     parameters: dict[str, Any] = {name: trial.suggest_float(name, *RANGES[name]) for name in RANGES}

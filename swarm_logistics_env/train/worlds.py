@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from swarm_logistics_env.adapters import SwarmVecEnv
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.train.mix import EpisodeMix
 from swarm_logistics_env.train.references import performances_of_study
 from swarm_logistics_env.train.specification import Training
@@ -45,7 +45,7 @@ def _references(training: Training) -> References:
     asked = training.indicators
     if asked is None or asked.references == "running":
         window, initial = (asked.window, asked.initial) if asked else (1, 1.0)
-        # One for all worlds: each reference episode serves them all.
+        # All worlds share one, so that each reference episode serves them all.
         return RunningMeans(window=window, initial=initial)
     if isinstance(asked.references, str):
         return performances_of_study(asked.references, training.scenario)

@@ -1,4 +1,4 @@
-"""A run that one watches and interferes with, in a window or in the browser; and films of runs."""
+"""Runs that one watches in the browser and interferes with, and films of runs."""
 
 from swarm_logistics_env.watch.session import Session
 

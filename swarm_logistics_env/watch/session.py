@@ -1,4 +1,4 @@
-"""What is watched: a run, its fault-free twin on the same seed, and what one can do to them."""
+"""A session: a run, its fault-free twin on the same seed, and the actions on them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Session:
         scenario: the conditions.
         make_policy: called once for each of the two.
         seed: of the first episode.
-        faults: what befalls the run, in every episode, besides what one does to it by hand.
+        faults: scheduled in the run in every episode, besides the faults that one adds by hand.
         speed: times real time, one of `SPEEDS`.
 
     Attributes:
@@ -217,7 +217,7 @@ class Session:
         self.note = f"swarm size {n_robots}: a swarm cannot grow in a run, so it began again"
         left_out = len(self._planned) - len(self.run.world.faults)
         if left_out:
-            self.note += f"; {left_out} faults befall more robots than there are: left out"
+            self.note += f"; {left_out} faults affect more robots than there are: left out"
 
     def set_delivery_width(self, width: float) -> None:
         """Make the delivery area that wide [m], in the run and in its twin, at once."""
@@ -231,7 +231,7 @@ class Session:
         self.note = f"delivery area {width:g} m wide"
 
     def _begin(self, scenario: Scenario, seed: int) -> None:
-        # Named robots, so that each can be repaired by itself.
+        # The faults name their robots, so that each robot can be repaired by itself.
         faults = []
         for fault in self._planned:
             try:

@@ -1,4 +1,4 @@
-"""What an episode is about, as far as indicators tell episodes apart."""
+"""The condition of an episode: what indicators tell episodes apart by."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from swarm_logistics_env.warehouse.faults import failed_robots
 
 @dataclass(frozen=True)
 class Condition:
-    """What distinguishes an episode from the reference's: size, faults, a changed parameter.
+    """The difference of an episode from its reference: size, faults, a changed parameter.
 
     When a fault begins is no part of it: where onsets are drawn, P_F is the mean over them.
 
     Args:
         n_robots: the swarm size N.
         modes: failure modes of its faults, sorted; "removed" is none of them.
-        n_failed: how many robots these befall (m of R and FT).
+        n_failed: how many robots these affect (m of R and FT).
         n_removed: how many robots are removed.
         changes: (field, value) of the scenario where it is not the environment's own, sorted.
 

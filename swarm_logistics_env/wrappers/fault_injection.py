@@ -8,26 +8,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swarm_logistics_env.environment.reset_options import faults_among
 from swarm_logistics_env.errors import FaultError
-from swarm_logistics_env.reset_options import faults_among
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
-from swarm_logistics_env.wrappers.drawing import Distribution
+from swarm_logistics_env.wrappers.sampling import Distribution
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
     from swarm_logistics_env.scenario import Scenario
 
 
 class FaultInjection(Wrapper):
     """Lets robots fail in every episode, besides those that fail anyway.
 
-    The robots are not told; `infos` say who has "failed", `warehouse.state.failure_modes` names
-    the modes while they hold. Faults
-    given to a reset as an option take the place of those the environment was made with, as ever;
-    this wrapper's come on top of either.
+    Robots do not sense that they failed; `infos` say who has "failed", and
+    `warehouse.state.failure_modes` names the modes while they hold. Faults among a reset's options
+    replace those that the environment was made with; this wrapper's are added to either.
 
     Args:
         env: the environment, or a wrapper of one.
@@ -86,7 +85,7 @@ class FaultInjection(Wrapper):
 
     @property
     def failed_robots(self) -> tuple[int, ...]:
-        """The robots that this wrapper's faults befall in this episode, ascending."""
+        """The robots that this wrapper's faults affect in this episode, ascending."""
         return tuple(sorted({robot for fault in self.injected for robot in _named(fault)}))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
@@ -96,17 +95,17 @@ class FaultInjection(Wrapper):
         return {**options, "faults": (*faults_among(options, self.unwrapped.faults), *faults)}
 
     def begun(self, seed: int) -> None:
-        """Note this episode's faults."""
+        """Store this episode's faults."""
         self.injected = self._drawn(seed, self.warehouse.state.n_robots)
 
-    def cover(self, scenario: Scenario) -> None:
-        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.cover`.
+    def declare_spaces(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
             FaultError: it has fewer robots than are to fail.
         """
         self._check(scenario)
-        self.env.cover(scenario)
+        self.env.declare_spaces(scenario)
 
     def _check(self, scenario: Scenario) -> None:
         failed_robots(self._fault, 0, scenario.n_robots)
@@ -126,7 +125,7 @@ class FaultInjection(Wrapper):
     ) -> tuple[Fault, ...]:
         faults, before = [], set[int]()
         for number, onset in enumerate(onsets, start=1):
-            # The first group has to be there; later ones are of those who are left.
+            # The first group has to exist; later groups are drawn from the robots that are left.
             so_many = self._fault.replace(robots=max(size, min(number * size, n_robots)))
             chosen = set(failed_robots(so_many, seed, n_robots).tolist())
             if more := tuple(sorted(chosen - before)):
@@ -141,7 +140,7 @@ class FaultInjection(Wrapper):
             if last is None or (last.duration and onset > last.onset + last.duration):
                 faults.append(self._fault.replace(onset=onset))
             elif last.duration and self._fault.duration:
-                # Still failed: twice motor_slow would be slower.
+                # The robot has still failed; two faults of motor_slow would make it slower still.
                 until = onset + self._fault.duration
                 faults[-1] = last.replace(duration=until - last.onset)
         return tuple(faults)

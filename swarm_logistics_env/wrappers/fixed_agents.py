@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.commands import as_array
-from swarm_logistics_env.dict_view import ArrayStep, Infos
+from swarm_logistics_env.environment.commands import as_array
+from swarm_logistics_env.environment.dict_view import ArrayStep, Infos
 from swarm_logistics_env.errors import CommandError
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class FixedAgents(Wrapper):
@@ -74,8 +74,9 @@ class FixedAgents(Wrapper):
         wanted = (self.n_rows, *self.action_space("robot_0").shape)
         if given.shape != wanted:
             raise CommandError(f"commands of shape {given.shape}: should be {wanted}")
-        told = super().step_arrays(given[: self.warehouse.state.n_robots])
-        observations, rewards, _, truncations = told
+        observations, rewards, _, truncations = super().step_arrays(
+            given[: self.warehouse.state.n_robots]
+        )
         is_over = not self.env.agents
         is_cut = is_over and bool(truncations.any())
         if is_over:

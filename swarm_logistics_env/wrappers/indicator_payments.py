@@ -1,4 +1,4 @@
-"""What an indicator pays for a delivery, and once, in an episode of some condition."""
+"""The payments of an indicator: one for each delivery, and one for the whole episode."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.wrappers.conditions import Condition
 from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
 
-# Of each indicator, the performances that it is relative to.
+# The performances that each indicator is relative to.
 PERFORMANCES = {"S": ("P_N",), "FT": ("P_o", "P_S"), "R": ("P_o",), "A": ("P_o",)}
 INDICATORS = tuple(PERFORMANCES)
 
 
 @dataclass(frozen=True)
 class Payment:
-    """What an episode's return is made of: `share` per item delivered, and `constant` once."""
+    """The parts of an episode's return: `share` for each item delivered, and `constant` once."""
 
     share: float = 0.0
     constant: float = 0.0

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.dict_view import ArrayStep
+from swarm_logistics_env.environment.dict_view import ArrayStep
+from swarm_logistics_env.environment.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.wrappers.conditions import Condition, changes_of, condition_of
 from swarm_logistics_env.wrappers.indicator_payments import (
@@ -25,7 +25,7 @@ from swarm_logistics_env.wrappers.reference_performances import GivenPerformance
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 CREDITS = ("team", "deliverer", "carriers")
 
@@ -137,7 +137,7 @@ class IndicatorReward(Wrapper):
             self._references, self.measured = GivenPerformances(given), RunningMeans()
             if given is not references:
                 self._references.divisor(self.condition)
-        # What can be known of the episodes to come is tried before any of them.
+        # Errors that can be known before the first episode are raised now.
         for scenario in self.env.scenarios:
             self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
         self.payments: dict[str, Payment] = {}
@@ -161,7 +161,7 @@ class IndicatorReward(Wrapper):
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """What the wrapped environment's infos say, and what this episode has come to.
+        """The wrapped environment's infos, and the values of the indicators so far.
 
         "n_robots", "n_failed", "n_removed": of its `condition`. For each indicator but P, here R:
         "R", its value so far, constant included; "R_tested", 1 if the episode tests it, else 0,
@@ -169,12 +169,12 @@ class IndicatorReward(Wrapper):
         its running mean, and "R_P_o_episodes", how many episodes of that condition were played.
         Likewise for P_S of FT, and for P_N instead of P_o of S.
         """
-        told = self.condition
+        condition = self.condition
         info = {
             **self.env.episode_info,
-            "n_robots": told.n_robots,
-            "n_failed": told.n_failed,
-            "n_removed": told.n_removed,
+            "n_robots": condition.n_robots,
+            "n_failed": condition.n_failed,
+            "n_removed": condition.n_removed,
         }
         delivered = self.unwrapped.warehouse.state.delivered
         for name in self.weights:
@@ -184,11 +184,11 @@ class IndicatorReward(Wrapper):
             info[name] = test.share * delivered + test.constant if test else 0.0
             info[f"{name}_tested"] = int(test is not None)
             for role in PERFORMANCES[name]:
-                condition, given = test.performances[role] if test else (None, 0.0)
-                mean = self.measured.mean(condition) if condition else None
+                reference, given = test.performances[role] if test else (None, 0.0)
+                mean = self.measured.mean(reference) if reference else None
                 info[f"{name}_{role}"] = given
                 info[f"{name}_{role}_measured"] = 0.0 if mean is None else mean
-                info[f"{name}_{role}_episodes"] = self.measured.count(condition) if condition else 0
+                info[f"{name}_{role}_episodes"] = self.measured.count(reference) if reference else 0
         return info
 
     def reset_arrays(
@@ -201,7 +201,7 @@ class IndicatorReward(Wrapper):
         return super().reset_arrays(seed, options)
 
     def begun(self, seed: int) -> None:
-        """Note what the episode is about and what it pays."""
+        """Store the condition of the episode and what it pays."""
         self._seed = seed
         self._paid, self._delivered = Payment(), 0
         self._carriers = set[int]()  # of the requested item since it was asked for
@@ -228,7 +228,7 @@ class IndicatorReward(Wrapper):
         self, rewards: NDArray[np.float64], deliverers: list[int], present: NDArray[np.bool_]
     ) -> None:
         once = self._due.constant - self._paid.constant
-        # What was delivered before a change in mid-run was paid another share.
+        # Items that were delivered before a change in mid-run were paid another share.
         once += (self._due.share - self._paid.share) * self._delivered
         self._paid = self._due
         if self.credit == "team":

@@ -1,4 +1,4 @@
-"""Surroundings that change."""
+"""Changes of a scenario's parameters, in an episode or during it."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from swarm_logistics_env.environment.reset_options import scenario_fields
 from swarm_logistics_env.errors import ScenarioError, suggest
-from swarm_logistics_env.reset_options import scenario_fields
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
 from swarm_logistics_env.streams import generator
-from swarm_logistics_env.wrappers.drawing import Drawn
+from swarm_logistics_env.warehouse.faults import GRACE
+from swarm_logistics_env.wrappers.sampling import Sampler
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class ParameterChange(Wrapper):
@@ -72,8 +73,8 @@ class ParameterChange(Wrapper):
                 f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
             )
         self.name = name
-        self._values = Drawn(name, values, within)
-        self._times = None if at is None else Drawn("at", at, at_within)
+        self._values = Sampler(name, values, within)
+        self._times = None if at is None else Sampler("at", at, at_within)
         if self._times is not None:
             for time in self._times.ends:
                 if not isinstance(time, int | float) or not time >= 0:
@@ -84,7 +85,7 @@ class ParameterChange(Wrapper):
         before = self.env.scenarios
         after = [known.replace(**{name: value}) for known in before for value in self._values.ends]
         for scenario in after:
-            self.cover(scenario)
+            self.declare_spaces(scenario)
         known = after if at is None else [*before, *after]
         self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys(known))
 
@@ -93,12 +94,12 @@ class ParameterChange(Wrapper):
         value, time = self._drawn(seed)
         if time is None:
             return {**options, "scenario": {self.name: value, **scenario_fields(options)}}
-        # It cannot be tried too early: a change that fails in mid-run has cost the run.
+        # The change is tried now, because an error in mid-run would cost the run.
         self.env.scenario_of(seed, options).replace(**{self.name: value})
         return options
 
     def begun(self, seed: int) -> None:
-        """Note this episode's value and time."""
+        """Store this episode's value and time."""
         self.value, self.time = self._drawn(seed)
         present = getattr(self.warehouse.scenario, self.name)
         if self.time is None:
@@ -107,13 +108,12 @@ class ParameterChange(Wrapper):
 
     def before_step(self, commands: ArrayLike) -> ArrayLike:
         """Make the change if it is due."""
-        # Half a microsecond of grace: times are sums of control periods.
-        if self._is_due and self.warehouse.state.time >= (self.time or 0.0) - 5e-7:
+        if self._is_due and self.warehouse.state.time >= (self.time or 0.0) - GRACE:
             self.warehouse.change(**{self.name: self.value})
             self._is_due = False
         return commands
 
     def _drawn(self, seed: int) -> tuple[Any, float | None]:
         rng = generator(seed, f"change of {self.name}", self._place())
-        value = self._values.draw(rng)
-        return value, None if self._times is None else float(self._times.draw(rng))
+        value = self._values.sample(rng)
+        return value, None if self._times is None else float(self._times.sample(rng))

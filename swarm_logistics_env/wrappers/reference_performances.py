@@ -13,7 +13,7 @@ from swarm_logistics_env.wrappers.conditions import Condition
 
 
 class GivenPerformances:
-    """Numbers, as of a study.
+    """Performances that were given as numbers, for instance from a study.
 
     Raises:
         SetupError: a performance is negative or not finite, or a key is no condition.

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swarm_logistics_env.dict_view import agent_names
+from swarm_logistics_env.environment.dict_view import agent_names
+from swarm_logistics_env.environment.reset_options import faults_among, scenario_fields
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.reset_options import faults_among, scenario_fields
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.wrappers.drawing import Distribution, Drawn
+from swarm_logistics_env.wrappers.sampling import Distribution, Sampler
 from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
     from swarm_logistics_env.scenario import Scenario
 
 
@@ -62,11 +62,11 @@ class SwarmSize(Wrapper):
         super().__init__(env)
         if isinstance(sizes, tuple | range):
             sizes = list(sizes)
-        self._size = Drawn("n_robots", sizes, within)
+        self._size = Sampler("n_robots", sizes, within)
         pairs = _departures(leave)
         self._leaving = sum(robots for robots, _ in pairs)
         self._absent = sum(robots for robots, time in pairs if time == 0.0)
-        # The sets are nested, so the first m + k take with them the m who have left.
+        # The sets are nested: the first m + k robots contain the m that have left.
         in_all = np.cumsum([robots for robots, _ in pairs], dtype=np.int64).tolist()
         self._departures = tuple(
             Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)
@@ -79,20 +79,20 @@ class SwarmSize(Wrapper):
             )
         )
         for scenario in self.scenarios:
-            self.cover(scenario)
+            self.declare_spaces(scenario)
         sizes_announced = (scenario.n_robots for scenario in self.scenarios)
         largest = max(self.unwrapped.max_robots or 0, *sizes_announced)
         self.unwrapped.possible_agents = agent_names(range(largest))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's size and departures among them."""
-        size = self._size.draw(generator(seed, "swarm size", self._place()))
+        size = self._size.sample(generator(seed, "swarm size", self._place()))
         faults = (*faults_among(options, self.unwrapped.faults), *self._departures)
         scenario = {"n_robots": size, **scenario_fields(options)}
         return {**options, "scenario": scenario, "faults": faults}
 
-    def cover(self, scenario: Scenario) -> None:
-        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.cover`.
+    def declare_spaces(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
             SetupError: more robots are to leave than it has, or all of them at 0 s.
@@ -107,7 +107,7 @@ class SwarmSize(Wrapper):
                 f"leave: {self._leaving} robots in all, should be at most n_robots = "
                 f"{scenario.n_robots}"
             )
-        self.env.cover(scenario)
+        self.env.declare_spaces(scenario)
 
 
 def _departures(leave: Sequence[tuple[int, float]]) -> list[tuple[int, float]]:

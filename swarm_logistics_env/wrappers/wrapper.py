@@ -1,4 +1,4 @@
-"""What the wrappers have in common."""
+"""The base of all wrappers."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo.utils import BaseParallelWrapper
 
-from swarm_logistics_env.dict_view import ArrayStep, DictView
+from swarm_logistics_env.environment.dict_view import ArrayStep, DictView
+from swarm_logistics_env.environment.reset_options import checked_options, checked_seed
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.reset_options import checked_options, checked_seed
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.env import SwarmLogisticsEnv
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
     from swarm_logistics_env.scenario import Scenario
 
 
@@ -37,7 +37,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         SetupError: it is something else, or a wrapper that has to be the outermost one.
 
     Example:
-        >>> from swarm_logistics_env.env import SwarmLogisticsEnv
+        >>> from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
         >>> env = Wrapper(SwarmLogisticsEnv(n_robots=2))
         >>> env.reset_arrays(seed=0).shape == env.unwrapped.reset_arrays(seed=0).shape
         True
@@ -82,7 +82,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         return observations
 
     def begun(self, seed: int) -> None:
-        """Note what there is to note of an episode that has begun."""
+        """Store what a subclass needs to know of the episode that has begun."""
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
         """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
@@ -98,7 +98,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """What the `infos` of every agent say of the episode; the same keys at every step.
+        """The part of every agent's infos that is about the episode; it always has the same keys.
 
         For wrappers that have more to say: `{**self.env.episode_info, "key": number}`.
         """

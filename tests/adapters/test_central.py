@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 
 from swarm_logistics_env import Fault
 from swarm_logistics_env.adapters import CentralEnv
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 

@@ -21,17 +21,14 @@ from swarm_logistics_env.cli import app
         (["watch", "--fault", "FM1:99"], "at most n_robots = 25"),
         (["watch", "--set", "n_robot=40"], "did you mean 'n_robots'?"),
         (["watch", "--speed", "3"], "speed = 3: should be one of"),
-        (["watch", "--port", "99999", "--web"], "--port"),
-        (["watch"], "needs a display"),
+        (["watch", "--port", "99999"], "--port"),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(
     arguments: list[str],
     words: str,
-    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
     assert app.run(arguments) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
@@ -39,43 +36,22 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
     assert len(printed.err.splitlines()) == 1
 
 
-def test_without_pygame_the_browser_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    assert app.run(["watch"]) == 2
-    assert capsys.readouterr().err.endswith("[render]', or use --web\n")
-
-
 def test_port_in_use_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert app.run(["watch", "--web", "--port", str(port)]) == 2
+        assert app.run(["watch", "--port", str(port)]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert f"port = {port}: is in use" in printed.err
 
 
-def test_window_opens_plays_and_closes(monkeypatch: pytest.MonkeyPatch) -> None:
-    from swarm_logistics_env.rendering.renderer import load_pygame
-
-    load_pygame()
-    import pygame
-
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    pygame.display.init()
-    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_q, unicode="q", mod=0))
-    assert app.run(["watch", "--policy", "random-walk", "--fault", "FM1:2@5"]) == 0
-    assert not pygame.display.get_init()
-
-
-def test_web_view_serves_until_ctrl_c_without_pygame() -> None:
+def test_page_is_served_until_ctrl_c_without_pygame() -> None:
     script = (
         # Also where the gate itself was started to ignore it, as by nohup.
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "import sys; sys.modules['pygame'] = None\n"
         "from swarm_logistics_env.cli import app\n"
-        "sys.exit(app.run(['watch', '--web', '--port', '0', '--set', 'n_robots=5']))"
+        "sys.exit(app.run(['watch', '--port', '0', '--set', 'n_robots=5']))"
     )
     started = subprocess.Popen(
         [sys.executable, "-u", "-c", script],

@@ -1,7 +1,9 @@
-"""A small trained policy, as a card and as a file."""
+"""A small trained policy, as a card and as a file, and a module of policies of a user's own."""
 
 from __future__ import annotations
 
+import sys
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -43,3 +45,43 @@ def file(card: PolicyCard, tensors: Tensors, tmp_path: Path) -> Path:
 def rows() -> NDArray[np.float32]:
     low, high = bounds(Scenario())
     return np.random.default_rng(1).uniform(low, high, (7, len(low))).astype(np.float32)
+
+
+@pytest.fixture
+def own_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A module of a user's own, with good and bad policies in it."""
+    path = tmp_path / "own_policies.py"
+    path.write_text(
+        textwrap.dedent(
+            """
+            import numpy as np
+
+            class Still:
+                def __init__(self, gripper=1.0):
+                    self.parameters = {"gripper": gripper}
+
+                def reset(self, n_robots, seed):
+                    pass
+
+                def act(self, observations):
+                    commands = np.zeros((len(observations), 4))
+                    commands[:, 3] = self.parameters["gripper"]
+                    return commands
+
+                class Inner:
+                    def reset(self, n_robots, seed): ...
+                    def act(self, observations): ...
+
+            class NoPolicy:
+                pass
+
+            class Named(Still):
+                identity = "weights 1"
+
+            number = 7
+            """
+        )
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "own_policies", raising=False)
+    return path

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, policies, testing
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
 from swarm_logistics_env.warehouse.state import CARRIED

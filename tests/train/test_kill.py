@@ -67,14 +67,14 @@ seeds = 0
 SCRIPT = """\
 import os, signal, sys
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.train import progress
-last, save, saved = int(sys.argv.pop(1)), progress.save_checkpoint, []
+from swarm_logistics_env.train import training_callback
+last, save, saved = int(sys.argv.pop(1)), training_callback.save_checkpoint, []
 def save_and_die(*given):
     save(*given)
     saved.append(given)
     if len(saved) == last:
         os.kill(os.getpid(), signal.SIGKILL)
-progress.CHECKPOINT_EVERY, progress.save_checkpoint = 0.0, save_and_die
+training_callback.CHECKPOINT_EVERY, training_callback.save_checkpoint = 0.0, save_and_die
 app()
 """
 
@@ -116,7 +116,7 @@ def test_a_training_that_was_killed_does_not_imitate_again(
         raise Killed
 
     with monkeypatch.context() as changed:
-        changed.setattr(trainer, "Progress", dies)
+        changed.setattr(trainer, "TrainingCallback", dies)
         with pytest.raises(Killed):
             trainer.train(training, tmp_path / "cut")
     monkeypatch.setattr(trainer, "imitate", dies)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.train.mix import EpisodeMix
 from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.warehouse import Fault

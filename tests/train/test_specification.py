@@ -6,7 +6,7 @@ import pytest
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions
+from swarm_logistics_env.train.settings import Conditions, Imitation
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -30,6 +30,12 @@ def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone(
     assert indicator.replace(**reward, **names) == same_mix
     names = {"name": deliveries.name, "about": deliveries.about}
     assert same_mix.replace(conditions=(), **names) == deliveries
+
+
+def test_a_file_from_before_beta_had_its_name_is_still_read(tmp_path: Path) -> None:
+    path = tmp_path / "old.toml"
+    path.write_text("[imitation]\nteacher_share = [0.5]\n")
+    assert load_training(str(path)).imitation == Imitation(beta=(0.5,))
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ import torch
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
+from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.policies.homing import homing_commands
-from swarm_logistics_env.policies.motion_frame import INPUTS
 from swarm_logistics_env.studies.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
 from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
@@ -97,7 +97,7 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
 
 def test_the_view_trains_what_the_policy_plays(small: Any) -> None:
     """One world in training and the policy file alone come to the same commands."""
-    from swarm_logistics_env.policies.motion_frame import MotionFrame
+    from swarm_logistics_env.motion.frame import MotionFrame
 
     training: Training = small(sizes=(3,), worlds=1)
     view = trainer._new_view(training)

@@ -8,8 +8,8 @@ from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.rendering.trails import TRAIL_SECONDS
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.inspection import observation_words
-from swarm_logistics_env.watch.keys import KEYS, press
+from swarm_logistics_env.watch.web.keys import KEYS, press
+from swarm_logistics_env.watch.web.view import observation_words
 
 SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
 

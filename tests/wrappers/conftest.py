@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.wrappers import (
     FaultInjection,
     FixedAgents,

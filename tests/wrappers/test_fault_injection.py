@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import FaultError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.warehouse.faults import failed_robots
 from swarm_logistics_env.wrappers import FaultInjection, SwarmSize

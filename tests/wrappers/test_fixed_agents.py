@@ -11,7 +11,7 @@ import pytest
 
 from swarm_logistics_env import Fault, testing
 from swarm_logistics_env.adapters import CentralEnv
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.wrappers import (
     FaultInjection,

@@ -14,7 +14,7 @@ import pytest
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_logistics_env import Fault, spi
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.wrappers import (
     Condition,
@@ -79,7 +79,7 @@ EPISODES: dict[str, tuple[Any, Callable[[int], spi.Estimate]]] = {
 def test_the_return_is_the_indicator(name: str) -> None:
     options, estimate = EPISODES[name]
     env = busy()
-    env.cover(env.scenario.replace(n_robots=7))
+    env.declare_spaces(env.scenario.replace(n_robots=7))
     env = IndicatorReward(env, name, references={OWN: 33, REMOVED: 21})
     rewards, infos = play(env, 0, options)
     p = delivered(env)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import ScenarioError, SetupError
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
@@ -60,7 +60,7 @@ def test_other_for_every_parameter_that_can_change() -> None:
 def test_in_mid_run_it_is_a_change_of_the_warehouse_at_that_time(name: str) -> None:
     wrapped = ParameterChange(small(), name, OTHER[name], at=1.0)
     plain = small()
-    plain.cover(plain.scenario.replace(**{name: OTHER[name]}))
+    plain.declare_spaces(plain.scenario.replace(**{name: OTHER[name]}))
     rng = np.random.default_rng(0)
     np.testing.assert_array_equal(wrapped.reset_arrays(3), plain.reset_arrays(3))
     for step in range(29):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault
-from swarm_logistics_env.env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError
 from swarm_logistics_env.wrappers import SwarmSize
 

@@ -1,4 +1,4 @@
-"""What the page may ask of a session."""
+"""The orders that the page may give to a session."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.watch.keys import press
 from swarm_logistics_env.watch.session import Session
+from swarm_logistics_env.watch.web.keys import press
 
 
 class _Order(BaseModel):

@@ -1,4 +1,4 @@
-"""The server: this machine only, the page's own files only, orders only with the token."""
+"""The server: for this machine, for the page's own files, for orders with the token alone."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from swarm_logistics_env.watch.web.orders import obey
 from swarm_logistics_env.watch.web.view import fixed_view, moving_view
 
 _LOOPBACK = "127.0.0.1"
-# A page elsewhere can have its name resolved to this machine; it cannot fake these.
+# A foreign page may resolve its name to this machine, but it cannot forge these headers.
 _OWN_HOST = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?")
 _FILES = {
     "": ("page.html", "text/html; charset=utf-8"),
@@ -51,7 +51,7 @@ _NOBODY_LOOKS_AFTER = 3.0  # [s] since the last request: time stands still
 
 
 class WatchServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
-    """Shows a session to whoever knows its address; the address holds a random token.
+    """Shows a session to those who know its address, which holds a random token.
 
     Args:
         session: what is watched.
@@ -136,7 +136,7 @@ class WatchServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
             self._room.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Pass over connections that break off; show faults of ours."""
+        """Ignore connections that break off; show our own bugs."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
@@ -185,7 +185,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
                 self._answer_json(b"{}")
 
     def _asked(self) -> tuple[str | None, str]:
-        """Return name and query of what is asked for; None: not for whoever asks, who was told."""
+        """Return name and query of the request; None if an error response was already sent."""
         hosts, origins = (self.headers.get_all(name, []) for name in ("Host", "Origin"))
         own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0])
         if not own or origins not in ([], [f"http://{hosts[0]}"]):
@@ -219,14 +219,14 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer with what the code means, and nothing of the request."""
-        # What follows on this connection may be the rest of a body.
+        """Answer with the meaning of the code; repeat nothing of the request."""
+        # The connection may go on with the rest of a body, so it is closed.
         self.close_connection = True
         status = HTTPStatus(code)
         text = status.phrase
         if status == HTTPStatus.FORBIDDEN:
-            text = "Open the address that swarm-logistics watch --web printed, on its machine."
-        # Even what is no request at all gets an answer.
+            text = "Open the address that swarm-logistics watch printed, on its machine."
+        # Data that is no request at all gets an answer, too.
         self.command = getattr(self, "command", None) or "GET"
         self.request_version = "HTTP/1.1"
         self._answer(f"{text}\n".encode(), "text/plain; charset=utf-8", status)
@@ -239,7 +239,7 @@ def serve(session: Session, title: str, port: int, announce: Callable[[str], Non
     """Show a session in the browser until Ctrl-C.
 
     Args:
-        announce: is told the address.
+        announce: called with the sentence that has the address.
 
     Raises:
         SetupError: the port cannot be had.

@@ -1,4 +1,4 @@
-"""A session as JSON: what the page draws."""
+"""The data of a session that the page draws, as JSON."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from swarm_logistics_env.observations import columns
 from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.rendering.beams import ranges
 from swarm_logistics_env.rendering.links import followed
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
-from swarm_logistics_env.watch.inspection import activity, observation_words
-from swarm_logistics_env.watch.keys import HELP, KEYS, LINKS, MOUSE, QUIT, TRAILS
 from swarm_logistics_env.watch.session import WIDTH_STEP, Session
+from swarm_logistics_env.watch.web.keys import HELP, KEYS, LINKS, MOUSE, TRAILS
 
 _COLOURS = (
     "INK", "SURROUNDINGS", "FLOOR", "FLOOR_LINE", "DELIVERY_AREA", "DELIVERY_HATCH",
@@ -25,6 +27,8 @@ _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius", "control_period",
 )  # fmt: skip
+# Several things stand in each of these blocks; those that are absent come last and are left out.
+_BLOCKS = ("item", "neighbour", "lowest_timer")
 
 
 def fixed_view(title: str) -> dict[str, Any]:
@@ -37,11 +41,7 @@ def fixed_view(title: str) -> dict[str, Any]:
             {"name": name, "mark": palette.MARKS.get(name, ""), "meaning": mode.description}
             for name, mode in FAILURE_MODES.items()
         ],
-        "keys": [
-            {"name": key.name, "label": key.label, "meaning": key.meaning}
-            for key in KEYS
-            if key.name != QUIT
-        ],
+        "keys": [{"name": key.name, "label": key.label, "meaning": key.meaning} for key in KEYS],
         "mouse": MOUSE,
         "view_keys": {"trails": TRAILS, "links": LINKS, "help": HELP},
         "width_step": WIDTH_STEP,
@@ -89,6 +89,39 @@ def moving_view(session: Session, *, trails: bool = False) -> dict[str, Any]:
         "selected": _selected(session),
         "trails": _trails(session) if trails else [],
     }
+
+
+def observation_words(row: NDArray[np.float32], scenario: Scenario) -> list[tuple[str, str]]:
+    """Return name and values of every named part of an observation row (D,).
+
+    Items and neighbours are listed only if present, the nearest first. The name has the unit.
+    """
+    words = []
+    parts = {column.name: row[column.columns] for column in columns(scenario)}
+    for column in columns(scenario):
+        values = parts[column.name]
+        block = next((block for block in _BLOCKS if column.name.startswith(block)), None)
+        if block is not None and column.name != f"{block}_present":
+            n_present = int((parts[f"{block}_present"] > 0.5).sum())
+            values = values[: n_present * (len(values) // len(parts[f"{block}_present"]))]
+        if column.unit == "flag":
+            text = " ".join("yes" if value > 0.5 else "no" for value in values)
+            if column.name.endswith("_present") and len(values) > 1:
+                text = f"{int((values > 0.5).sum())} of {len(values)}"
+        else:
+            # Adding 0.0 turns a negative zero into zero.
+            text = " ".join(f"{round(float(value), 2) + 0.0:.2f}" for value in values)
+        unit = "" if column.unit in ("flag", "1") else f" [{column.unit}]"
+        words.append((column.name + unit, text or "–"))
+    return words
+
+
+def activity(state: WarehouseState, robot: int) -> str:
+    """Return what a robot does now, in the words of the legend."""
+    item = int(state.robot_item[robot])
+    if item == NOBODY:
+        return "searching"
+    return "delivering" if item == state.requested else "shuffling"
 
 
 def _trails(session: Session) -> list[list[list[float] | None]]:

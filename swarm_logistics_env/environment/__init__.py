@@ -1,0 +1,1 @@
+"""The PettingZoo environment: its array methods, their dict view, spaces, rewards and options."""

@@ -1,0 +1,307 @@
+"""The PettingZoo environment: the dict view of a Warehouse."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env.environment.central_state import global_state
+from swarm_logistics_env.environment.commands import as_array
+from swarm_logistics_env.environment.dict_view import ArrayStep, DictView, agent_names
+from swarm_logistics_env.environment.reset_options import (
+    OPTIONS,
+    check_somebody_is_there,
+    checked_faults,
+    checked_options,
+    checked_seed,
+    faults_among,
+    scenario_fields,
+)
+from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.environment.spaces import Spaces
+from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.streams import key
+from swarm_logistics_env.warehouse import Fault, Warehouse
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.rendering import Renderer
+
+# Names that other environments give to an argument of this one.
+_OTHER_NAMES = {
+    "num_agents": "n_robots",
+    "n_agents": "n_robots",
+    "num_robots": "n_robots",
+    "width": "warehouse_width",
+    "height": "warehouse_height",
+    "max_steps": "max_cycles",
+}
+
+
+class SwarmLogisticsEnv(DictView):
+    """A swarm fetches requested items in a warehouse, each robot with its own sensors only.
+
+    `reset_arrays` and `step_arrays` are the environment; `reset` and `step` are their dict view.
+
+    Args:
+        scenario: the conditions; default: the paper's.
+        faults: the faults that are scheduled in every episode.
+        rewards: reward term -> weight; default: 1 to everybody for each delivery.
+        render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
+        max_cycles: steps after which an episode is truncated, if sooner than the duration.
+        max_robots: the largest swarm that a reset's options may ask for; default: n_robots.
+        **fields: fields of the scenario to replace, e.g. `n_robots=40`.
+
+    Attributes:
+        next_seed: the seed of the episode that a reset without one begins; follows from the
+            seed of the episode before.
+        is_begun: whether there was a reset.
+
+    Raises:
+        ArgumentError: there is no such argument; a ScenarioError and a TypeError.
+        ScenarioError, FaultError, SetupError: an argument cannot be.
+
+    Example:
+        >>> env = SwarmLogisticsEnv(n_robots=3)
+        >>> observations, infos = env.reset(seed=0)
+        >>> sorted(observations)
+        ['robot_0', 'robot_1', 'robot_2']
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012  # PettingZoo has it on the class as well
+        "name": "swarm_logistics_v0",
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,  # of the default control period; an instance has its own
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        *,
+        faults: Sequence[Fault] = (),
+        rewards: Mapping[str, float] | None = None,
+        render_mode: Literal["human", "rgb_array"] | None = None,
+        max_cycles: int | None = None,
+        max_robots: int | None = None,
+        **fields: Any,
+    ) -> None:
+        self.scenario = _scenario_of(scenario, fields)
+        self.faults = checked_faults("faults", faults)
+        is_count = isinstance(max_cycles, int | np.integer) and max_cycles >= 1
+        if max_cycles is not None and not is_count:
+            raise SetupError(
+                f"max_cycles = {max_cycles!r}: should be None or a whole number of at least 1"
+            )
+        self.max_cycles = max_cycles
+        modes = self.metadata["render_modes"]
+        if render_mode is not None and render_mode not in modes:
+            raise SetupError(f"render_mode = {render_mode!r}: should be None or one of {modes}")
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": 1.0 / self.scenario.control_period}
+        self._renderer: Renderer | None = None
+        self.warehouse = Warehouse(self.scenario)
+        self.agents: list[str] = []
+        self.is_begun = False
+        self.possible_agents = agent_names(range(self.scenario.n_robots))
+        self._spaces = Spaces(self.scenario)
+        self._rewards = RewardTerms(rewards)
+        self.next_seed = int(np.random.default_rng().integers(2**63))
+        self.max_robots = max_robots
+        if max_robots is not None:
+            is_number = isinstance(max_robots, int | np.integer)
+            if not is_number or max_robots < self.scenario.n_robots:
+                raise SetupError(
+                    f"max_robots = {max_robots!r}: should be None or a whole number of at least "
+                    f"n_robots = {self.scenario.n_robots}"
+                )
+            self.declare_spaces(self.scenario.replace(n_robots=int(max_robots)))
+
+    def observation_space(self, agent: str) -> Box:
+        """Return the space of an observation row (D,), the same for every agent."""
+        return self._spaces.observation
+
+    def action_space(self, agent: str) -> Box:
+        """Return the space of a command (4,): forward, left, turn, gripper; the same for all."""
+        return self._spaces.action
+
+    def reset_arrays(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> NDArray[np.float32]:
+        """Begin an episode and return the first observations (N, D).
+
+        Args:
+            seed: decides everything random in this episode, and in those that follow with seed
+                None, each of which differs.
+            options: for this episode: "scenario", fields to replace; "faults", instead of the
+                environment's. Other keys are ignored with a warning.
+
+        Raises:
+            ScenarioError, FaultError: an option cannot be.
+            SetupError: a seed or option is of the wrong type; no robot would be there; or such a
+                scenario has more robots than `possible_agents`, or observations or states that
+                could leave their spaces, which are those of the environment's own (and of those
+                given to `declare_spaces`).
+        """
+        options = checked_options(options)
+        for unknown in options.keys() - set(OPTIONS):
+            warnings.warn(
+                f"reset option {str(unknown)!r} is ignored{suggest(str(unknown), OPTIONS)}",
+                stacklevel=3,
+            )
+        seed = self.next_seed if seed is None else checked_seed(seed)
+        scenario = self.scenario_of(seed, options)
+        self._spaces.check(scenario, len(self.possible_agents))
+        faults = faults_among(options, self.faults)
+        check_somebody_is_there(faults, seed, scenario.n_robots)
+        observations = self.warehouse.reset(seed, faults, scenario)
+        self.next_seed = key(seed, "the episode that follows") >> 1
+        self._rewards.begin(self.warehouse)
+        self.is_begun = True
+        self._present = self.warehouse.state.robot_present.copy()
+        self._n_removed = self.warehouse.n_removed
+        self.agents = agent_names(np.flatnonzero(self._present).tolist())
+        return observations
+
+    def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
+        """Return the scenario of the episode that such a reset would begin; changes nothing.
+
+        Raises:
+            ScenarioError, SetupError: as `reset_arrays`.
+        """
+        return self.scenario.replace(**scenario_fields(options))
+
+    @property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios that episodes are played in, unless a reset's options say otherwise."""
+        return (self.scenario,)
+
+    def step_arrays(self, commands: ArrayLike) -> ArrayStep:
+        """Take one control period.
+
+        Args:
+            commands: (N, 4), see `Warehouse.step`; rows of absent robots are ignored.
+
+        Returns:
+            Observations (N, D), rewards (N,), terminations (N,) and truncations (N,). A robot
+            terminates when it is removed, all do when everything is delivered; all are truncated
+            when the time is up. `agents` are those to whom neither happened yet.
+
+        Raises:
+            CommandError: wrong shape, not readable or not finite; nothing has happened then.
+        """
+        if not isinstance(commands, np.ndarray):
+            commands = as_array(commands, "commands")
+        return self.outcome(self.warehouse.step(commands))
+
+    def is_uneventful(self, was_eventful: bool) -> bool:
+        """Return whether the step that the warehouse has just taken pays nobody and ends nothing.
+
+        `outcome` gives zeros then and need not be asked.
+
+        Args:
+            was_eventful: what `warehouse.stepping.step` returned.
+        """
+        if was_eventful or not self.agents or self._rewards.pays_steadily:
+            return False
+        world = self.warehouse
+        is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
+        return not (is_cut or world.is_over_time)
+
+    def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
+        """Return what `step_arrays` does of the step that the warehouse has just taken."""
+        world, was_present = self.warehouse, self._present
+        rewards = self._rewards.pay(world)
+        if len(self.agents) < len(was_present):
+            rewards *= was_present
+        terminations, truncations = np.zeros((2, len(was_present)), np.bool_)
+        is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
+        is_over_time = is_cut or world.is_over_time
+        # These cases are rare; the other steps save the work.
+        if is_over_time or world.all_delivered or world.n_removed != self._n_removed:
+            self._n_removed = world.n_removed
+            self._present = world.state.robot_present.copy()
+            terminations |= was_present & (~self._present | world.all_delivered)
+            if is_over_time:
+                truncations |= was_present & ~terminations
+            is_left = was_present & ~(terminations | truncations)
+            self.agents = agent_names(np.flatnonzero(is_left).tolist())
+        return observations, rewards, terminations, truncations
+
+    @property
+    def episode_info(self) -> dict[str, float]:
+        """The part of every agent's infos that is about the episode; it always has the same keys.
+
+        "delivered": items delivered so far, the paper's performance P.
+        """
+        return {"delivered": self.warehouse.state.delivered}
+
+    def declare_spaces(self, scenario: Scenario) -> None:
+        """Widen the observation space so that episodes may also be played in `scenario`.
+
+        For wrappers, when they are made: spaces must not change once they were handed out.
+
+        Raises:
+            SetupError: its rows or commands are longer or shorter than this environment's.
+        """
+        self._spaces.widen(scenario)
+        if scenario.n_robots > len(self.possible_agents):
+            self.possible_agents = agent_names(range(scenario.n_robots))
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture (H, W, 3) in mode "rgb_array"; show the window in mode "human".
+
+        Raises:
+            SetupError: no render_mode was chosen, pygame is missing, or there is no display.
+        """
+        if self.render_mode is None:
+            raise SetupError('render_mode = None: should be "rgb_array" or "human" to render')
+        if self._renderer is None:
+            from swarm_logistics_env.rendering import Renderer
+
+            self._renderer = Renderer(self.scenario, self.render_mode)
+        world = self.warehouse
+        if self.render_mode == "rgb_array":
+            return self._renderer.frame(world.state, world.scenario)
+        self._renderer.show(world.state, world.scenario)
+        return None
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the whole warehouse as one vector, see `global_state`; for central critics."""
+        return global_state(self.warehouse, len(self.possible_agents), self._spaces.n_items)
+
+    @property
+    def state_space(self) -> Box:
+        """The space of `state()`, for `possible_agents` robots and the most items there may be."""
+        return self._spaces.state(len(self.possible_agents))
+
+    def close(self) -> None:
+        """Release what rendering holds; harmless when called twice."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy opens a window of its own.
+        return {**self.__dict__, "_renderer": None}
+
+
+def _scenario_of(scenario: Scenario | None, fields: Mapping[str, Any]) -> Scenario:
+    if scenario is not None and not isinstance(scenario, Scenario):
+        raise SetupError(
+            f"scenario = {scenario!r}: should be a Scenario; its fields are arguments of their "
+            "own, as n_robots=40"
+        )
+    own = ("scenario", "faults", "rewards", "render_mode", "max_cycles", "max_robots")
+    for name in fields:
+        if name not in Scenario.model_fields:
+            hint = suggest(_OTHER_NAMES.get(name, name), (*Scenario.model_fields, *own))
+            raise ArgumentError(
+                f"the environment got an unexpected keyword argument {name!r}{hint}"
+            )
+    return (scenario or Scenario()).replace(**fields)

@@ -1,0 +1,89 @@
+"""Checks of a reset's options, for the environment and its wrappers."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
+
+OPTIONS = ("faults", "scenario")
+
+
+def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the options as a dict of one's own, empty for None.
+
+    Raises:
+        SetupError: they are no mapping.
+    """
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise SetupError(f"options = {options!r}: should be None or a dict with keys {OPTIONS}")
+    return dict(options)
+
+
+def checked_seed(seed: int) -> int:
+    """Return the seed as an int.
+
+    Raises:
+        SetupError: it is none.
+    """
+    try:
+        return operator.index(seed)
+    except TypeError:
+        raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
+
+
+def scenario_fields(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of the scenario that the options replace.
+
+    Raises:
+        SetupError: they are no mapping from names.
+    """
+    fields = options.get("scenario", {})
+    if not isinstance(fields, Mapping) or not all(isinstance(name, str) for name in fields):
+        raise SetupError(
+            f'options["scenario"] = {fields!r}: should be a dict of fields, as {{"n_robots": 40}}'
+        )
+    return dict(fields)
+
+
+def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[Fault, ...]:
+    """Return the faults that the options give, or `default` where they give none.
+
+    Raises:
+        SetupError: they are not a sequence of faults.
+    """
+    return checked_faults('options["faults"]', options.get("faults", default))
+
+
+def checked_faults(name: str, faults: Any) -> tuple[Fault, ...]:
+    """Return faults as a tuple.
+
+    Raises:
+        SetupError: they are not a sequence of faults.
+    """
+    if not isinstance(faults, Sequence) or not all(isinstance(fault, Fault) for fault in faults):
+        raise SetupError(f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)]')
+    return tuple(faults)
+
+
+def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:
+    """Check that an episode with these faults begins with at least one robot.
+
+    Raises:
+        SetupError: they remove all at 0 s.
+        FaultError: a fault names robots that are not there.
+    """
+    gone = set[int]()
+    for fault in faults:
+        if fault.onset <= GRACE and not FAILURE_MODES[fault.mode].present:
+            gone.update(failed_robots(fault, seed, n_robots).tolist())
+    if len(gone) == n_robots:
+        raise SetupError(
+            f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
+        )

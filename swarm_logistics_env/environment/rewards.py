@@ -1,0 +1,152 @@
+"""Named reward terms; how much each counts is configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import SetupError, suggest
+from swarm_logistics_env.warehouse import Warehouse
+from swarm_logistics_env.warehouse.state import NOBODY
+
+DEFAULT_WEIGHTS: Mapping[str, float] = {"delivery": 1.0}
+
+
+class RewardTerms:
+    """The weighted sum of named terms, one value per robot and step.
+
+    Args:
+        weights: term -> weight; see `REWARD_TERMS` for the terms.
+
+    Attributes:
+        pays_steadily: whether a step without a delivery may pay.
+
+    Raises:
+        SetupError: no dict; a term is unknown or its weight is not a finite number.
+    """
+
+    def __init__(self, weights: Mapping[str, float] | None = None) -> None:
+        if weights is not None and not isinstance(weights, Mapping):
+            raise SetupError(
+                f'rewards = {weights!r}: should be None or a dict, as {{"delivery": 1.0}}'
+            )
+        self.weights = dict(DEFAULT_WEIGHTS if weights is None else weights)
+        for name, weight in self.weights.items():
+            if name not in REWARD_TERMS:
+                raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
+            finite_number(f"rewards[{name!r}]", weight)
+        self._terms = [(REWARD_TERMS[name], weight) for name, weight in self.weights.items()]
+        self._follows_carrier = not _OF_CARRIER.isdisjoint(self.weights)
+        self.pays_steadily = not _AT_DELIVERIES.issuperset(self.weights)
+
+    def begin(self, world: Warehouse) -> None:
+        """Store the state at the start of an episode."""
+        self._before = Before()
+        self._before.note(world, self._follows_carrier)
+
+    def pay(self, world: Warehouse) -> NDArray[np.float64]:
+        """Return what the step just taken earns each robot, (N,)."""
+        total = np.zeros(world.state.n_robots)
+        for term, weight in self._terms:
+            earned = term(world, self._before)
+            if earned is not None:
+                total += weight * earned
+        self._before.note(world, self._follows_carrier)
+        return total
+
+
+class Before:
+    """The state before a step, with which the terms compare the state after it."""
+
+    __slots__ = ("carrier", "carrier_x", "delivered", "requested")
+
+    def note(self, world: Warehouse, follows_carrier: bool) -> None:
+        """Store the state; the carrier of the requested item only if a term reads it."""
+        self.delivered = len(world.state.delivery_times)
+        self.requested = world.state.requested
+        self.carrier, self.carrier_x = NOBODY, 0.0
+        if follows_carrier:
+            self.carrier = carrier_of_requested(world)
+            if self.carrier != NOBODY:
+                self.carrier_x = float(world.state.robot_position[self.carrier, 0])
+
+
+Earned = NDArray[np.float64] | float | None  # per robot, the same for all, or nothing
+
+
+def delivery(world: Warehouse, before: Before) -> Earned:
+    """Items delivered in this step, to every robot of the team."""
+    return float(world.state.delivered - before.delivered) or None
+
+
+def own_delivery(world: Warehouse, before: Before) -> Earned:
+    """Items that the robot itself delivered in this step."""
+    new = world.state.delivered_by[before.delivered :]
+    if not new:
+        return None
+    return np.bincount(new, minlength=world.state.n_robots).astype(np.float64)
+
+
+def lift_requested(world: Warehouse, before: Before) -> Earned:
+    """1 to the robot that took up the requested item, -1 to the one that let go of it."""
+    carrier = carrier_of_requested(world)
+    # Deliveries tell that the request changed; the item's number does not, as the same item may be
+    # asked for again with `restock`.
+    if world.state.delivered != before.delivered or carrier == before.carrier:
+        return None
+    paid = np.zeros(world.state.n_robots)
+    if carrier != NOBODY:
+        paid[carrier] += 1.0
+    if before.carrier != NOBODY:
+        paid[before.carrier] -= 1.0
+    return paid
+
+
+def approach(world: Warehouse, before: Before) -> Earned:
+    """Metres that the requested item's carrier came nearer to the delivery area.
+
+    Privileged: no robot can sense it, so it may shape a reward but not an observation.
+    """
+    carrier = carrier_of_requested(world)
+    if carrier == NOBODY or carrier != before.carrier or before.requested != world.state.requested:
+        return None
+    paid = np.zeros(world.state.n_robots)
+    edge = world.scenario.storage_width
+    x = world.state.robot_position[carrier, 0]
+    paid[carrier] = min(x, edge) - min(before.carrier_x, edge)
+    return paid
+
+
+def contact(world: Warehouse, before: Before) -> Earned:
+    """Seconds that the robot touched a robot, a wall or an obstacle; weigh it negatively."""
+    return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
+
+
+REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
+    "delivery": delivery,
+    "own_delivery": own_delivery,
+    "lift_requested": lift_requested,
+    "approach": approach,
+    "contact": contact,
+}
+_AT_DELIVERIES = {"delivery", "own_delivery"}
+_OF_CARRIER = {"lift_requested", "approach"}
+
+
+def finite_number(name: str, value: float) -> float:
+    """Return the value as a float.
+
+    Raises:
+        SetupError: it is not a number, or not finite.
+    """
+    if not isinstance(value, int | float | np.number) or not np.isfinite(value):
+        raise SetupError(f"{name} = {value!r}: should be a finite number")
+    return float(value)
+
+
+def carrier_of_requested(world: Warehouse) -> int:
+    """Return the robot that carries the requested item, or NOBODY."""
+    requested = world.state.requested
+    return NOBODY if requested == NOBODY else int(world.state.item_carrier[requested])

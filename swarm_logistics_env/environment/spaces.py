@@ -1,0 +1,102 @@
+"""The spaces of an environment, wide enough for every scenario that it may play."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium.spaces import Box
+
+from swarm_logistics_env.environment.central_state import global_state_bounds
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.observations import bounds
+from swarm_logistics_env.scenario import Scenario
+
+# These fields bound the state: an episode may have at most the largest value declared.
+_BOUND_THE_STATE = (
+    "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
+)  # fmt: skip
+
+
+class Spaces:
+    """The spaces of observations, commands and states in all declared scenarios.
+
+    Args:
+        scenario: the environment's own.
+
+    Attributes:
+        observation: of an observation row (D,).
+        action: of a command (4 + message_size,).
+        n_items: the most items that there may be.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        low, high = bounds(scenario)
+        self.observation = Box(low, high, dtype=np.float32)
+        self.action = Box(-1.0, 1.0, (4 + scenario.message_size,), dtype=np.float32)
+        self.n_items = scenario.n_items
+        self._declared = [scenario]
+
+    def widen(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`.
+
+        Raises:
+            SetupError: its rows or commands are longer or shorter than the environment's own.
+        """
+        low, high = bounds(scenario)
+        if low.shape != self.observation.shape:
+            raise SetupError(
+                f"message_size = {scenario.message_size}: should be the environment's own, "
+                f"{self._declared[0].message_size}, which its spaces are made for"
+            )
+        low = np.minimum(low, self.observation.low)
+        high = np.maximum(high, self.observation.high)
+        self.observation = Box(low, high, dtype=np.float32)
+        self.n_items = max(self.n_items, scenario.n_items)
+        self._declared.append(scenario)
+
+    def state(self, n_robots: int) -> Box:
+        """Return the space of the state with rows for `n_robots` and the most items."""
+        lows, highs = zip(
+            *(global_state_bounds(known, n_robots, self.n_items) for known in self._declared),
+            strict=True,
+        )
+        return Box(np.min(lows, axis=0), np.max(highs, axis=0), dtype=np.float32)
+
+    def check(self, scenario: Scenario, n_possible: int) -> None:
+        """Check that an episode in `scenario` stays within the spaces.
+
+        Args:
+            scenario: that of the episode.
+            n_possible: how many possible agents there are.
+
+        Raises:
+            SetupError: it has more robots than that, or observations or states could leave their
+                spaces.
+        """
+        if scenario.n_robots > n_possible:
+            raise SetupError(
+                f"n_robots = {scenario.n_robots}: should be at most {n_possible}, as spaces and "
+                f"possible_agents never change; make the environment with "
+                f"max_robots={scenario.n_robots} or wrap it in SwarmSize"
+            )
+        if scenario in self._declared:
+            return
+        low, high = bounds(scenario)
+        seen = self.observation
+        is_seen_within = low.shape == seen.shape and bool(
+            (low >= seen.low).all() and (high <= seen.high).all()
+        )
+        is_state_within = all(
+            getattr(scenario, name) <= max(getattr(known, name) for known in self._declared)
+            for name in _BOUND_THE_STATE
+        )
+        if is_seen_within and is_state_within:
+            return
+        changed = [
+            f"{name} = {value}"
+            for name, value in scenario.model_dump().items()
+            if value != getattr(self._declared[0], name)
+        ]
+        raise SetupError(
+            f"{', '.join(changed)}: observations or states could leave their spaces; should be "
+            "within what the environment was built for, or declared by env.declare_spaces(scenario)"
+        )

@@ -1,0 +1,266 @@
+"""The inputs and outputs of a network, in the frame of its robot's motion.
+
+A swarm has no compass, so what is to the left of a robot's motion matters, not what is to the
+left of its body. The frame is turned by whole beams, so that scans need no interpolation.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion.clearing import clear_the_way
+from swarm_logistics_env.scenario import Scenario
+
+N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
+WALL_REACH, FAR, NEAR = 0.7, 2.0, 0.5  # [m], where nearness 1 .. 0 ends
+RANDOM_HEADING_TIME = 0.8  # [s] that a random direction lasts
+FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
+
+OUTPUTS = ("along", "aside", "gripper")
+
+
+def _names() -> tuple[str, ...]:
+    vector = ("along", "aside")
+    return (
+        *(f"wall_{beam}" for beam in range(row.N_BEAMS)),
+        *(f"neighbour_{n}_{part}" for n in range(N_FAR) for part in vector),
+        *(f"near_neighbour_{n}_{part}" for n in range(N_NEAR) for part in vector),
+        *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in ("present", *vector)),
+        "requested_present", "requested_along", "requested_aside", "requested_distance",
+        "requested_nearness", "requested_recently_held",
+        "lead_present", "lead_along", "lead_aside", "lead_distance", "lead_timer",
+        "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
+        "velocity_along", "velocity_aside", "heading_along", "heading_aside",
+        "home_along", "home_aside", "home_certainty", "failed", "stuck",
+        "whim_along", "whim_aside",
+    )  # fmt: skip
+
+
+INPUTS = _names()
+LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
+
+
+class MotionFrame:
+    """Makes network inputs from observation rows, and commands from outputs, row by row.
+
+    Each row has a memory of its own (see `memory`), begun anew by `begin`.
+
+    Args:
+        scenario: for its control period.
+        listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
+    """
+
+    def __init__(self, scenario: Scenario, listens: bool = True) -> None:
+        self._period = scenario.control_period
+        self._listens = listens
+        self.begin(np.empty(0, np.uint64))
+
+    def begin(self, keys: NDArray[np.uint64]) -> None:
+        """Begin an episode of as many rows as there are keys, which are those of their streams."""
+        self.keys = keys.copy()
+        self.counts = np.zeros(len(keys), np.int64)
+        self.memory = np.empty((len(keys), known.N_COLUMNS))
+        known.begin_memory(keys, self.memory)
+        self._turned = np.zeros(len(keys))
+
+    def begin_rows(self, rows: NDArray[np.int64], keys: NDArray[np.uint64]) -> None:
+        """Begin an episode in these rows alone."""
+        self.keys[rows], self.counts[rows] = keys, 0
+        fresh = np.empty((len(rows), known.N_COLUMNS))
+        known.begin_memory(keys, fresh)
+        self.memory[rows] = fresh
+
+    def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on."""
+        known.remember(observations, self._period, self.memory)
+        inputs = np.empty((len(observations), len(INPUTS)), np.float32)
+        read_rows(
+            observations, self.memory, self.keys, self._random_headings(), inputs, self._turned
+        )
+        if not self._listens:
+            inputs[:, LEAD] = 0.0
+        self.counts += 1
+        self._rows = observations
+        return inputs
+
+    def peek(
+        self, observations: NDArray[np.float32], rows: NDArray[np.int64]
+    ) -> NDArray[np.float32]:
+        """Return the inputs that observations of these rows would make, without going on."""
+        memory = self.memory[rows]
+        known.remember(observations, self._period, memory)
+        inputs = np.empty((len(rows), len(INPUTS)), np.float32)
+        read_rows(
+            observations,
+            memory,
+            self.keys[rows],
+            self._random_headings()[rows],
+            inputs,
+            np.empty(len(rows)),
+        )
+        if not self._listens:
+            inputs[:, LEAD] = 0.0
+        return inputs
+
+    def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
+
+        A robot that is caged by items clears its way instead.
+        """
+        commands = np.zeros((len(outputs), 4))
+        turn_outputs(outputs.astype(np.float64), self._turned, commands)
+        clear_the_way(self._rows, self.memory, commands)
+        known.note_commands(self._rows, commands, self.memory)
+        return commands
+
+    def outputs_for(self, commands: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the outputs (N, 3) that ask for these commands (N, 4); turns are left out."""
+        cos, sin = np.cos(self._turned), np.sin(self._turned)
+        x, y = commands[:, 0], commands[:, 1]
+        return np.stack([cos * x + sin * y, cos * y - sin * x, commands[:, 3]], axis=1)
+
+    def _random_headings(self) -> NDArray[np.int64]:
+        return (self.counts * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+
+
+@kernel
+def read_rows(
+    rows: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    keys: NDArray[np.uint64],
+    random_headings: NDArray[np.int64],
+    inputs: NDArray[np.float32],
+    turned: NDArray[np.float64],
+) -> None:
+    """Fill inputs (N, len(INPUTS)) and how far each frame is turned from the body's (N,) [rad]."""
+    for robot in range(rows.shape[0]):
+        sensed, own, read = rows[robot], memory[robot], inputs[robot]
+        heading = math.atan2(own[known.HEADING_Y], own[known.HEADING_X])
+        beams = round(heading / (2.0 * math.pi / row.N_BEAMS)) % row.N_BEAMS
+        turned[robot] = 2.0 * math.pi * beams / row.N_BEAMS
+        cos, sin = math.cos(turned[robot]), math.sin(turned[robot])
+        for beam in range(row.N_BEAMS):
+            away = sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS]
+            read[beam] = max(0.0, 1.0 - away / WALL_REACH)
+        at = read_neighbours(sensed, cos, sin, read, row.N_BEAMS)
+        at = read_items(sensed, cos, sin, read, at)
+        # The robot that tells the lowest timer may lie: it counts less the more this robot knows.
+        sure = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
+        at = read_lead(sensed, cos, sin, 1.0 - math.tanh(sure), read, at)
+        read[at] = sensed[row.CARRYING]
+        read[at + 1] = sensed[row.CARRYING_REQUESTED]
+        read[at + 2] = sensed[row.IN_DELIVERY_AREA]
+        read[at + 3], read[at + 4] = sensed[row.TIMER_RUNS], sensed[row.TIMER] / 10.0
+        read[at + 5] = sensed[row.CONTACT]
+        at += 6
+        x, y = sensed[row.VELOCITY] / 2.0, sensed[row.VELOCITY + 1] / 2.0
+        read[at], read[at + 1] = cos * x + sin * y, cos * y - sin * x
+        at += 2
+        x, y = own[known.HEADING_X], own[known.HEADING_Y]
+        # The heading is at most half a beam aside, so it is doubled to be as large as other inputs.
+        read[at], read[at + 1] = cos * x + sin * y, 2.0 * (cos * y - sin * x)
+        at += 2
+        x, y = own[known.HOME_X], own[known.HOME_Y]
+        unit = math.tanh(sure) / sure if sure > 0.0 else 0.0
+        read[at], read[at + 1] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
+        read[at + 2] = math.tanh(sure / 3.0)
+        at += 3
+        read[at], read[at + 1] = own[known.FAILED], own[known.STUCK]
+        at += 2
+        angle = random_heading(keys[robot], random_headings[robot]) - turned[robot]
+        read[at], read[at + 1] = math.cos(angle), math.sin(angle)
+
+
+@kernel
+def read_neighbours(
+    sensed: NDArray[np.float32], cos: float, sin: float, read: NDArray[np.float32], at: int
+) -> int:
+    """Fill the inputs of neighbours, from column `at` on; return the column after them."""
+    for place in range(N_FAR + N_NEAR):
+        is_far = place < N_FAR
+        reach = FAR if is_far else NEAR
+        there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (place if is_far else place - N_FAR)
+        x, y = float(sensed[there + 1]), float(sensed[there + 2])
+        away = math.sqrt(x * x + y * y)
+        near = max(0.0, 1.0 - away / reach) / away if away > 0.0 else 0.0
+        read[at], read[at + 1] = near * (cos * x + sin * y), near * (cos * y - sin * x)
+        at += 2
+    return at
+
+
+@kernel
+def read_items(
+    sensed: NDArray[np.float32], cos: float, sin: float, read: NDArray[np.float32], at: int
+) -> int:
+    """Fill the inputs of obstacles and the requested item; return the column after them."""
+    delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+    for place in range(N_OBSTACLES):
+        there = row.ITEMS + row.ITEM_WIDTH * place
+        x, y = float(sensed[there + 1]), float(sensed[there + 2])
+        is_there = 1.0 if delivers and sensed[there] > 0.5 else 0.0
+        read[at] = is_there
+        read[at + 1] = is_there * (cos * x + sin * y)
+        read[at + 2] = is_there * (cos * y - sin * x)
+        at += 3
+    read[at : at + 6] = 0.0
+    for place in range(row.N_ITEMS_IN_VIEW):
+        there = row.ITEMS + row.ITEM_WIDTH * place
+        if sensed[there] > 0.5 and sensed[there + 3] > 0.5:
+            x, y = float(sensed[there + 1]), float(sensed[there + 2])
+            away = max(math.sqrt(x * x + y * y), 1e-9)
+            read[at] = 1.0
+            read[at + 1] = (cos * x + sin * y) / away
+            read[at + 2] = (cos * y - sin * x) / away
+            read[at + 3] = away
+            read[at + 4] = max(0.0, 1.0 - away / NEAR)
+            read[at + 5] = sensed[there + 4]
+    return at + 6
+
+
+@kernel
+def read_lead(
+    sensed: NDArray[np.float32],
+    cos: float,
+    sin: float,
+    trust: float,
+    read: NDArray[np.float32],
+    at: int,
+) -> int:
+    """Fill the inputs of the lowest timer heard, times `trust`; return the column after them."""
+    heard = sensed[row.LOWEST_TIMER] * trust
+    x, y = float(sensed[row.LOWEST_TIMER + 1]), float(sensed[row.LOWEST_TIMER + 2])
+    away = math.sqrt(x * x + y * y)
+    unit = heard / away if away > 0.0 else 0.0
+    read[at] = heard
+    read[at + 1], read[at + 2] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
+    read[at + 3] = heard * away / 4.0
+    read[at + 4] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
+    return at + 5
+
+
+@kernel
+def random_heading(key: np.uint64, number: int) -> float:
+    """Return a robot's random direction number `number`, in its own frame [rad]."""
+    return 2.0 * math.pi * uniform(key, FIRST_RANDOM_HEADING + number)
+
+
+@kernel
+def turn_outputs(
+    outputs: NDArray[np.float64], turned: NDArray[np.float64], commands: NDArray[np.float64]
+) -> None:
+    """Fill the commands (N, 4) of outputs (N, 3): along, aside, gripper; clipped, no turns."""
+    for robot in range(outputs.shape[0]):
+        cos, sin = math.cos(turned[robot]), math.sin(turned[robot])
+        along = min(max(outputs[robot, 0], -1.0), 1.0)
+        aside = min(max(outputs[robot, 1], -1.0), 1.0)
+        longer = max(math.sqrt(along * along + aside * aside), 1.0)
+        commands[robot, 0] = (cos * along - sin * aside) / longer
+        commands[robot, 1] = (sin * along + cos * aside) / longer
+        commands[robot, 2] = 0.0
+        commands[robot, 3] = min(max(outputs[robot, 2], -1.0), 1.0)

@@ -1,0 +1,97 @@
+"""A robot's memory, made of its own observations and commands alone.
+
+Directions are in the robot's own frame, which drifts; so what it remembers of them fades.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.kernels import kernel, uniform
+
+# Columns of a memory array (N, N_COLUMNS).
+HEADING_X, HEADING_Y = 0, 1  # of its last motion, length 1
+HOME_X, HOME_Y = 2, 3  # fading sum of its directions into the delivery area, less those out
+WAS_INSIDE = 4  # the delivery area
+FAILED = 5  # 1: it just met its own failure; fades over FAILURE_TIME
+STUCK = 6  # 1: it just stood still with the requested item; falls to 0 in STUCK_TIME
+HELD = 7  # the last gripper command: 0 open, 1 hold, 2 hold the requested item it carries
+STANDING = 8  # [s] that it stood still with the requested item, less those that it moved
+CLEARING = 9  # [s] that are left to clear its way out of a cage of items; see `clearing`
+N_COLUMNS = 10
+
+FAILURE_TIME = 60.0  # [s]
+HOME_TIME = 10.0  # [s], in which a remembered direction fades: by then a gyro may have drifted
+STUCK_TIME = 1.5  # [s]
+CAGED_TIME = 5.0  # [s] of standing, after which a robot takes itself for caged
+CLEARING_TIME = 6.0  # [s]
+SURELY_IN_REACH = 0.24  # [m]; such an item is lifted by a gripper that works
+STANDS = 0.2  # [m/s] and less
+MOVES = 0.1  # [m/s] and more: its velocity has a direction
+
+
+@kernel
+def begin_memory(keys: NDArray[np.uint64], memory: NDArray[np.float64]) -> None:
+    """Fill memories (N, N_COLUMNS) of robots that know nothing, with random headings."""
+    memory[:] = 0.0
+    for robot in range(memory.shape[0]):
+        angle = 2.0 * math.pi * uniform(keys[robot], 0)
+        memory[robot, HEADING_X], memory[robot, HEADING_Y] = math.cos(angle), math.sin(angle)
+
+
+@kernel
+def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float64]) -> None:
+    """Take what the rows (N, D) tell into the memories, once a control period [s]."""
+    for robot in range(rows.shape[0]):
+        sensed, known = rows[robot], memory[robot]
+        x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
+        speed = math.sqrt(x * x + y * y)
+        is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
+        delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+
+        known[FAILED] *= 1.0 - period / FAILURE_TIME
+        if known[HELD] > 0.5 and sensed[row.CARRYING] < 0.5:
+            for place in range(row.N_ITEMS_IN_VIEW):
+                item = row.ITEMS + row.ITEM_WIDTH * place
+                away = math.sqrt(sensed[item + 1] ** 2 + sensed[item + 2] ** 2)
+                if sensed[item] > 0.5 and sensed[item + 3] > 0.5 and away < SURELY_IN_REACH:
+                    known[FAILED] = 1.0
+        if is_inside and delivers:
+            known[FAILED] = 1.0
+
+        known[STUCK] = max(0.0, known[STUCK] - period / STUCK_TIME)
+        stands = delivers and known[HELD] > 1.5 and speed < STANDS
+        if stands:
+            known[STUCK] = 1.0
+        known[STANDING] = max(0.0, known[STANDING] + (period if stands else -period))
+        known[CLEARING] = max(0.0, known[CLEARING] - period)
+        if known[STANDING] > CAGED_TIME and not is_inside:
+            known[STANDING], known[CLEARING] = 0.0, CLEARING_TIME
+
+        kept = math.exp(-period / HOME_TIME)
+        known[HOME_X] *= kept
+        known[HOME_Y] *= kept
+        if is_inside != (known[WAS_INSIDE] > 0.5) and speed > MOVES:
+            way = 1.0 if is_inside else -1.0
+            known[HOME_X] += way * x / speed
+            known[HOME_Y] += way * y / speed
+        known[WAS_INSIDE] = 1.0 if is_inside else 0.0
+
+
+@kernel
+def note_commands(
+    rows: NDArray[np.float32], commands: NDArray[np.float64], memory: NDArray[np.float64]
+) -> None:
+    """Remember the commands (N, 4) that were given upon these rows."""
+    for robot in range(rows.shape[0]):
+        x, y, grips = commands[robot, 0], commands[robot, 1], commands[robot, 3]
+        speed = math.sqrt(x * x + y * y)
+        if speed > 0.05:
+            memory[robot, HEADING_X], memory[robot, HEADING_Y] = x / speed, y / speed
+        memory[robot, HELD] = 1.0 if grips > 0.5 else 0.0
+        if rows[robot, row.CARRYING_REQUESTED] > 0.5 and grips > -0.5:
+            memory[robot, HELD] = 2.0

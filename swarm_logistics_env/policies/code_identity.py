@@ -1,0 +1,127 @@
+"""What names a policy's behaviour: its class, its parameters, and the code that it uses."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import inspect
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.records import Record
+
+OWN_PACKAGE = __name__.partition(".")[0]
+# These hold messages and validation, so that they decide nothing that a policy does. The package
+# itself imports all that it offers, whatever a policy uses of it.
+WITHOUT_BEHAVIOUR = frozenset({OWN_PACKAGE, f"{OWN_PACKAGE}.errors", f"{OWN_PACKAGE}.records"})
+
+
+def identity(policy: Policy) -> str:
+    """Return text that changes whenever the policy's behaviour may have changed.
+
+    It is the policy's own attribute `identity` if it has one. Otherwise it names the class, its
+    `parameters`, and a digest of the code (see `code_digest`).
+    """
+    own = getattr(policy, "identity", None)
+    if own is not None:
+        return str(own)
+    kind = type(policy)
+    parameters: Any = getattr(policy, "parameters", {})
+    if isinstance(parameters, Record):
+        parameters = parameters.model_dump(mode="json")
+    return json.dumps(
+        {
+            "class": f"{kind.__module__}:{kind.__qualname__}",
+            "parameters": parameters,
+            "source": code_digest(kind),
+        },
+        sort_keys=True,
+        default=repr,
+    )
+
+
+@functools.cache
+def code_digest(kind: type) -> str:
+    """Return 16 hexadecimal digits that change with the code which a class uses.
+
+    That code is the modules of the class and of its base classes, and whatever these import from
+    their own package and from this one, directly or not. Docstrings, lines that only comment and
+    blank lines do not count. The digest is empty if the source of the class cannot be found.
+    """
+    packages = {OWN_PACKAGE, kind.__module__.partition(".")[0]}
+    used: dict[str, Path] = {}
+    for base in kind.__mro__:
+        if base.__module__.partition(".")[0] in packages:
+            try:
+                _follow(base.__module__, Path(inspect.getfile(base)), packages, used)
+            except (TypeError, OSError):  # typed into an interpreter
+                continue
+    digest = hashlib.sha256()
+    for name, path in sorted(used.items()):
+        digest.update(name.encode() + b"\0" + _content(path) + b"\0")
+    return digest.hexdigest()[:16] if used else ""
+
+
+def without_prose(source: str) -> str:
+    """Return Python source without docstrings, lines that only comment, and blank lines."""
+    prose: set[int] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            first = node.body[0] if node.body else None
+            if isinstance(first, ast.Expr) and ast.get_docstring(node, clean=False) is not None:
+                prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
+    lines = enumerate(source.splitlines(), start=1)
+    return "\n".join(
+        line.rstrip()
+        for number, line in lines
+        if number not in prose and line.strip() and not line.lstrip().startswith("#")
+    )
+
+
+def _content(path: Path) -> bytes:
+    if path.suffix != ".py":
+        return path.read_bytes()
+    return without_prose(path.read_text(encoding="utf-8")).encode()
+
+
+def _follow(name: str, path: Path, packages: set[str], used: dict[str, Path]) -> None:
+    """Add a module to `used`, and those of `packages` that it imports."""
+    used[name] = path
+    if path.suffix != ".py":
+        return
+    parent = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    for imported in _imported(ast.parse(path.read_text(encoding="utf-8")), parent):
+        # What is imported may be a module, or something in the module that is named before it.
+        for module in (imported, imported.rpartition(".")[0]):
+            found = _file_of(module) if module.partition(".")[0] in packages else None
+            if found is not None:
+                if module not in used and module not in WITHOUT_BEHAVIOUR:
+                    _follow(module, found, packages, used)
+                break
+
+
+def _imported(tree: ast.AST, parent: str) -> Iterator[str]:
+    """Return the full name of everything that is imported anywhere in a module of `parent`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = parent.split(".")[: 1 - node.level or None] if node.level else []
+            base = ".".join([*above, node.module] if node.module else above)
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _file_of(module: str) -> Path | None:
+    """Return the file of a module whose package is loaded; None if there is none."""
+    package, *rest = module.split(".")
+    for folder in getattr(sys.modules.get(package), "__path__", ()):
+        place = Path(folder, *rest)
+        for file in (place / "__init__.py", place.with_suffix(".py")):
+            if file.is_file():
+                return file
+    return None

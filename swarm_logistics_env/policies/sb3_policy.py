@@ -1,0 +1,79 @@
+"""Policies that stable-baselines3 saved: reading such a file executes the code in it."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.observations import n_columns
+from swarm_logistics_env.scenario import Scenario
+
+SUFFIX = ".zip"
+
+
+class StableBaselinesPolicy:
+    """A PPO model that stable-baselines3 saved; it gives its most likely command each time.
+
+    It should have learned from bare observation rows (D,) to give commands (4,), as from
+    `adapters.SwarmVecEnv`; what normalised its observations is not in the file.
+
+    Args:
+        path: of the .zip file.
+        trust_code: whether to read it, which executes whatever code is in it.
+
+    Raises:
+        PolicyError: it is not trusted, cannot be read, has other spaces, or stable-baselines3 is
+            missing.
+    """
+
+    def __init__(self, path: Path, *, trust_code: bool = False) -> None:
+        if not trust_code:
+            raise PolicyError(
+                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
+                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
+            )
+        try:
+            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+        except OSError as error:
+            raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
+        self._model = _model(path)
+        found = self._model.observation_space.shape, self._model.action_space.shape
+        wanted = (n_columns(Scenario()),), (4,)
+        if found != wanted:
+            raise PolicyError(
+                f"{path} maps observations {found[0]} to commands {found[1]}: should map "
+                f"{wanted[0]} to {wanted[1]}"
+            )
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode; nothing here is random."""
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return commands (N, 4) for observation rows (N, D)."""
+        commands, _ = self._model.predict(observations, deterministic=True)
+        return np.asarray(commands, dtype=np.float64)
+
+
+def _model(path: Path) -> Any:
+    try:
+        from stable_baselines3 import PPO
+    except ImportError:
+        raise PolicyError(
+            f"{path} needs stable-baselines3: install swarm-logistics-env[train]"
+        ) from None
+    import pickle
+    import zipfile
+
+    try:
+        return PPO.load(path, device="cpu")
+    except (
+        ValueError, KeyError, TypeError, AttributeError, RuntimeError, ImportError, EOFError,
+        OSError, zipfile.BadZipFile, pickle.UnpicklingError,
+    ) as error:  # fmt: skip
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise PolicyError(f"{path} is no PPO model of stable-baselines3: {reason}") from None

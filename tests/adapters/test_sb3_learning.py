@@ -1,0 +1,96 @@
+"""PPO of stable-baselines3, its wrappers and callbacks on a VecEnv of worlds."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
+
+from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
+
+Played = Callable[[SwarmVecEnv, int], list[Any]]
+Small = dict[str, Any]
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    """Nets this small are slower on several threads, the more so beside other tests."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def learned(small: Small, n_steps: int, threads: int = 2) -> Any:
+    # Rollouts are cut in mid-episode.
+    env = SwarmVecEnv(n_worlds=3, n_robots=[2, 5], threads=threads, **small)
+    model = PPO(
+        "MlpPolicy", env, n_steps=32, batch_size=96, n_epochs=2, seed=0,
+        policy_kwargs={"net_arch": [16]},
+    )  # fmt: skip
+    return model.learn(n_steps)
+
+
+def parameters(model: Any) -> list[Any]:
+    return [tensor.numpy() for tensor in model.policy.state_dict().values()]
+
+
+def test_learning_twice_gives_equal_parameters_whatever_the_threads(small: Small) -> None:
+    first = parameters(learned(small, 4000))
+    np.testing.assert_equal(parameters(learned(small, 4000)), first)
+    np.testing.assert_equal(parameters(learned(small, 4000, threads=1)), first)
+    shorter = parameters(learned(small, 2000))
+    assert any(not np.array_equal(one, other) for one, other in zip(first, shorter, strict=True))
+
+
+class Ends(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
+    """Collects what the infos of done rows say."""
+
+    def _on_step(self) -> bool:
+        self.ends = getattr(self, "ends", [])
+        self.ends += [info for info in self.locals["infos"] if "episode" in info]
+        return True
+
+
+def test_their_wrappers_callbacks_and_evaluation_work(small: Small) -> None:
+    env = VecNormalize(
+        VecMonitor(
+            VecCheckNan(SwarmVecEnv(n_worlds=2, n_robots=3, threads=2, **small)),
+            info_keywords=("delivered", "n_robots", "padding"),
+        )
+    )
+    model = PPO(
+        "MlpPolicy", env, n_steps=25, batch_size=50, seed=0, policy_kwargs={"net_arch": [16]}
+    )
+    seen = Ends()
+    model.learn(2 * 150, callback=seen)
+    assert len(seen.ends) == 12
+    assert {info["episode"]["l"] for info in seen.ends} == {20}
+    assert {info["episode"]["n_robots"] for info in seen.ends} == {3}
+    assert env.get_attr("render_mode") == [None] * 6
+    mean, _ = evaluate_policy(model, env, n_eval_episodes=6)
+    assert np.isfinite(mean)
+
+
+def test_asking_for_adapters_does_not_load_torch() -> None:
+    script = (
+        "import sys, swarm_logistics_env.adapters as a; a.CentralEnv; print(*sys.modules);"
+        "a.SwarmVecEnv; assert 'torch' in sys.modules"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert not {"torch", "stable_baselines3"} & set(done.stdout.split())

@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import swarm_logistics_env
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.cli import app
+
+SMALL = [
+    *("--set", "n_robots=3"),
+    *("--set", "n_items=4"),
+    *("--set", "warehouse_width=3"),
+    *("--set", "warehouse_height=3"),
+    *("--set", "delivery_width=1"),
+    *("--set", "duration=20"),
+]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "--sead", "3"], "--sead"),
+        (["run", "--seed", "x"], "valid integer"),
+        (["run", "\n"], "extra argument"),
+        (["run", "--policy", "a\x1b[31m\udc80"], r"'a\x1b[31m\udc80'"),
+        (["run", "--set", "n_robot=40"], "did you mean 'n_robots'?"),
+        (["run", "--set", "n_robots"], "FIELD=VALUE"),
+        (["run", "--set", "n_robots=-3"], "n_robots = -3"),
+        (["run", "--preset", "papr"], "did you mean 'paper'?"),
+        (["run", "--policy", "swarm-td"], "did you mean 'swarm-dt'?"),
+        (["run", "--fault", "FM9"], "no failure mode 'FM9'"),
+        (["run", "--fault", "FM1:x"], "MODE[:ROBOTS][@ONSET]"),
+        (["run", "--fault", "FM1@1.2.3"], "number of seconds"),
+        (["run", "--fault", "FM1:99"], "at most n_robots = 25"),
+        (["scenario", "--set", "delivery_width=10"], "leaves no storage"),
+        (["study", "run", "papr", "--out", "x"], "did you mean 'paper'?"),
+        (["study", "run", "paper"], "--out"),
+        (["study", "run", "none.toml", "--out", "x"], "cannot read the study file none.toml"),
+        (["study", "run", "quick", "--out", "x", "--shard", "0/2"], "i/n with i from 1 to n"),
+        (["study", "run", "quick", "--out", "x", "--engine", "slurm"], "no engine 'slurm'"),
+        (["study", "merge", "nowhere", "--out", "x"], "no study in nowhere"),
+        (["study", "compare", "nowhere", "nowhere", "--fail-if", "R"], "should be [possibly]"),
+        (["study", "compare", "nowhere", "nowhere"], "no study in nowhere"),
+        (["study", "power", "quik"], "did you mean 'quick'?"),
+        (["study", "import", "none.csv", "--out", "x"], "cannot read none.csv"),
+        (["study", "plan", "quik"], "did you mean 'quick'?"),
+        (["study", "plan", "quick", "--policy", "nobody"], "'nobody'"),
+        (["study", "report", "nowhere"], "no study in nowhere"),
+        (["study", "run", "paper", "--out", "x", "--seeds", "0"], "--seeds"),
+        (["study", "run", "paper", "--out", "x", "--policy", "nobody"], "'nobody'"),
+        (["study", "export", "nowhere", "--to", "x.csv"], "no study in nowhere"),
+        (["study", "fly"], "fly"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert app.run(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert words in printed.err
+    assert len(printed.err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(Scenario, "sheet", broken)
+    with pytest.raises(ZeroDivisionError):
+        app.run(["scenario"])
+
+
+def test_no_command_prints_the_help_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run([]) == 2
+    printed = capsys.readouterr()
+    assert "Commands" in printed.out
+    assert printed.err == ""
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        ("Torn", ("ZeroDivisionError: the motor is gone", "own_faulty.py, line 6")),
+        ("Short", ("TypeError: Short.reset() takes 2 positional arguments but 3 were given",)),
+        ("Unmade", ("'own_faulty:Unmade' cannot be made: KeyError: 'gain'",)),
+        ("./own_faulty.py", ("should be MODULE:CLASS, as 'own_faulty:Torn'",)),
+        ("unread", ("'unread:Torn' cannot be imported: SyntaxError", "line 1")),
+    ],
+)
+def test_what_a_policy_of_ones_own_raises_is_one_sentence(
+    policy: str,
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "own_faulty.py").write_text(
+        "import math\n"
+        "class Torn:\n"
+        "    def reset(self, n_robots, seed): ...\n"
+        "    def act(self, observations): return self.move()\n"
+        "    def move(self):\n"
+        "        raise ZeroDivisionError('the motor\\nis gone')\n"
+        "class Short(Torn):\n"
+        "    def reset(self, n_robots): ...\n"
+        "class Unmade(Torn):\n"
+        "    def __init__(self): {}['gain']\n"
+    )
+    (tmp_path / "unread.py").write_text("class Torn(:\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    name = f"own_faulty:{policy}" if policy.isalpha() and policy != "unread" else f"{policy}:Torn"
+    assert app.run(["run", "--policy", name, *SMALL]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    for part in words:
+        assert part in said
+
+
+def test_scenario_sheet_and_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["scenario", "--set", "n_robots=40"]) == 0
+    printed = capsys.readouterr().out
+    assert "| n_robots | 40 (default 25) |" in printed
+    assert "https://arxiv.org/abs/2311.01944" in printed  # whose defaults these are
+    assert app.run(["scenario", "--preset", "paper_scalability", "--json"]) == 0
+    assert Scenario.from_json(capsys.readouterr().out) == Scenario.preset("paper_scalability")
+
+
+def test_run_prints_what_the_episode_gave(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["run", "--seed", "1", *SMALL, "--fault", "FM1:2@5"]) == 0
+    first = capsys.readouterr().out
+    assert "P = " in first
+    assert "seed 1" in first
+    assert "failed robots " in first
+    assert "times real time" in first
+    assert app.run(["run", "--seed", "1", *SMALL, "--fault", "FM1:2@5"]) == 0
+    assert capsys.readouterr().out.splitlines()[:-1] == first.splitlines()[:-1]
+
+
+def test_policy_of_ones_own_is_found_where_the_command_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "lazy_policy.py").write_text(
+        "import numpy as np\n"
+        "class Lazy:\n"
+        "    def reset(self, n_robots, seed):\n"
+        "        self.n_robots = n_robots\n"
+        "    def act(self, observations):\n"
+        "        return np.zeros((self.n_robots, 4))\n"
+    )
+    # As the installed script is started: without the folder it is run in.
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    monkeypatch.chdir(tmp_path)
+    assert app.run(["run", "--policy", "lazy_policy:Lazy", *SMALL]) == 0
+    assert "P = 0 items" in capsys.readouterr().out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__

@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+
+STORAGE = 8.0  # [m], its width
+
+
+@pytest.fixture
+def world() -> Warehouse:
+    """A world of four robots whose state the tests change by hand, as a step would."""
+    made = Warehouse(Scenario(n_robots=4, n_items=6))
+    made.reset(0)
+    made.state.requested = 2
+    return made
+
+
+def give(world: Warehouse, robot: int, item: int) -> None:
+    world.state.robot_item[robot] = item
+    world.state.item_carrier[item], world.state.item_status[item] = robot, CARRIED
+
+
+def put_down(world: Warehouse, robot: int) -> None:
+    item = world.state.robot_item[robot]
+    world.state.robot_item[robot] = NOBODY
+    world.state.item_carrier[item], world.state.item_status[item] = NOBODY, STORED
+
+
+def deliver(world: Warehouse, robot: int, next_request: int) -> None:
+    put_down(world, robot)
+    world.state.item_status[world.state.requested] = DELIVERED
+    world.state.delivery_times.append(1.0)
+    world.state.delivered_by.append(robot)
+    world.state.requested = next_request
+
+
+def started(world: Warehouse, **weights: float) -> RewardTerms:
+    terms = RewardTerms(weights or None)
+    terms.begin(world)
+    return terms
+
+
+def test_by_default_everybody_earns_one_per_delivery(world: Warehouse) -> None:
+    give(world, 1, 2)
+    terms = started(world)
+    assert terms.pay(world).tolist() == [0.0] * 4
+    deliver(world, 1, next_request=3)
+    assert terms.pay(world).tolist() == [1.0] * 4
+    assert terms.pay(world).tolist() == [0.0] * 4
+
+
+def test_own_delivery_is_the_deliverers(world: Warehouse) -> None:
+    give(world, 1, 2)
+    give(world, 3, 4)
+    terms = started(world, own_delivery=2.0)
+    deliver(world, 1, next_request=4)
+    deliver(world, 3, next_request=0)
+    assert terms.pay(world).tolist() == [0.0, 2.0, 0.0, 2.0]
+    assert terms.pay(world).tolist() == [0.0] * 4
+
+
+def test_lift_requested_pays_for_taking_up_and_fines_letting_go(world: Warehouse) -> None:
+    terms = started(world, lift_requested=1.0)
+    give(world, 0, 5)  # not the requested one
+    assert terms.pay(world).tolist() == [0.0] * 4
+    give(world, 1, 2)
+    assert terms.pay(world).tolist() == [0.0, 1.0, 0.0, 0.0]
+    assert terms.pay(world).tolist() == [0.0] * 4
+    put_down(world, 1)
+    assert terms.pay(world).tolist() == [0.0, -1.0, 0.0, 0.0]
+
+
+def test_lift_requested_pays_one_and_fines_the_other_when_an_item_changes_hands(
+    world: Warehouse,
+) -> None:
+    give(world, 1, 2)
+    terms = started(world, lift_requested=1.0)
+    put_down(world, 1)
+    give(world, 3, 2)
+    assert terms.pay(world).tolist() == [0.0, -1.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("next_request", [3, 2])
+def test_a_delivery_is_no_letting_go_even_if_the_same_item_is_asked_for_again(
+    world: Warehouse, next_request: int
+) -> None:
+    give(world, 1, 2)
+    terms = started(world, lift_requested=1.0)
+    deliver(world, 1, next_request)
+    assert terms.pay(world).tolist() == [0.0] * 4
+
+
+def test_approach_pays_metres_towards_the_delivery_area(world: Warehouse) -> None:
+    give(world, 1, 2)
+    world.state.robot_position[1] = [3.0, 5.0]
+    terms = started(world, approach=10.0)
+    world.state.robot_position[1] = [3.2, 1.0]
+    world.state.robot_position[0] += 0.1  # who does not carry it earns nothing
+    assert terms.pay(world) == pytest.approx([0.0, 2.0, 0.0, 0.0])
+    world.state.robot_position[1] = [2.9, 1.0]
+    assert terms.pay(world) == pytest.approx([0.0, -3.0, 0.0, 0.0])
+    world.state.robot_position[1] = [STORAGE + 1.0, 1.0]  # deeper inside is no nearer
+    assert terms.pay(world) == pytest.approx([0.0, 51.0, 0.0, 0.0])
+    world.state.robot_position[1] = [STORAGE + 0.2, 1.0]
+    assert terms.pay(world) == pytest.approx([0.0] * 4)
+
+
+def test_approach_pays_nothing_for_a_change_of_item_or_carrier(world: Warehouse) -> None:
+    give(world, 1, 2)
+    terms = started(world, approach=1.0)
+    put_down(world, 1)
+    give(world, 3, 2)
+    assert terms.pay(world).tolist() == [0.0] * 4
+    give(world, 0, 5)
+    deliver(world, 3, next_request=5)
+    assert terms.pay(world).tolist() == [0.0] * 4
+
+
+def test_contact_pays_its_seconds(world: Warehouse) -> None:
+    terms = started(world, contact=-1.0)
+    world.state.robot_contact[:] = [True, False, False, True]
+    assert terms.pay(world) == pytest.approx([-0.1, 0.0, 0.0, -0.1])
+
+
+def test_terms_are_weighed_and_added(world: Warehouse) -> None:
+    give(world, 1, 2)
+    terms = started(world, delivery=0.5, own_delivery=2.0, contact=-10.0)
+    world.state.robot_contact[:] = [True, False, False, False]
+    deliver(world, 1, next_request=3)
+    assert terms.pay(world) == pytest.approx([-0.5, 2.5, 0.5, 0.5])
+
+
+def test_without_terms_nobody_earns(world: Warehouse) -> None:
+    terms = RewardTerms({})
+    terms.begin(world)
+    world.state.robot_contact[:] = True
+    assert terms.pay(world).tolist() == [0.0] * 4
+
+
+def test_after_the_last_delivery_every_term_still_pays(world: Warehouse) -> None:
+    give(world, 1, 2)
+    terms = RewardTerms(dict.fromkeys(REWARD_TERMS, 1.0))
+    terms.begin(world)
+    world.state.robot_contact[:] = False
+    deliver(world, 1, next_request=NOBODY)
+    assert terms.pay(world).tolist() == [1.0, 2.0, 1.0, 1.0]
+    assert terms.pay(world).tolist() == [0.0] * 4
+
+
+@pytest.mark.parametrize(
+    ("weights", "complaint"),
+    [
+        ({"delivry": 1.0}, "no reward term 'delivry'; did you mean 'delivery'?"),
+        ({"speed_of_light": 1.0}, "no reward term 'speed_of_light'; known: approach, contact"),
+        ({"delivery": float("nan")}, r"rewards\['delivery'\] = nan: should be a finite number"),
+        ({"delivery": None}, r"rewards\['delivery'\] = None: should be a finite number"),
+        ({"delivery": "1"}, r"rewards\['delivery'\] = '1': should be a finite number"),
+    ],
+)
+def test_unknown_terms_and_weights_that_are_no_numbers_are_refused(
+    weights: dict[str, Any], complaint: str
+) -> None:
+    with pytest.raises(SetupError, match=complaint):
+        RewardTerms(weights)
+
+
+def test_every_term_pays_finite_numbers_for_every_robot_in_a_running_world() -> None:
+    world = Warehouse(Scenario(n_robots=6, n_items=8, warehouse_width=3, warehouse_height=3))
+    world.reset(0, [Fault("removed", 2, onset=1.0)])
+    terms = RewardTerms(dict.fromkeys(REWARD_TERMS, 1.0))
+    terms.begin(world)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        world.step(rng.uniform(-1.0, 1.0, (6, 4)))
+        paid = terms.pay(world)
+        assert paid.shape == (6,)
+        assert np.isfinite(paid).all()

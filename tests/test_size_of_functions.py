@@ -1,0 +1,30 @@
+"""Functions are short enough to be read and take few parameters."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import swarm_logistics_env
+
+MOST_LINES, MOST_PARAMETERS = 80, 12
+PACKAGE = Path(swarm_logistics_env.__file__).parent
+# A command's parameters are the options of its command line.
+FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.parent.name != "cli")
+TOO_BIG = {"spi/judgement.py": ["judge: 8 parameters, 117 lines"]}
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_functions_are_short_and_take_few_parameters(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    too_big = []
+    for function in functions:
+        given = function.args
+        n_parameters = len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
+        n_lines = (function.end_lineno or function.lineno) - function.lineno + 1
+        if n_parameters > MOST_PARAMETERS or n_lines > MOST_LINES:
+            too_big.append(f"{function.name}: {n_parameters} parameters, {n_lines} lines")
+    assert too_big == TOO_BIG.get(path.relative_to(PACKAGE).as_posix(), [])
