@@ -16,8 +16,8 @@ from swarm_logistics_env.cli.study import (
 )
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.studies.comparing import Answer
-    from swarm_logistics_env.studies.judgement import Findings
+    from swarm_logistics_env.studies.gate import Answer
+    from swarm_logistics_env.studies.results import StudyResults
 
 AtOption = Annotated[
     str, typer.Option(metavar="TEXT", help="Only comparisons whose name holds this.")
@@ -48,13 +48,13 @@ def power_command(
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
     from swarm_logistics_env.cli.tables import show
     from swarm_logistics_env.errors import StudyError
-    from swarm_logistics_env.studies.power import demands
-    from swarm_logistics_env.studies.reporting.sections import Section
+    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.studies.seeds_needed import demands
 
-    findings = _pilot(asked, pilot_seeds, policies, processes, trust_code)
+    results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
-    for demand in demands(findings, effect, power):
-        comparison = demand.judgement.comparison
+    for demand in demands(results, effect, power):
+        comparison = demand.test.comparison
         name = f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}"
         if indicator not in (None, comparison.indicator) or at not in name:
             continue
@@ -71,12 +71,12 @@ def power_command(
     if not rows:
         asked_for = [] if indicator is None else [f"--indicator {indicator}"]
         asked_for += [f"--at {at!r}"] if at else []
-        made = dict.fromkeys(j.comparison.indicator for j in findings.judgements)
+        made = dict.fromkeys(j.comparison.indicator for j in results.tests)
         raise StudyError(
             f"{' '.join(asked_for) or asked}: the study makes no such comparison; "
             f"it asks about {', '.join(made) or 'nothing'}"
         )
-    n_seeds = len(findings.plan.seeds)
+    n_seeds = len(results.plan.seeds)
     columns = (
         "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power on average",
         "power in nine pilots of ten at least",
@@ -101,8 +101,7 @@ def compare_command(
 ) -> None:
     """Compare two studies, condition by condition; end with 1 if a gate fails."""
     from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.comparing import answers
-    from swarm_logistics_env.studies.gate import Gate
+    from swarm_logistics_env.studies.gate import Gate, answers
     from swarm_logistics_env.studies.matching import match
 
     gates = [Gate.parse(text) for text in fail_if or []]
@@ -126,7 +125,7 @@ def _pilot(
     policies: list[str] | None,
     processes: int | None,
     trust_code: bool,
-) -> Findings:
+) -> StudyResults:
     import os
 
     from swarm_logistics_env.errors import StudyError
@@ -143,7 +142,7 @@ def _pilot(
 
 def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
     from swarm_logistics_env.cli.tables import show
-    from swarm_logistics_env.studies.reporting.sections import Section
+    from swarm_logistics_env.report.result_tables import Section
 
     rows = []
     for answer in said:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.engines import Engine
     from swarm_logistics_env.studies.plan import Plan
-    from swarm_logistics_env.studies.reporting.sections import Section
     from swarm_logistics_env.studies.shards import Shard
     from swarm_logistics_env.studies.study import Tally
 
@@ -167,7 +167,7 @@ def merge_command(
     out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
 ) -> None:
     """Make one store of those that shards or machines have filled."""
-    from swarm_logistics_env.studies.merging import merge
+    from swarm_logistics_env.studies.shards import merge
 
     typer.echo(f"{merge(directories, out)} runs in {out}")
 
@@ -209,11 +209,11 @@ def duration(seconds: float) -> str:
 
 
 def _conditions(plan: Plan) -> Section:
-    from swarm_logistics_env.studies.reporting.sections import Section
+    from swarm_logistics_env.report.result_tables import Section
 
     uses: dict[str, list[str]] = {}
     for _, table, arm in plan.cells:
-        uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.level})")
+        uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.setting})")
     rows = (
         (condition.policy.label, str(condition.scenario.n_robots), "; ".join(uses[condition.key]))
         for condition in plan.conditions
@@ -248,18 +248,21 @@ def _show(asked: Study) -> None:
     from dataclasses import replace
 
     from swarm_logistics_env.cli.tables import show
-    from swarm_logistics_env.studies.reporting.beyond_faults import beyond_faults
-    from swarm_logistics_env.studies.reporting.files import write_report
-    from swarm_logistics_env.studies.reporting.images import how_to_get_figures, missing_packages
-    from swarm_logistics_env.studies.reporting.sections import sections
+    from swarm_logistics_env.report.further_measures import beyond_faults
+    from swarm_logistics_env.report.report_files import (
+        how_to_get_figures,
+        missing_packages,
+        write_report,
+    )
+    from swarm_logistics_env.report.result_tables import sections
 
-    findings = asked.findings()
-    for section in (*sections(findings), *beyond_faults(findings)):
+    results = asked.findings()
+    for section in (*sections(results), *beyond_faults(results)):
         if section.columns or section.lines:  # else it is a figure
             show(replace(section, figures=()))
     assert asked.out is not None
-    # Of the findings that were shown: nothing is read and judged twice.
-    written = write_report(findings, asked.out)
+    # Of the results that were shown: nothing is read and judged twice.
+    written = write_report(results, asked.out)
     typer.echo(f"Written: {', '.join(str(path) for path in written)}")
     if missing := missing_packages():
         typer.echo(how_to_get_figures(missing))

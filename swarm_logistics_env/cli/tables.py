@@ -6,8 +6,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from swarm_logistics_env.studies.reporting.markdown import section_markdown
-from swarm_logistics_env.studies.reporting.sections import Section
+from swarm_logistics_env.report.markup import section_markdown
+from swarm_logistics_env.report.result_tables import Section
 
 
 def show(section: Section) -> None:

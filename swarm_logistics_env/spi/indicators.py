@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, SupportsIndex
 
-from .errors import IndicatorError
-from .inputs import count, finite
-from .judgement import judge
+from .estimate import judge
+from .inputs import IndicatorError, count, finite
 
 if TYPE_CHECKING:
     from collections.abc import Collection

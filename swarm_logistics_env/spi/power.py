@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, count, finite
+from .inputs import IndicatorError, between_0_and_1, count, finite
 
 if TYPE_CHECKING:
     from .estimate import Estimate

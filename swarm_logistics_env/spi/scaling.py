@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, performance
+from .inputs import IndicatorError, between_0_and_1, performance
 from .scaling_laws import (
     CURVES,
     peak_of,

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, delivery_times
+from .inputs import IndicatorError, between_0_and_1, delivery_times
 
 SWAPS = 999  # of the test that there is any loss
 SIMULATIONS = 400  # of each candidate time: the 95 % limit of its likelihood ratio is then +-1 %

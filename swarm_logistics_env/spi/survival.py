@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, numbers
+from .inputs import IndicatorError, between_0_and_1, numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

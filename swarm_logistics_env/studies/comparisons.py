@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypedDict
 
@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.estimate import Estimate, Indicator
 from swarm_logistics_env.studies.conditions import Condition
 
 Performance = Callable[["Arm"], NDArray[np.float64]]
 
 
-class Level(NamedTuple):
-    """One level of a factor: a swarm size, a fault, a parameter's value, or another policy."""
+class Setting(NamedTuple):
+    """One setting of a factor: a swarm size, a fault, a parameter's value, or another policy."""
 
     kind: Literal["size", "fault", "parameter", "policy"]
     name: str
@@ -39,20 +40,20 @@ class Level(NamedTuple):
         return f"{self.name}, m = {self.value:g}{start}"
 
 
-NO_FAULT = Level("fault", "none", 0)
-OTHER_BEHAVIOUR = Level("fault", "other behaviour", 0)
+NO_FAULT = Setting("fault", "none", 0)
+OTHER_BEHAVIOUR = Setting("fault", "other behaviour", 0)
 
 
 @dataclass(frozen=True)
 class Arm:
     """A condition in the part that it plays in a comparison."""
 
-    level: Level
+    setting: Setting
     condition: Condition
 
 
 @dataclass(frozen=True)
-class Twins:
+class NullPair:
     """Two arms without fault that share worlds, not behaviour: what chance alone makes of them.
 
     Attributes:
@@ -75,8 +76,8 @@ class Question(NamedTuple):
     """What a comparison asks, whichever policy it is asked of."""
 
     indicator: Indicator
-    original: Level
-    changed: Level
+    original: Setting
+    changed: Setting
     threshold: float
 
 
@@ -110,7 +111,7 @@ class Comparison:
     @property
     def question(self) -> Question:
         """The comparison without its policy."""
-        return Question(self.indicator, self.original.level, self.changed.level, self.threshold)
+        return Question(self.indicator, self.original.setting, self.changed.setting, self.threshold)
 
     @property
     def family(self) -> tuple[str, Indicator]:
@@ -125,7 +126,7 @@ class Comparison:
     @property
     def label(self) -> str:
         """The step in words, e.g. "N 5 -> 10" or "FM1, m = 2"."""
-        before, after = self.original.level, self.changed.level
+        before, after = self.original.setting, self.changed.setting
         if after.kind == "size":
             return f"N {before.value:g} -> {after.value:g}"
         if after.kind == "parameter":
@@ -153,7 +154,7 @@ class Comparison:
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
         """
-        before, after = self.original.level.value, self.changed.level.value
+        before, after = self.original.setting.value, self.changed.setting.value
         p_o, p_new = performance(self.original), performance(self.changed)
         swarm = self.original.condition.scenario.n_robots
         asked: _Asked = {
@@ -202,3 +203,45 @@ class _Asked(TypedDict):
     level: float
     paired: bool
     saturated: list[str]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Performances and yes/no claims that somebody published, without a number of runs.
+
+    Each performance is treated as one run.
+
+    Attributes:
+        source: whose they are, for the report.
+        performance: P at each setting [items].
+        cells: the settings that count as cells of the tables; a baseline repeated under another
+            name is none.
+        claims: whether the text says that the indicator is above the threshold.
+    """
+
+    source: str
+    performance: Mapping[Setting, float]
+    cells: tuple[Setting, ...]
+    claims: Mapping[Question, bool]
+
+    def estimate(self, comparison: Comparison) -> Estimate | None:
+        """Return the published value of an indicator, without interval, where there is one."""
+        if any(arm.setting not in self.performance for arm in comparison.arms):
+            return None
+        return comparison.estimate(lambda arm: np.array([self.performance[arm.setting]]))
+
+
+def load_reference(name: str | None) -> Reference | None:
+    """Return the reference of that name; None for none.
+
+    Raises:
+        StudyError: there is none of that name.
+    """
+    if name is None:
+        return None
+    from swarm_logistics_env.studies.paper import PAPER
+
+    known = {"paper": PAPER}
+    if name not in known:
+        raise StudyError(f"no reference {name!r}{suggest(name, known)}")
+    return known[name]

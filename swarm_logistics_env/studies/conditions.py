@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.scenario import Scenario
@@ -92,3 +94,10 @@ def _canonical(value: object) -> str:
 
 def _digest(*parts: str) -> str:
     return hashlib.sha256(_canonical(parts).encode()).hexdigest()
+
+
+def seeds_in_words(seeds: Sequence[int]) -> str:
+    """Return ascending seeds as ranges, e.g. "0 to 3, 8"; at least one."""
+    breaks = [place for place, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
+    parts = [seeds[a:b] for a, b in pairwise([0, *breaks, len(seeds)])]
+    return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)

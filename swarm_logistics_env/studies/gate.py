@@ -15,11 +15,19 @@ same the change is exactly 0, and the gate fails where "0 < number" (or ">") is 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, Self, cast
 
+import numpy as np
+
+from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.estimate import Verdict
+from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.studies.conditions import seeds_in_words
+from swarm_logistics_env.studies.matching import Match, match, outcomes
+from swarm_logistics_env.studies.results import StudyResults, same_runs
 
 Subject = Literal["S", "FT", "R", "A", "change"]
 
@@ -84,3 +92,135 @@ class Gate:
         """Return whether a verdict on "above the number" makes the gate fail."""
         holds, opposite = ("refuted", "supported") if self.below else ("supported", "refuted")
         return verdict != opposite if self.possibly else verdict == holds
+
+
+# An estimate; a number that is exact, as the runs are the same runs; or why it cannot be judged.
+_Found = Estimate | float | str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one comparison or condition says to a gate.
+
+    Attributes:
+        name: policy, subject and comparison.
+        fails: whether it makes the gate fail; what cannot be judged does.
+        estimate: against the gate's number; None: it is exact, or cannot be judged.
+        verdict: on "above the number", Holm-adjusted over the gate's estimates.
+        exact: the value where the runs compared are the same runs, so that nothing is estimated.
+        problem: why it cannot be judged.
+    """
+
+    name: str
+    fails: bool
+    estimate: Estimate | None = None
+    verdict: Verdict | None = None
+    exact: float | None = None
+    problem: str | None = None
+
+
+def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[Answer, ...]:
+    """Return what everything that a gate is about says to it.
+
+    A change is asked of every judged policy: one that the other study gives nothing to compare
+    with answers that it cannot be judged.
+
+    Raises:
+        StudyError: the gate is about nothing that the studies hold.
+    """
+    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
+    asked = list(found)
+    if not asked:
+        where = f" at {gate.at!r}" if gate.at else ""
+        raise StudyError(
+            f"gate {gate.text!r}: the studies hold no {gate.subject}{where}, so it tests nothing"
+        )
+    verdicts = iter(spi.adjust([value for _, value in asked if isinstance(value, Estimate)]))
+    return tuple(_answer(gate, name, value, verdicts) for name, value in asked)
+
+
+def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -> Answer:
+    if isinstance(value, str):
+        return Answer(name, fails=True, problem=value)
+    if isinstance(value, float):
+        return Answer(name, gate.holds_for(value), exact=value)
+    verdict = next(verdicts)
+    return Answer(name, gate.fails_on(verdict), estimate=value, verdict=verdict)
+
+
+def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
+    performance = {(cell.policy, cell.table, cell.arm): cell for cell in new.cells}
+    # Once each, however many thresholds it was asked against.
+    comparisons = {
+        replace(test.comparison, threshold=gate.number): test.unaffected
+        for test in new.tests
+        if test.comparison.indicator == gate.subject
+    }
+    labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
+    for comparison, unaffected in comparisons.items():
+        name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
+        if labels[comparison.policy, comparison.label] > 1:
+            name += f" ({comparison.table})"
+        if gate.at not in name:
+            continue
+        used = {
+            arm: performance[comparison.policy, comparison.table, arm] for arm in comparison.arms
+        }
+        problems = [f"{arm.setting}: {cell.problem}" for arm, cell in used.items() if cell.problem]
+        if problems:
+            yield name, "; ".join(problems)
+            continue
+        try:
+            estimate = comparison.estimate(
+                # No type can be given to a lambda's default.
+                lambda arm, used=used: used[arm].performance,  # type: ignore[misc]
+                paired=new.plan.paired,
+                saturated=[arm for arm, cell in used.items() if cell.saturated],
+                identical=unaffected,
+            )
+        except spi.IndicatorError as error:
+            yield name, str(error)
+        else:
+            yield name, estimate.value if unaffected else estimate
+
+
+def _changes(gate: Gate, old: StudyResults, new: StudyResults) -> Iterator[tuple[str, _Found]]:
+    matching = match(old, new)
+    for unmatched in matching.unmatched:
+        if any(gate.at in name for name in unmatched.names):
+            yield f"{unmatched.policy}: change", unmatched.problem
+    for matched in matching.matches:
+        if gate.at in matched.name:
+            yield matched.name, _change(gate, old, new, matched, matching.seeds)
+
+
+def _change(
+    gate: Gate, old: StudyResults, new: StudyResults, matched: Match, seeds: Sequence[int] | None
+) -> _Found:
+    before, after = matched.before, matched.after
+    if problem := before.problem or after.problem:
+        return problem
+    p_o, p_new = before.performance, after.performance
+    if seeds is not None:
+        if not seeds:
+            return (
+                f"the studies share no seed: the old one has {seeds_in_words(old.plan.seeds)}, "
+                f"the new one {seeds_in_words(new.plan.seeds)}; play one of them on the other's "
+                "seeds"
+            )
+        pair = outcomes(old, before, seeds), outcomes(new, after, seeds)
+        if same_runs(*([outcome.digest for outcome in side] for side in pair)):
+            return 0.0
+        p_o, p_new = (np.array([o.delivered for o in side], dtype=np.float64) for side in pair)
+    try:
+        return spi.relative_change(
+            p_o,
+            p_new,
+            threshold=gate.number,
+            paired=seeds is not None,
+            saturated=[
+                name for name, cell in (("p_o", before), ("p_new", after)) if cell.saturated
+            ],
+        )
+    except spi.IndicatorError as error:
+        return str(error)

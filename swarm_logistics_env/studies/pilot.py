@@ -10,9 +10,10 @@ import numpy as np
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies.conditions import Condition
-from swarm_logistics_env.studies.execution import Outcome, execute
+from swarm_logistics_env.studies.engines import execute
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.tasks.task import Outcome
 
 PILOT = 3.0  # simulated seconds
 

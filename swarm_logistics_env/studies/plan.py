@@ -8,17 +8,15 @@ from functools import cached_property
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.studies.code_version import code_version
 from swarm_logistics_env.studies.comparisons import (
     NO_FAULT,
     OTHER_BEHAVIOUR,
     Arm,
     Comparison,
-    Level,
-    Twins,
+    NullPair,
+    Setting,
 )
 from swarm_logistics_env.studies.conditions import Condition, Run, StudiedPolicy
-from swarm_logistics_env.studies.policy_choice import policy_identity, policy_label
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Factor,
@@ -28,6 +26,8 @@ from swarm_logistics_env.studies.specification import (
     Specification,
     vary,
 )
+from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 from swarm_logistics_env.warehouse.faults import Fault
 
 
@@ -40,7 +40,7 @@ class Plan:
         comparisons: in the order of the report.
         code: version of the code that decides what a run gives.
         identities: of the policies, by the part that each plays in the specification.
-        twins: pairs without fault, one for the faults of each policy that begin during the run.
+        null_pairs: pairs without fault, one for each policy whose faults begin during the run.
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.
         imported_seeds: those that the file names; empty: it names none, or results are run here.
@@ -50,7 +50,7 @@ class Plan:
     comparisons: tuple[Comparison, ...]
     code: str
     identities: Mapping[str, str]
-    twins: tuple[Twins, ...] = ()
+    null_pairs: tuple[NullPair, ...] = ()
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
@@ -68,7 +68,9 @@ class Plan:
             for comparison in self.comparisons
             for arm in comparison.arms
         ]
-        cells += [(twins.policy, twins.table, twins.other) for twins in self.twins]
+        cells += [
+            (null_pair.policy, null_pair.table, null_pair.other) for null_pair in self.null_pairs
+        ]
         return tuple(dict.fromkeys(cells))
 
     @cached_property
@@ -133,16 +135,16 @@ def make_plan(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
-    # Self-repair is told of FT's comparisons alone: without them nobody looks at the twins.
-    twins = [item for item in found if isinstance(item, Twins)]
+    # Self-repair is told of FT's comparisons alone: without them nobody looks at the null_pair.
+    null_pairs = [item for item in found if isinstance(item, NullPair)]
     if "FT" not in specification.indicators:
-        twins = []
-    return Plan(specification, comparisons, code or code_version(), known, tuple(twins))
+        null_pairs = []
+    return Plan(specification, comparisons, code or code_version(), known, tuple(null_pairs))
 
 
 def _asked(
     specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
-) -> Iterator[Comparison | Twins]:
+) -> Iterator[Comparison | NullPair]:
     base = specification.scenario
     lesser = [
         (ablation, policy_of(f"ablation {number}", ablation.policy))
@@ -180,7 +182,7 @@ def scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator
     scenario = vary(base, sizes.scenario)
     table = _title(sizes, "Scalability")
     arms = {
-        size: Arm(Level("size", "n_robots", size), _condition(policy, scenario, n_robots=size))
+        size: Arm(Setting("size", "n_robots", size), _condition(policy, scenario, n_robots=size))
         for size in sizes.values
     }
     steps = list(zip(sizes.values, sizes.values[1:]))
@@ -197,8 +199,8 @@ def scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator
 
 def robustness(
     base: Scenario, faults: Faults, policy: StudiedPolicy
-) -> Iterator[Comparison | Twins]:
-    """Yield FT and R of every mode, m and onset, and the twins where an onset is in mid-run."""
+) -> Iterator[Comparison | NullPair]:
+    """Yield FT and R of every mode, m and onset, and the null_pair where an onset is in mid-run."""
     scenario = vary(base, faults.scenario)
     table = _title(faults, "Fault tolerance and robustness")
     for m in faults.robots:
@@ -216,11 +218,11 @@ def robustness(
     original = Arm(NO_FAULT, _condition(policy, scenario))
     if any(faults.onsets):
         other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1))
-        yield Twins(table, original, other)
+        yield NullPair(table, original, other)
 
     def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
         fault = Fault(mode, m, onset=onset, duration=duration)
-        return Arm(Level("fault", mode, m, onset), Condition(policy, scenario, (fault,)))
+        return Arm(Setting("fault", mode, m, onset), Condition(policy, scenario, (fault,)))
 
     for onset in faults.onsets:
         for mode in faults.modes:
@@ -239,7 +241,7 @@ def adaptability(
     table = _title(parameter, f"Adaptability to {parameter.name}")
     original, *changed = (
         Arm(
-            Level("parameter", parameter.name, value),
+            Setting("parameter", parameter.name, value),
             _condition(policy, scenario, **{parameter.name: value}),
         )
         for value in parameter.values
@@ -253,7 +255,7 @@ def _ablation(
 ) -> Comparison:
     scenario = vary(base, ablation.scenario)
     whole, part = (
-        Arm(Level("policy", label.label, scenario.n_robots), _condition(label, scenario))
+        Arm(Setting("policy", label.label, scenario.n_robots), _condition(label, scenario))
         for label in (policy, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".

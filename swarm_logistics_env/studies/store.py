@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import notes
+from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.conditions import Run
-from swarm_logistics_env.studies.execution import Outcome
+from swarm_logistics_env.tasks.task import Outcome
 
 FILE_NAME = "study.sqlite"
 SCHEMA_VERSION = 3
@@ -260,7 +260,7 @@ class Store:
             ).fetchone()
         if row is None:
             return None
-        if not notes.reads(name, row[0]):
+        if not metadata.reads(name, row[0]):
             raise StudyError(f"the store {self.path} is damaged: its note {name!r} does not read")
         return str(row[0])
 
@@ -372,3 +372,33 @@ def _times(blob: bytes, delivered: object) -> NDArray[np.float64]:
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("delivery times that do not rise")
     return times
+
+
+def refuse_study_in(out: Path, way: str) -> None:
+    """Raise StudyError if `out` holds a study; `way`, e.g. "merge", says what was to be done."""
+    if (out / FILE_NAME).exists():
+        raise StudyError(f"{out} holds a study already: {way} into a new directory")
+
+
+@contextmanager
+def new_store(out: Path) -> Iterator[Store]:
+    """Yield an empty store; what was written into it is that of `out` once the block ends well.
+
+    Killed or failed before, it leaves nothing that looks like a store.
+
+    Raises:
+        StudyError: `out` cannot be written.
+    """
+    unfinished = out / f"{FILE_NAME}.unfinished"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        unfinished.unlink(missing_ok=True)
+    except OSError as error:
+        raise StudyError(f"cannot write to {out}: {error.strerror}") from error
+    try:
+        with Store(unfinished) as store:
+            yield store
+        unfinished.rename(out / FILE_NAME)
+    finally:
+        for left in out.glob(f"{unfinished.name}*"):
+            left.unlink()

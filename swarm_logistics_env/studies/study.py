@@ -11,19 +11,18 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import notes
-from swarm_logistics_env.studies.code_version import code_version
-from swarm_logistics_env.studies.declaring import Declaration
+from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import Origin, imported_plan
-from swarm_logistics_env.studies.judgement import Findings, judge
+from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
-from swarm_logistics_env.studies.progress import Progress
+from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.run_progress import Progress
 from swarm_logistics_env.studies.shards import Shard
-from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
-from swarm_logistics_env.studies.study_file import read_study_file
+from swarm_logistics_env.tasks.code_version import code_version
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -111,16 +110,16 @@ class Study:
         """
         out = Path(out)
         with Store.existing(out) as store:
-            noted = notes.planned(store, out)
-            imported = store.note(notes.IMPORTED)
-        study = cls._of(Specification.from_json(noted[notes.SPECIFICATION]), out)
+            noted = metadata.planned(store, out)
+            imported = store.note(metadata.IMPORTED)
+        study = cls._of(Specification.from_json(noted[metadata.SPECIFICATION]), out)
         if imported is not None:
             study._plan = imported_plan(study.specification, Origin(**json.loads(imported)))
             return study
         study._plan = make_plan(
             study.specification,
-            code=noted[notes.CODE],
-            identities=json.loads(noted[notes.IDENTITIES]),
+            code=noted[metadata.CODE],
+            identities=json.loads(noted[metadata.IDENTITIES]),
         )
         return study
 
@@ -172,9 +171,9 @@ class Study:
             self._refuse_another(store)
             if Declaration.noted(store) is None:
                 Declaration(self.specification.seed_numbers, self.specification.looks).note(store)
-            store.set_note(notes.SPECIFICATION, self.specification.to_json())
-            store.set_note(notes.CODE, plan.code)
-            store.set_note(notes.IDENTITIES, json.dumps(dict(plan.identities)))
+            store.set_note(metadata.SPECIFICATION, self.specification.to_json())
+            store.set_note(metadata.CODE, plan.code)
+            store.set_note(metadata.IDENTITIES, json.dumps(dict(plan.identities)))
             done = store.succeeded()
             runs = [run for run in whole if run.key not in done]
             kept = len(whole) - len(runs)
@@ -219,7 +218,7 @@ class Study:
             declared = Declaration.noted(store)
         return None if declared is None or declared.covers(plan) else declared.warning(plan)
 
-    def findings(self) -> Findings:
+    def findings(self) -> StudyResults:
         """Return every cell and every verdict, from the runs that are there.
 
         Raises:
@@ -250,9 +249,9 @@ class Study:
         _need_pandas()
         import pandas as pd
 
-        from swarm_logistics_env.studies.reporting.files import judgement_record
+        from swarm_logistics_env.report.report_files import indicator_record
 
-        return pd.DataFrame(judgement_record(j) for j in self.findings().judgements)
+        return pd.DataFrame(indicator_record(j) for j in self.findings().tests)
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
         """Write report.md, cells.csv and claims.csv into a directory; return their paths.
@@ -263,7 +262,7 @@ class Study:
         Raises:
             StudyError: nothing has been run, there is no directory, or it cannot be written.
         """
-        from swarm_logistics_env.studies.reporting.files import write_report
+        from swarm_logistics_env.report.report_files import write_report
 
         directory = self.out if path is None else Path(path)
         if directory is None:
@@ -271,10 +270,10 @@ class Study:
         return write_report(self.findings(), directory)
 
     def _refuse_another(self, store: Store) -> None:
-        if store.note(notes.IMPORTED) is not None:
+        if store.note(metadata.IMPORTED) is not None:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         # The report and the declared seeds are one study's.
-        noted = store.note(notes.SPECIFICATION)
+        noted = store.note(metadata.SPECIFICATION)
         name = self.specification.name
         if noted is not None and (there := Specification.from_json(noted).name) != name:
             raise StudyError(

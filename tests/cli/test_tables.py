@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from swarm_logistics_env.cli.tables import show
-from swarm_logistics_env.studies.reporting.sections import Section
+from swarm_logistics_env.report.result_tables import Section
 
 
 def test_no_number_is_cut_at_a_narrow_terminal(

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import os
+import time
+import traceback
 from collections.abc import Callable, Generator, Iterable
 
+import numpy as np
+
+from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.studies.conditions import Run
-from swarm_logistics_env.studies.execution import Outcome, execute
+from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.tasks.policy_choice import policy_of
+from swarm_logistics_env.tasks.task import Outcome
 
 Engine = Callable[[Iterable[Run]], Generator[tuple[Run, Outcome], None, None]]
 
@@ -41,11 +48,42 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
             raise StudyError(f"engine local: is one process, not {processes}")
         return serial
     if name == "process":
-        from swarm_logistics_env.studies.engines.processes import Processes
+        from swarm_logistics_env.studies.engines.process_pool import Processes
 
         return Processes(processes or os.cpu_count() or 1)
-    from swarm_logistics_env.studies.engines.cluster import Cluster
+    from swarm_logistics_env.studies.engines.ray_cluster import Cluster
 
     if address is not None and processes is not None:
         raise StudyError("engine ray: a cluster that runs already has its own number of cores")
     return Cluster(address, processes)
+
+
+def execute(run: Run) -> Outcome:
+    """Play a run; whatever goes wrong in it is its outcome."""
+    start = time.perf_counter()
+    condition = run.condition
+    try:
+        if run.code != code_version():
+            raise StudyError(
+                f"this process runs code version {code_version()}, the study {run.code}: "
+                "the package changed while the study ran"
+            )
+        # A policy of its own: one that remembers must not make rows depend on the order of runs.
+        policy = policy_of(condition.policy.source)
+        episode = run_episode(
+            condition.scenario, policy, run.seed, condition.faults, run.policy_seed
+        )
+    except Exception:  # noqa: BLE001 - kept as the run's row, and blocks the verdict
+        return Outcome(
+            run.key, error=traceback.format_exc(), wall_seconds=time.perf_counter() - start
+        )
+    return Outcome(
+        run.key,
+        delivery_times=np.asarray(episode.delivery_times, dtype=np.float64),
+        ended_at=float(episode.ended_at),
+        all_delivered=bool(episode.all_delivered),
+        failed_robots=tuple(int(robot) for robot in episode.failed_robots),
+        anchoring_seconds=float(episode.anchoring_seconds),
+        digest=episode.digest,
+        wall_seconds=time.perf_counter() - start,
+    )

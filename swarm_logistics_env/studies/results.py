@@ -1,0 +1,313 @@
+"""IndicatorTest: what the finished runs say about every cell and every comparison of a plan."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.comparisons import Arm, Comparison, Reference, load_reference
+from swarm_logistics_env.studies.conditions import Condition
+from swarm_logistics_env.studies.metadata import Declaration
+from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.tasks.task import Outcome
+
+POWER = 0.8
+LEVEL = 0.95
+_LEAST_ALPHA = 1e-12  # of a look: a level is no nearer to 1 than this, whose numbers end at 1e-16
+
+
+@dataclass(frozen=True)
+class Cell:
+    """P of one arm over the seeds that succeeded.
+
+    Attributes:
+        performance: P [items], shape (n,), seed by seed.
+        problem: why the runs are not complete; None: they are.
+        saturated: whether any seed delivered every item, so that P is capped.
+        published: P of the reference; counted: whether it is one of the reference's cells.
+    """
+
+    policy: str
+    table: str
+    arm: Arm
+    performance: NDArray[np.float64]
+    problem: str | None
+    saturated: bool
+    published: float | None
+    counted: bool
+
+    @property
+    def mean(self) -> Interval | None:
+        """Mean P with its 95 % interval; None without any run."""
+        return spi.mean_interval(self.performance) if self.performance.size else None
+
+    @property
+    def prediction(self) -> Interval | None:
+        """Mean P with the 95 % interval of one further run; None without any run."""
+        return spi.prediction_interval(self.performance) if self.performance.size else None
+
+    @property
+    def published_inside(self) -> bool | None:
+        """Whether the published run lies within the prediction interval; None: cannot be said."""
+        prediction = self.prediction
+        if self.published is None or prediction is None:
+            return None
+        if prediction.low is None or prediction.high is None:
+            return None
+        return prediction.low <= self.published <= prediction.high
+
+
+@dataclass(frozen=True)
+class IndicatorTest:
+    """The verdict on one comparison.
+
+    Attributes:
+        estimate: with the unadjusted verdict; None: blocked.
+        adjusted_p, adjusted_verdict: under Holm within the family; None: blocked, or unaffected.
+        problem: why it is blocked, e.g. a failed run.
+        saturated: it rests on a cell whose P is capped.
+        claim: what is claimed: above the threshold (True), not above (False), nothing (None).
+        published: the reference's value of the indicator.
+        seeds_needed: for 80 % power at the published value; else `no_plan` says why there is none.
+    """
+
+    comparison: Comparison
+    estimate: Estimate | None
+    problem: str | None
+    saturated: bool
+    claim: bool | None
+    published: float | None
+    seeds_needed: int | None = None
+    no_plan: str | None = None
+    adjusted_p: float | None = None
+    adjusted_verdict: Verdict | None = None
+
+    @property
+    def unaffected(self) -> bool:
+        """Whether both conditions gave the same runs: the value is exact, and no evidence."""
+        return self.estimate is not None and self.estimate.identical
+
+    def on_claim(self, verdict: Verdict | None) -> Verdict | None:
+        """Turn a verdict on "above the threshold" into one on what is claimed."""
+        if verdict is None or self.claim is None:
+            return None
+        if self.claim or verdict == "inconclusive":
+            return verdict
+        return "supported" if verdict == "refuted" else "refuted"
+
+
+@dataclass(frozen=True)
+class StudyResults:
+    """All that a report says.
+
+    Attributes:
+        plan: of the study.
+        cells: every P, in the order of the tables.
+        tests: every comparison, in the order of the tables.
+        exploratory: seeds that were not declared at the study's start, or a look that was not,
+            so the verdicts' error level is not the nominal one.
+        outcomes: of the plan's runs, by key, for what P alone does not tell.
+        level: confidence level of the indicators' intervals and verdicts; above 0.95 at a
+            declared look, so that all looks together err in 5 %.
+        looks: numbers of seeds at which the study was declared to be judged, before its first run.
+    """
+
+    plan: Plan
+    reference: Reference | None
+    cells: tuple[Cell, ...]
+    tests: tuple[IndicatorTest, ...]
+    exploratory: bool
+    outcomes: Mapping[str, Outcome]
+    level: float = LEVEL
+    looks: tuple[int, ...] = ()
+
+
+def judge(
+    plan: Plan,
+    outcomes: Mapping[str, Outcome],
+    declared_seeds: int,
+    declared_looks: tuple[int, ...] = (),
+    declared_first_seed: int = 0,
+) -> StudyResults:
+    """Judge a plan by the outcomes of its runs, keyed by run.
+
+    Args:
+        declared_seeds: how many seeds were declared before the first run.
+        declared_looks: at how many seeds the study was then declared to be judged.
+        declared_first_seed: the smallest of the declared seeds.
+
+    A comparison that needs a run which failed or is missing is blocked, and with it the adjusted
+    verdicts of its family, whose size would else be too small.
+    """
+    reference = load_reference(plan.specification.reference)
+    by_condition = {
+        condition.key: _result(condition, plan, outcomes) for condition in plan.conditions
+    }
+    cells = tuple(
+        _cell(policy, table, arm, by_condition[arm.condition.key], reference)
+        for policy, table, arm in plan.cells
+    )
+    declared = range(declared_first_seed, declared_first_seed + declared_seeds)
+    level, exploratory = _level(plan, Declaration(declared, declared_looks))
+    tests = [
+        _indicator_test(comparison, by_condition, reference, level=level, paired=plan.paired)
+        for comparison in plan.comparisons
+    ]
+    return StudyResults(
+        plan,
+        reference,
+        cells,
+        _adjusted(tests),
+        exploratory=exploratory,
+        outcomes=outcomes,
+        level=level,
+        looks=declared_looks,
+    )
+
+
+def _level(plan: Plan, declared: Declaration) -> tuple[float, bool]:
+    if not declared.covers(plan):
+        return LEVEL, True
+    if not declared.looks:
+        return LEVEL, False
+    alphas = spi.look_levels(declared.looks, 1 - LEVEL)
+    return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False
+
+
+@dataclass(frozen=True)
+class _Result:
+    performance: NDArray[np.float64]
+    problem: str | None
+    saturated: bool
+    digests: tuple[str | None, ...]
+
+
+def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -> _Result:
+    found = [outcomes.get(condition.run(plan.code, seed).key) for seed in plan.seeds]
+    finished = [outcome for outcome in found if outcome is not None]
+    succeeded = [outcome for outcome in finished if outcome.error is None]
+    failed, missing = len(finished) - len(succeeded), len(found) - len(finished)
+    if not plan.paired and finished:
+        missing = 0  # such results need not be equally many everywhere
+    parts = [
+        f"{count} of {len(found)} runs {what}"
+        for count, what in ((failed, "failed"), (missing, "missing"))
+        if count
+    ]
+    return _Result(
+        np.array([outcome.delivered for outcome in succeeded], dtype=np.float64),
+        ", ".join(parts) or None,
+        any(outcome.all_delivered for outcome in succeeded),
+        tuple(outcome.digest for outcome in succeeded),
+    )
+
+
+def _identical(comparison: Comparison, used: Mapping[Arm, _Result]) -> bool:
+    """Return whether what was changed changed no run: equal digests, seed by seed."""
+    before, after = used[comparison.original].digests, used[comparison.changed].digests
+    return comparison.removed is None and same_runs(before, after)
+
+
+def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool:
+    """Return whether two conditions gave the same run at every seed, by the digests of the runs."""
+    return list(before) == list(after) and None not in before
+
+
+def _cell(policy: str, table: str, arm: Arm, result: _Result, reference: Reference | None) -> Cell:
+    return Cell(
+        policy,
+        table,
+        arm,
+        result.performance,
+        result.problem,
+        result.saturated,
+        published=reference.performance.get(arm.setting) if reference else None,
+        counted=reference is not None and arm.setting in reference.cells,
+    )
+
+
+def _indicator_test(
+    comparison: Comparison,
+    by_condition: Mapping[str, _Result],
+    reference: Reference | None,
+    *,
+    level: float,
+    paired: bool,
+) -> IndicatorTest:
+    used = {arm: by_condition[arm.condition.key] for arm in comparison.arms}
+    problems = [f"{arm.setting}: {used[arm].problem}" for arm in used if used[arm].problem]
+    estimate = None
+    if not problems:
+        try:
+            estimate = comparison.estimate(
+                lambda arm: used[arm].performance,
+                level=level,
+                paired=paired,
+                saturated=[arm for arm in used if used[arm].saturated],
+                identical=_identical(comparison, used),
+            )
+        except spi.IndicatorError as error:
+            problems = [str(error)]
+    published = reference.estimate(comparison) if reference else None
+    claim = comparison.claim
+    if claim is None and reference:
+        claim = reference.claims.get(comparison.question)
+    test = IndicatorTest(
+        comparison,
+        estimate,
+        "; ".join(problems) or None,
+        any(result.saturated for result in used.values()),
+        claim,
+        published.value if published else None,
+    )
+    if estimate is None or test.published is None:
+        return test
+    return replace(
+        test,
+        seeds_needed=spi.seeds_for_power(estimate, test.published, POWER),
+        no_plan=spi.no_plan_because(estimate, test.published),
+    )
+
+
+def _adjusted(tests: list[IndicatorTest]) -> tuple[IndicatorTest, ...]:
+    families: dict[tuple[str, str], list[int]] = defaultdict(list)
+    for index, test in enumerate(tests):
+        families[test.comparison.family].append(index)
+    adjusted = list(tests)
+    for members in families.values():
+        estimates = [e for e in (tests[index].estimate for index in members) if e is not None]
+        if len(estimates) < len(members):
+            continue
+        p_values = spi.adjusted_p_values(estimates)
+        for index, p, verdict in zip(members, p_values, spi.adjust(estimates)):
+            if not tests[index].unaffected:
+                adjusted[index] = replace(tests[index], adjusted_p=p, adjusted_verdict=verdict)
+    return tuple(adjusted)
+
+
+Times = tuple[NDArray[np.float64], ...]
+
+
+def outcomes_of(results: StudyResults, arm: Arm) -> tuple[Outcome, ...] | None:
+    """Return an arm's outcomes seed by seed; None where one failed, is missing or has no times."""
+    plan = results.plan
+    found = [results.outcomes.get(arm.condition.run(plan.code, seed).key) for seed in plan.seeds]
+    complete = tuple(
+        outcome
+        for outcome in found
+        if outcome is not None and outcome.error is None and outcome.untimed is None
+    )
+    return complete if len(complete) == len(found) else None
+
+
+def times_of(results: StudyResults, arm: Arm) -> Times | None:
+    """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""
+    outcomes = outcomes_of(results, arm)
+    return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)
