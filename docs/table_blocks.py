@@ -126,7 +126,7 @@ def _claims(tests: list[IndicatorTest]) -> list[str]:
         f"adjusted after Holm: {wording.counted(Counter(said))}."
     )
     refuted = [
-        f"{wording.claimed(test)}, {test.comparison.label}"
+        f"{test.claim_text}, {test.comparison.label}"
         for test, verdict in zip(claims, said)
         if verdict == "refuted"
     ]

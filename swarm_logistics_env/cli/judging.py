@@ -14,11 +14,13 @@ from swarm_logistics_env.cli.study import (
     study,
     study_of,
 )
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.gate import Answer
     from swarm_logistics_env.studies.results import StudyResults
 
+SYMBOLS = tuple(DEFINITIONS)
 AtOption = Annotated[
     str, typer.Option(metavar="TEXT", help="Only comparisons whose name holds this.")
 ]
@@ -38,7 +40,9 @@ def power_command(
         typer.Option(help="Assumed true value of the indicator; the paper's if not given."),
     ] = None,
     power: Annotated[float, typer.Option(help="Wanted probability of a verdict.")] = 0.8,
-    indicator: Annotated[str | None, typer.Option(help="Only S, FT, R, A or change.")] = None,
+    indicator: Annotated[
+        str | None, typer.Option(help=f"Only {', '.join(SYMBOLS[:-1])} or {SYMBOLS[-1]}.")
+    ] = None,
     at: AtOption = "",
     pilot_seeds: Annotated[int, typer.Option(min=2, help="Seeds of the pilot.")] = 5,
     policies: PolicyOption = None,
@@ -93,7 +97,8 @@ def compare_command(
         list[str] | None,
         typer.Option(
             metavar="GATE",
-            help="[possibly] S|FT|R|A|change <|> NUMBER [at TEXT]; may be repeated. change is "
+            help=f"[possibly] {'|'.join(SYMBOLS)} <|> NUMBER [at TEXT]; may be "
+            "repeated. change is "
             "(P_new - P_old) / P_old; the others are NEW's. Plain: fails where it is so beyond "
             "chance; possibly: where that is not ruled out.",
         ),

@@ -15,16 +15,9 @@ from swarm_logistics_env.report.policies_compared import compared
 from swarm_logistics_env.report.result_tables import Section, tables, warnings
 from swarm_logistics_env.report.setup_sheet import setup_sheet
 from swarm_logistics_env.report.wording import sentence
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import size_series
-
-_NAMES = {
-    "S": "scalability S",
-    "FT": "fault tolerance FT",
-    "R": "robustness R",
-    "A": "adaptability A",
-    "change": "change of P",
-}
 
 
 @dataclass(frozen=True)
@@ -139,7 +132,7 @@ def _verdicts(results: StudyResults) -> Iterator[Section]:
     families = dict.fromkeys((j.comparison.policy, j.comparison.indicator) for j in results.tests)
     for policy, indicator in families:
         yield Section(
-            f"{policy}: {_NAMES[indicator]}",
+            f"{policy}: {DEFINITIONS[indicator].heading}",
             sentences=tuple(
                 sentence(results, test)
                 for test in results.tests

@@ -9,13 +9,12 @@ from typing import TypeVar
 
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.drawing import Panel, Point, Series
-from swarm_logistics_env.report.wording import decided, listed, percent, seeds_text
-from swarm_logistics_env.spi import Verdict
-from swarm_logistics_env.studies.results import IndicatorTest, StudyResults
+from swarm_logistics_env.report.wording import listed, percent, seeds_text
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
+from swarm_logistics_env.studies.results import IndicatorTest, StudyResults, Value
 from swarm_logistics_env.studies.size_series import SizeSeries
 
 _Key = TypeVar("_Key")
-Value = str | float | int | bool | None
 
 
 @dataclass(frozen=True)
@@ -56,26 +55,30 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
 
 
 def _scalability(results: StudyResults) -> Iterator[Figure]:
-    asked = [j for j in _thresholded(results) if j.comparison.indicator == "S"]
+    asked = _thresholded(results, "size")
     for table in _tables(asked):
         here = [j for j in asked if j.comparison.table == table]
-        series = [
-            Series(policy, tuple(_points(js, _step, published=not index)))
-            for index, (policy, js) in enumerate(_grouped(here, lambda j: j.comparison.policy))
-        ]
-        panel = Panel("", "scalability S", tuple(series), (0.0, 1.0), "swarm size N → N + m")
+        panels = []
+        for definition, tests in _by_definition(here):
+            series = [
+                Series(policy, tuple(_points(js, _step, published=not index)))
+                for index, (policy, js) in enumerate(_grouped(tests, lambda j: j.comparison.policy))
+            ]
+            thresholds = tuple(definition.adjectives)
+            panels.append(
+                Panel("", definition.axis, tuple(series), thresholds, "swarm size N → N + m")
+            )
         yield _intervals(
             results,
-            slug("S", table),
-            f"{_policies(here)}, {table}: scalability S per step in N; above 0 scalable, above 1 "
-            "superlinear.",
+            slug(_symbols(here), table),
+            f"{_policies(here)}, {table}: {_caption(here, 'per step in N')}",
             here,
-            (panel,),
+            tuple(panels),
         )
 
 
 def _faults(results: StudyResults) -> Iterator[Figure]:
-    asked = [j for j in _thresholded(results) if j.comparison.indicator in ("FT", "R")]
+    asked = _thresholded(results, "fault")
     first = asked[0].comparison.policy if asked else ""
     keys = dict.fromkeys(
         (j.comparison.policy, j.comparison.table, j.comparison.changed.setting.onset) for j in asked
@@ -88,50 +91,56 @@ def _faults(results: StudyResults) -> Iterator[Figure]:
             == (policy, table, onset)
         ]
         panels = []
-        for indicator, label in (("FT", "fault tolerance FT"), ("R", "robustness R")):
-            of_indicator = [j for j in here if j.comparison.indicator == indicator]
+        for definition, tests in _by_definition(here):
             series = [
                 Series(f"m = {m:g}", tuple(_points(js, _mode, published=policy == first)))
-                for m, js in _grouped(of_indicator, lambda j: j.comparison.changed.setting.value)
+                for m, js in _grouped(tests, lambda j: j.comparison.changed.setting.value)
             ]
-            panels.append(Panel("", label, tuple(series), (0.0,), "failure mode"))
+            thresholds = tuple(definition.adjectives)
+            panels.append(Panel("", definition.axis, tuple(series), thresholds, "failure mode"))
         swarm = here[0].comparison.original.condition.scenario.n_robots
         start = f", faults from {onset:g} s" if onset else ""
         yield _intervals(
             results,
-            slug("FT-R", policy, table, f"{onset:g}s" if onset else ""),
-            f"{policy}, {table}, N = {swarm}{start}: fault tolerance FT and robustness R per "
-            "failure mode and number m of faulty robots; above 0 tolerant, robust.",
+            slug(_symbols(here), policy, table, f"{onset:g}s" if onset else ""),
+            f"{policy}, {table}, N = {swarm}{start}: "
+            f"{_caption(here, 'per failure mode and number m of faulty robots')}",
             here,
             tuple(panels),
         )
 
 
 def _adaptability(results: StudyResults) -> Iterator[Figure]:
-    asked = [j for j in _thresholded(results) if j.comparison.indicator == "A"]
+    asked = _thresholded(results, "parameter")
     if not asked:
         return
     panels = []
-    for (table, name), js in _grouped(
-        asked, lambda j: (j.comparison.table, j.comparison.changed.setting.name)
+    for (table, name, definition), js in _grouped(
+        asked,
+        lambda j: (
+            j.comparison.table,
+            j.comparison.changed.setting.name,
+            j.comparison.definition.symbol,
+        ),
     ):
         series = [
             Series(policy, tuple(_points(of_policy, _step, published=not index)))
             for index, (policy, of_policy) in enumerate(_grouped(js, lambda j: j.comparison.policy))
         ]
-        panels.append(Panel(table, "A", tuple(series), (0.0, 1.0), f"{name}, x_o → x_new"))
+        row = DEFINITIONS[definition]
+        thresholds = tuple(row.adjectives)
+        panels.append(Panel(table, row.axis, tuple(series), thresholds, f"{name}, x_o → x_new"))
     yield _intervals(
         results,
-        "A",
-        f"{_policies(asked)}: adaptability A per parameter; above 0 adaptable, above 1 "
-        "P has grown.",
+        slug(_symbols(asked)),
+        f"{_policies(asked)}: {_caption(asked, 'per parameter')}",
         asked,
         tuple(panels),
     )
 
 
 def _ablations(results: StudyResults) -> Iterator[Figure]:
-    asked = [j for j in results.tests if j.comparison.indicator == "change"]
+    asked = [j for j in results.tests if j.comparison.definition.compares == "policy"]
     for table in _tables(asked):
         here = [j for j in asked if j.comparison.table == table]
         series = [
@@ -143,7 +152,7 @@ def _ablations(results: StudyResults) -> Iterator[Figure]:
         panel = Panel("", "change of P", tuple(series), tuple(thresholds), "in its place")
         yield _intervals(
             results,
-            slug("change", table),
+            slug(_symbols(here), table),
             f"{_policies(here)}, {table}: relative change of P where another policy takes its "
             "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share.",
             here,
@@ -196,24 +205,8 @@ def _intervals(
         "policy", "table", "indicator", "comparison", "value", "low", "high",
         "verdict", "verdict_holm", "published", "saturated",
     )  # fmt: skip
-    rows = []
-    for test in tests:
-        comparison, estimate = test.comparison, test.estimate
-        rows.append(
-            (
-                comparison.policy,
-                comparison.table,
-                comparison.indicator,
-                comparison.label,
-                estimate.value if estimate else None,
-                estimate.low if estimate else None,
-                estimate.high if estimate else None,
-                _verdict(test, estimate.verdict if estimate else None),
-                _verdict(test, test.adjusted_verdict),
-                test.published,
-                test.saturated,
-            )
-        )
+    records = [test.record() for test in tests]
+    rows = tuple(tuple(record[column] for column in columns) for record in records)
     published = any(test.published is not None for test in tests)
     cross = "; crosses: published" if published else ""
     capped = _saturation(any(test.saturated for test in tests))
@@ -221,25 +214,43 @@ def _intervals(
         name,
         f"{caption} {seeds_text(results).capitalize()}. {marks(results)}{cross}.{capped}",
         columns,
-        tuple(rows),
+        rows,
         0.5 + 2.5 * len(panels),
         lambda canvas: drawing.intervals(canvas, panels),
     )
-
-
-def _verdict(test: IndicatorTest, verdict: Verdict | None) -> str | None:
-    return "unaffected" if test.unaffected else verdict
 
 
 def _saturation(saturated: bool) -> str:
     return " †: P is capped, every item was delivered in a run." if saturated else ""
 
 
-def _thresholded(results: StudyResults) -> list[IndicatorTest]:
-    """Return each indicator once: that asked against the lowest threshold."""
+def _by_definition(tests: list[IndicatorTest]) -> list[tuple[Definition, list[IndicatorTest]]]:
+    by_symbol = dict(_grouped(tests, lambda j: j.comparison.indicator))
+    return [(row, by_symbol[symbol]) for symbol, row in DEFINITIONS.items() if symbol in by_symbol]
+
+
+def _symbols(tests: list[IndicatorTest]) -> str:
+    return "-".join(definition.symbol for definition, _ in _by_definition(tests))
+
+
+def _caption(tests: list[IndicatorTest], per: str) -> str:
+    """Return what a figure shows, e.g. "robustness R per failure mode; above 0 robust."."""
+    definitions = [definition for definition, _ in _by_definition(tests)]
+    above: dict[float, list[str]] = {}
+    for definition in definitions:
+        for threshold, adjective in definition.adjectives.items():
+            above.setdefault(threshold, []).append(adjective)
+    says = ", ".join(f"above {threshold:g} {', '.join(says)}" for threshold, says in above.items())
+    return f"{listed([definition.heading for definition in definitions])} {per}; {says}."
+
+
+def _thresholded(results: StudyResults, factor: Factor) -> list[IndicatorTest]:
+    """Return each indicator of a factor once: that asked against the lowest threshold."""
     first: dict[object, IndicatorTest] = {}
     for test in results.tests:
         comparison = test.comparison
+        if comparison.definition.compares != factor:
+            continue
         key = (
             comparison.policy, comparison.table, comparison.indicator,
             comparison.original.setting, comparison.changed.setting,
@@ -260,7 +271,7 @@ def _points(
             estimate.value if estimate else None,
             estimate.low if estimate else None,
             estimate.high if estimate else None,
-            decided(test),
+            test.decided,
             test.saturated,
             test.published if published else None,
         )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from swarm_logistics_env.report import drawing, wording
 from swarm_logistics_env.report.drawing import Panel, Point, Series
-from swarm_logistics_env.report.figures import Figure, Value, slug
+from swarm_logistics_env.report.figures import Figure, slug
 from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.report.wording import listed, seeds_text
 from swarm_logistics_env.spi.summaries import Interval
@@ -19,7 +19,7 @@ from swarm_logistics_env.studies.policy_comparison import (
     indicator_contests,
     judged_policies,
 )
-from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.results import StudyResults, Value
 
 _HOW_TO_READ = (
     "How many questions got which Holm-adjusted verdict; the questions themselves follow.",
@@ -56,7 +56,7 @@ def compared(results: StudyResults) -> Iterator[Section]:
 
 def _matrix(results: StudyResults, policies: tuple[str, ...]) -> Section:
     properties = dict.fromkeys(
-        wording.property_name(j) for j in results.tests if j.comparison.indicator != "change"
+        j.property_name for j in results.tests if j.comparison.definition.compares != "policy"
     )
     rows = []
     for policy in policies:
@@ -65,7 +65,7 @@ def _matrix(results: StudyResults, policies: tuple[str, ...]) -> Section:
             verdicts = Counter[str](
                 wording.counted_as(j, j.adjusted_verdict)
                 for j in results.tests
-                if j.comparison.policy == policy and wording.property_name(j) == name
+                if j.comparison.policy == policy and j.property_name == name
             )
             row.append(wording.counted(verdicts) or wording.NOTHING)
         rows.append(tuple(row))
@@ -88,7 +88,7 @@ def _indicators(
     rows = []
     for contest in contests:
         test = next(j for j in contest.tests if j is not None)
-        label = f"{wording.property_name(test)}, {test.comparison.label}"
+        label = f"{test.property_name}, {test.comparison.label}"
         values = [
             wording.NOTHING if j is None else f"{wording.ratio(j)} {wording.verdict(j)}"
             for j in contest.tests
@@ -158,7 +158,7 @@ def difference_figures(
                 f"difference of {label}" + (" [items]" if label == "P" else ""),
                 tuple(_series(differences, others)),
                 (0.0,),
-                _x_label(contests[0].cell.arm.setting, stepwise=label in ("S", "A")),
+                _x_label(contests[0].cell.arm.setting, stepwise=label != "P"),
             )
             for label, differences in found.items()
             if differences

@@ -13,14 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.report import wording
 from swarm_logistics_env.report.document import document, figures_of
 from swarm_logistics_env.report.drawing import INK, PAPER, WIDTH
 from swarm_logistics_env.report.figures import Figure
 from swarm_logistics_env.report.markup import html, markdown
-from swarm_logistics_env.spi import Verdict
-from swarm_logistics_env.studies.export import Value, write_csv
-from swarm_logistics_env.studies.results import Cell, IndicatorTest, StudyResults
+from swarm_logistics_env.studies.export import write_csv
+from swarm_logistics_env.studies.results import StudyResults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
@@ -38,8 +36,7 @@ def write_report(results: StudyResults, directory: Path) -> tuple[Path, ...]:
         pictures.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(f"cannot write to {pictures}: {error.strerror}") from error
-    cells = [cell_record(cell) for cell in results.cells]
-    claims = [indicator_record(test) for test in results.tests]
+    cells, claims = results.performance_table(), results.indicator_table()
     whole = document(results)
     for figure in figures_of(whole):
         write_csv(pictures / f"{figure.name}.csv", figure.columns, figure.rows)
@@ -58,69 +55,6 @@ def write_report(results: StudyResults, directory: Path) -> tuple[Path, ...]:
     write_csv(files[1], list(cells[0]), (list(cell.values()) for cell in cells))
     write_csv(files[2], list(claims[0]), (list(claim.values()) for claim in claims))
     return files if missing else (directory / "report.html", *files)
-
-
-def cell_record(cell: Cell) -> dict[str, Value]:
-    """Return one cell as a flat record; intervals are at 95 %, P in items."""
-    setting, mean, prediction = cell.arm.setting, cell.mean, cell.prediction
-    return {
-        "policy": cell.policy,
-        "table": cell.table,
-        "cell": str(setting),
-        "factor": setting.name,
-        "value": setting.value,
-        "onset": setting.onset,
-        "published": cell.published,
-        "counted": cell.counted,
-        "n_seeds": len(cell.performance),
-        "mean": mean.value if mean else None,
-        "low": mean.low if mean else None,
-        "high": mean.high if mean else None,
-        "prediction_low": prediction.low if prediction else None,
-        "prediction_high": prediction.high if prediction else None,
-        "published_inside": cell.published_inside,
-        "saturated": cell.saturated,
-        "problem": cell.problem,
-    }
-
-
-def indicator_record(test: IndicatorTest) -> dict[str, Value]:
-    """Return one judged comparison as a flat record."""
-    comparison, estimate, claim = test.comparison, test.estimate, test.claim
-    unaffected = "unaffected" if test.unaffected else None
-    return {
-        "policy": comparison.policy,
-        "table": comparison.table,
-        "indicator": comparison.indicator,
-        "comparison": comparison.label,
-        "threshold": comparison.threshold,
-        "value": estimate.value if estimate else None,
-        "low": estimate.low if estimate else None,
-        "high": estimate.high if estimate else None,
-        "level": estimate.level if estimate else None,
-        "probability": estimate.probability if estimate else None,
-        "p_value": estimate.p_value if estimate else None,
-        "p_holm": test.adjusted_p,
-        "verdict": unaffected or (estimate.verdict if estimate else None),
-        "verdict_holm": unaffected or test.adjusted_verdict,
-        "n_seeds": estimate.n_seeds if estimate else None,
-        "pairing_correlation": estimate.pairing_correlation if estimate else None,
-        "flags": " ".join(estimate.flags) if estimate else None,
-        "saturated": test.saturated,
-        "claim": None if claim is None else wording.claimed(test),
-        "published": test.published,
-        "claim_verdict": _on_claim(test, estimate.verdict if estimate else None),
-        "claim_verdict_holm": _on_claim(test, test.adjusted_verdict),
-        "seeds_for_power_80": test.seeds_needed,
-        "no_plan": test.no_plan,
-        "problem": test.problem,
-    }
-
-
-def _on_claim(test: IndicatorTest, verdict: Verdict | None) -> str | None:
-    if test.claim is not None and test.unaffected:
-        return "unaffected"
-    return test.on_claim(verdict)
 
 
 def write_text(path: Path, text: str) -> None:

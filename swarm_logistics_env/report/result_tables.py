@@ -113,18 +113,14 @@ def _answers(
     verdict, with Holm's in brackets where it differs, beside what the paper claims.
     """
     indicator = asked[0].comparison.indicator
-    properties = list(dict.fromkeys(wording.property_name(test) for test in asked))
+    properties = list(dict.fromkeys(test.property_name for test in asked))
     columns = [f"{indicator} [{wording.percent(results.level)}]"]
     columns += [f"{indicator} paper"] if published else []
     for name in properties:
         columns += [name, "paper"] if published else [name]
     rows = []
     for cell in cells:
-        here = {
-            wording.property_name(test): test
-            for test in asked
-            if test.comparison.changed == cell.arm
-        }
+        here = {test.property_name: test for test in asked if test.comparison.changed == cell.arm}
         row = [NOTHING] * len(columns)
         for name, test in here.items():
             row[0] = wording.ratio(test)
@@ -156,7 +152,7 @@ def _claims(results: StudyResults, policy: str) -> Iterator[Section]:
         rows.append(
             (
                 f"{test.comparison.indicator}, {test.comparison.label}",
-                wording.claimed(test),
+                test.claim_text or NOTHING,
                 wording.number(test.published),
                 wording.ratio(test),
                 unaffected or says or "blocked",

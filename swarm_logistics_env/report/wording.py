@@ -18,34 +18,6 @@ UNAFFECTED = "unaffected by construction"
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 NOTHING = "–"
 
-_PROPERTIES = {
-    ("S", 0.0): "scalable",
-    ("S", 1.0): "superlinear",
-    ("FT", 0.0): "tolerant",
-    ("R", 0.0): "robust",
-    ("A", 0.0): "adaptable",
-}
-
-
-def property_name(test: IndicatorTest) -> str:
-    """Return what is asked: whether the swarm is scalable, tolerant, ...; whether P falls."""
-    comparison = test.comparison
-    if _is_fall(test):
-        fall = -comparison.threshold
-        return f"P falls by more than {100 * fall:.0f} %" if fall else "P falls"
-    named = _PROPERTIES.get((comparison.indicator, comparison.threshold))
-    return named or f"{comparison.indicator} > {comparison.threshold:.3g}"
-
-
-def claimed(test: IndicatorTest) -> str:
-    """Return the claim in words."""
-    name = property_name(test)
-    return f"not {name}" if test.claim is False and not _is_fall(test) else name
-
-
-def _is_fall(test: IndicatorTest) -> bool:
-    return test.comparison.indicator == "change" and test.claim is False
-
 
 def items(interval: Interval | None) -> str:
     """Return a performance with its limits, e.g. "28.7 [27.1, 30.3]"."""
@@ -104,14 +76,9 @@ def verdict(test: IndicatorTest) -> str:
         return "blocked"
     if test.unaffected:
         return UNAFFECTED
-    plain = on_property(test, test.estimate.verdict)
-    adjusted = on_property(test, test.adjusted_verdict)
+    plain = test.on_property(test.estimate.verdict)
+    adjusted = test.on_property(test.adjusted_verdict)
     return f"{plain}" if adjusted == plain else f"{plain} ({adjusted or 'blocked'})"
-
-
-def on_property(test: IndicatorTest, verdict: Verdict | None) -> Verdict | None:
-    """Turn a verdict on "above the threshold" into one on the property that is named."""
-    return test.on_claim(verdict) if _is_fall(test) else verdict
 
 
 def counted_as(test: IndicatorTest, verdict: Verdict | None) -> str:
@@ -140,11 +107,6 @@ def power(test: IndicatorTest) -> str:
     if test.seeds_needed is None:
         return "undefined"
     return str(test.seeds_needed)
-
-
-def decided(test: IndicatorTest) -> bool:
-    """Return whether the Holm-adjusted verdict is either way."""
-    return test.adjusted_verdict in ("supported", "refuted")
 
 
 def listed(names: Sequence[str]) -> str:
@@ -180,7 +142,7 @@ class Sentence:
 def sentence(results: StudyResults, test: IndicatorTest) -> Sentence:
     """Return the verdict on one comparison in words."""
     comparison, estimate = test.comparison, test.estimate
-    head = f"{comparison.policy}, {property_name(test)}? {_conditions(test)}."
+    head = f"{comparison.policy}, {test.property_name}? {_conditions(test)}."
     if estimate is None:
         return Sentence(head, f"Blocked: {test.problem}.", "blocked")
     if test.unaffected:
@@ -190,8 +152,8 @@ def sentence(results: StudyResults, test: IndicatorTest) -> Sentence:
             "runs, so there is nothing to test."
         )
         return Sentence(head, text, "unaffected")
-    plain = on_property(test, estimate.verdict)
-    adjusted = on_property(test, test.adjusted_verdict) or "blocked"
+    plain = test.on_property(estimate.verdict)
+    adjusted = test.on_property(test.adjusted_verdict) or "blocked"
     # One seed gives no p, and Holm's placeholder of 1 says nothing.
     adjusted_p = None if estimate.p_value is None else test.adjusted_p
     mark = SATURATED if test.saturated else ""
@@ -254,7 +216,7 @@ def _claim(test: IndicatorTest, estimate: Estimate) -> list[str]:
         test.on_claim(verdict) or "blocked" for verdict in (estimate.verdict, test.adjusted_verdict)
     )
     both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
-    return [f'Claim "{claimed(test)}": {both}.']
+    return [f'Claim "{test.claim_text}": {both}.']
 
 
 def _what_it_takes(test: IndicatorTest, estimate: Estimate, adjusted: str) -> list[str]:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-Indicator = Literal["S", "FT", "R", "A", "change", "resilience"]
 Verdict = Literal["supported", "refuted", "inconclusive"]
 
 
@@ -60,7 +59,7 @@ class Estimate:
             more often than its level at this n).
     """
 
-    indicator: Indicator
+    indicator: str
     value: float
     low: float | None
     high: float | None
@@ -109,7 +108,7 @@ LEAST_SEEDS = 3
 
 
 def judge(
-    indicator: Indicator,
+    indicator: str,
     terms: Mapping[str, tuple[ArrayLike, float, float]],
     *,
     offset: float,

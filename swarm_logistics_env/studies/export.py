@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies.results import Value
 from swarm_logistics_env.studies.store import Store
-
-Value = str | float | int | bool | list[float] | None
 
 
 def export(store: Store, path: Path) -> tuple[int, str]:

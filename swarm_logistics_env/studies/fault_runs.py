@@ -13,7 +13,7 @@ from swarm_logistics_env.spi import Verdict
 from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Comparison
-from swarm_logistics_env.studies.results import IndicatorTest, StudyResults, outcomes_of
+from swarm_logistics_env.studies.results import IndicatorTest, StudyResults
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
     for comparison in results.plan.comparisons:
         if comparison.removed is None:
             continue
-        outcomes = outcomes_of(results, comparison.changed)
+        outcomes = results.outcomes_of(comparison.changed)
         if outcomes is None:
             continue
         seconds = np.array([outcome.anchoring_seconds for outcome in outcomes])

@@ -1,11 +1,12 @@
 """Gates: conditions under which a comparison of two studies fails, for continuous integration.
 
     gate     := ["possibly"] subject ("<" | ">") number ["at" text]
-    subject  := "S" | "FT" | "R" | "A" | "change"
+    subject  := symbol of an indicator in `spi.definitions`, "change" among them
 
-S, FT, R and A are those of the newer study; `change` is (P_new - P_old) / P_old of every condition
-under which both studies judge a policy, over the seeds that they share. "R < 0" fails where R lies
-below 0 beyond chance, "possibly R < 0" wherever that is not ruled out, for want of seeds as well.
+Indicators are those of the newer study. Only `change` is about both studies: (P_new - P_old) /
+P_old of every condition under which both judge a policy, over the seeds that they share. "R < 0"
+fails where R lies below 0 beyond chance, "possibly R < 0" wherever that is not ruled out, for want
+of seeds as well.
 `at` keeps the comparisons and conditions whose name holds the text, e.g. "R < 0 at FM4, m = 1".
 Verdicts are Holm-adjusted over what is kept. What cannot be judged fails: a policy without a match
 in the other study, failed runs, studies that share no seed. Where the runs of both studies are the
@@ -18,21 +19,21 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Self, cast
+from typing import Self
 
 import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.studies.conditions import seeds_in_words
 from swarm_logistics_env.studies.matching import Match, match, outcomes
 from swarm_logistics_env.studies.results import StudyResults, same_runs
 
-Subject = Literal["S", "FT", "R", "A", "change"]
-
+SUBJECTS = "|".join(DEFINITIONS)
 _GATE = re.compile(
-    r"(?P<possibly>possibly\s+)?(?P<subject>S|FT|R|A|change)\s*(?P<sign>[<>])\s*(?P<number>\S+)"
+    rf"(?P<possibly>possibly\s+)?(?P<subject>{SUBJECTS})\s*(?P<sign>[<>])\s*(?P<number>\S+)"
     r"(\s+at\s+(?P<at>.+))?"
 )
 
@@ -51,7 +52,7 @@ class Gate:
 
     text: str
     possibly: bool
-    subject: Subject
+    subject: str
     below: bool
     number: float
     at: str
@@ -66,7 +67,7 @@ class Gate:
         match = _GATE.fullmatch(text.strip())
         if match is None:
             raise StudyError(
-                f"gate {text!r}: should be [possibly] S|FT|R|A|change <|> NUMBER [at TEXT], "
+                f"gate {text!r}: should be [possibly] {SUBJECTS} <|> NUMBER [at TEXT], "
                 'e.g. "R < 0" or "possibly change < -0.1 at N = 25"'
             )
         try:
@@ -78,7 +79,7 @@ class Gate:
         return cls(
             text.strip(),
             match["possibly"] is not None,
-            cast("Subject", match["subject"]),
+            match["subject"],
             match["sign"] == "<",
             number,
             (match["at"] or "").strip(),

@@ -113,7 +113,7 @@ def _judged(results: StudyResults) -> _Judged:
     second = {
         (comparison.policy, comparison.table, comparison.changed)
         for comparison in plan.comparisons
-        if comparison.indicator == "change"
+        if comparison.definition.compares == "policy"
     }
     found: _Judged = {}
     for cell in results.cells:

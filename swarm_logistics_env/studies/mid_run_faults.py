@@ -16,7 +16,7 @@ from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.spi.survival import SurvivalCurve
 from swarm_logistics_env.studies.comparisons import Comparison
-from swarm_logistics_env.studies.results import StudyResults, Times, outcomes_of, times_of
+from swarm_logistics_env.studies.results import StudyResults, Times
 
 Pair = tuple[Times, Times]
 
@@ -74,7 +74,7 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
         assert comparison.removed is not None
         m, n = comparison.changed.setting.value, comparison.original.condition.scenario.n_robots
         faulty, removed, whole = (
-            times_of(results, arm)
+            results.times_of(arm)
             for arm in (comparison.changed, comparison.removed, comparison.original)
         )
         if faulty is None or removed is None or whole is None:
@@ -128,11 +128,11 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
     missing = StudyError("the runs of the no-fault null are missing")
     if null_pair is None:
         raise missing
-    original, other = times_of(results, null_pair.original), times_of(results, null_pair.other)
+    original, other = results.times_of(null_pair.original), results.times_of(null_pair.other)
     if original is None or other is None:
         raise missing
     arms = (*comparison.arms, null_pair.other)
-    if any(outcome.all_delivered for arm in arms for outcome in outcomes_of(results, arm) or ()):
+    if any(outcome.all_delivered for arm in arms for outcome in results.outcomes_of(arm) or ()):
         raise StudyError("the items ran out, and the rate with them: use restock")
     return original, other
 
@@ -196,7 +196,7 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
     seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
     curves = []
     for label, arm in arms.items():
-        if (times := times_of(results, arm)) is not None:
+        if (times := results.times_of(arm)) is not None:
             counts = np.array([_in_window(run, seconds, window) for run in times])
             rates = tuple(spi.mean_interval(column) for column in counts.T)
             curves.append(RateCurve(label, tuple(seconds.tolist()), rates))

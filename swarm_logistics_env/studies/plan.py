@@ -8,6 +8,7 @@ from functools import cached_property
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spi.definitions import DEFINITIONS, comparing
 from swarm_logistics_env.studies.comparisons import (
     NO_FAULT,
     OTHER_BEHAVIOUR,
@@ -29,6 +30,8 @@ from swarm_logistics_env.studies.specification import (
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 from swarm_logistics_env.warehouse.faults import Fault
+
+SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
 
 @dataclass(frozen=True)
@@ -135,9 +138,9 @@ def make_plan(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
-    # Self-repair is told of FT's comparisons alone: without them nobody looks at the null_pair.
+    # Only comparisons with the robots removed have a self-repair time, which needs the null pair.
     null_pairs = [item for item in found if isinstance(item, NullPair)]
-    if "FT" not in specification.indicators:
+    if not any(DEFINITIONS[symbol].needs_removed for symbol in specification.indicators):
         null_pairs = []
     return Plan(specification, comparisons, code or code_version(), known, tuple(null_pairs))
 
@@ -160,7 +163,7 @@ def _asked(
             yield from adaptability(base, parameter, policy)
         for ablation, part in lesser:
             if part.identity != policy.identity:
-                yield _ablation(base, ablation, policy, part)
+                yield from _ablation(base, ablation, policy, part)
 
 
 def studied(source: object) -> StudiedPolicy:
@@ -186,21 +189,26 @@ def scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator
         for size in sizes.values
     }
     steps = list(zip(sizes.values, sizes.values[1:]))
-    for small, large in steps:
-        yield Comparison(table, "S", arms[small], arms[large])
+    for definition in comparing("size"):
+        for small, large in steps:
+            yield Comparison(table, definition.symbol, arms[small], arms[large])
     for small, large in sizes.superlinear:
         if (small, large) not in steps:
             raise StudyError(
                 f"superlinear = ({small}, {large}): should be a step between neighbouring "
                 f"sizes of {sizes.values}"
             )
-        yield Comparison(table, "S", arms[small], arms[large], threshold=1.0)
+        for definition in comparing("size"):
+            if SUPERLINEAR in definition.adjectives:
+                yield Comparison(
+                    table, definition.symbol, arms[small], arms[large], threshold=SUPERLINEAR
+                )
 
 
 def robustness(
     base: Scenario, faults: Faults, policy: StudiedPolicy
 ) -> Iterator[Comparison | NullPair]:
-    """Yield FT and R of every mode, m and onset, and the null_pair where an onset is in mid-run."""
+    """Yield the indicators of every mode, m and onset; the null pair where faults start late."""
     scenario = vary(base, faults.scenario)
     table = _title(faults, "Fault tolerance and robustness")
     for m in faults.robots:
@@ -229,8 +237,9 @@ def robustness(
             for m in faults.robots:
                 failed = arm(mode, m, onset, faults.duration)
                 removed = arm("removed", m, onset, None)
-                yield Comparison(table, "FT", original, failed, removed)
-                yield Comparison(table, "R", original, failed)
+                for definition in comparing("fault"):
+                    third = removed if definition.needs_removed else None
+                    yield Comparison(table, definition.symbol, original, failed, third)
 
 
 def adaptability(
@@ -246,27 +255,30 @@ def adaptability(
         )
         for value in parameter.values
     )
-    for arm in changed:
-        yield Comparison(table, "A", original, arm)
+    for definition in comparing("parameter"):
+        for arm in changed:
+            yield Comparison(table, definition.symbol, original, arm)
 
 
 def _ablation(
     base: Scenario, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy
-) -> Comparison:
+) -> Iterator[Comparison]:
     scenario = vary(base, ablation.scenario)
     whole, part = (
         Arm(Setting("policy", label.label, scenario.n_robots), _condition(label, scenario))
         for label in (policy, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".
-    return Comparison(
-        _title(ablation, "Ablation"),
-        "change",
-        whole,
-        part,
-        threshold=-ablation.fall if ablation.fall else 0.0,
-        claim=False,
-    )
+    threshold = -ablation.fall if ablation.fall else 0.0
+    for definition in comparing("policy"):
+        yield Comparison(
+            _title(ablation, "Ablation"),
+            definition.symbol,
+            whole,
+            part,
+            threshold=threshold,
+            claim=False,
+        )
 
 
 def _condition(policy: StudiedPolicy, scenario: Scenario, **fields: float) -> Condition:

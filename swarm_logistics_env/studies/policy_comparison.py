@@ -108,7 +108,7 @@ def indicator_contests(results: StudyResults) -> Iterator[IndicatorContest]:
     asked: dict[object, dict[str, IndicatorTest]] = {}
     for test in results.tests:
         comparison = test.comparison
-        if comparison.indicator != "change":
+        if comparison.definition.compares != "policy":
             asked.setdefault((comparison.table, comparison.question), {})[comparison.policy] = test
     for by_policy in asked.values():
         if len(by_policy) < 2:

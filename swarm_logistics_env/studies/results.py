@@ -18,6 +18,8 @@ from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.tasks.task import Outcome
 
+Value = str | float | int | bool | list[float] | None
+Times = tuple[NDArray[np.float64], ...]
 POWER = 0.8
 LEVEL = 0.95
 _LEAST_ALPHA = 1e-12  # of a look: a level is no nearer to 1 than this, whose numbers end at 1e-16
@@ -63,6 +65,29 @@ class Cell:
             return None
         return prediction.low <= self.published <= prediction.high
 
+    def record(self) -> dict[str, Value]:
+        """Return a row of the table of performances; intervals are at 95 %, P in items."""
+        setting, mean, prediction = self.arm.setting, self.mean, self.prediction
+        return {
+            "policy": self.policy,
+            "table": self.table,
+            "cell": str(setting),
+            "factor": setting.name,
+            "value": setting.value,
+            "onset": setting.onset,
+            "published": self.published,
+            "counted": self.counted,
+            "n_seeds": len(self.performance),
+            "mean": mean.value if mean else None,
+            "low": mean.low if mean else None,
+            "high": mean.high if mean else None,
+            "prediction_low": prediction.low if prediction else None,
+            "prediction_high": prediction.high if prediction else None,
+            "published_inside": self.published_inside,
+            "saturated": self.saturated,
+            "problem": self.problem,
+        }
+
 
 @dataclass(frozen=True)
 class IndicatorTest:
@@ -94,6 +119,34 @@ class IndicatorTest:
         """Whether both conditions gave the same runs: the value is exact, and no evidence."""
         return self.estimate is not None and self.estimate.identical
 
+    @property
+    def _asks_for_fall(self) -> bool:
+        return self.comparison.definition.compares == "policy" and self.claim is False
+
+    @property
+    def property_name(self) -> str:
+        """What is asked: whether the swarm is scalable, tolerant, ...; whether P falls."""
+        return self.comparison.definition.property_name(
+            self.comparison.threshold, claimed_below=self.claim is False
+        )
+
+    @property
+    def claim_text(self) -> str | None:
+        """The claim in words; None: nothing is claimed."""
+        if self.claim is None:
+            return None
+        negated = self.claim is False and not self._asks_for_fall
+        return f"not {self.property_name}" if negated else self.property_name
+
+    @property
+    def decided(self) -> bool:
+        """Whether the Holm-adjusted verdict is either way."""
+        return self.adjusted_verdict in ("supported", "refuted")
+
+    def on_property(self, verdict: Verdict | None) -> Verdict | None:
+        """Turn a verdict on "above the threshold" into one on the property that is named."""
+        return self.on_claim(verdict) if self._asks_for_fall else verdict
+
     def on_claim(self, verdict: Verdict | None) -> Verdict | None:
         """Turn a verdict on "above the threshold" into one on what is claimed."""
         if verdict is None or self.claim is None:
@@ -101,6 +154,43 @@ class IndicatorTest:
         if self.claim or verdict == "inconclusive":
             return verdict
         return "supported" if verdict == "refuted" else "refuted"
+
+    def record(self) -> dict[str, Value]:
+        """Return a row of the table of indicators."""
+        comparison, estimate = self.comparison, self.estimate
+        unaffected = "unaffected" if self.unaffected else None
+        return {
+            "policy": comparison.policy,
+            "table": comparison.table,
+            "indicator": comparison.indicator,
+            "comparison": comparison.label,
+            "threshold": comparison.threshold,
+            "value": estimate.value if estimate else None,
+            "low": estimate.low if estimate else None,
+            "high": estimate.high if estimate else None,
+            "level": estimate.level if estimate else None,
+            "probability": estimate.probability if estimate else None,
+            "p_value": estimate.p_value if estimate else None,
+            "p_holm": self.adjusted_p,
+            "verdict": unaffected or (estimate.verdict if estimate else None),
+            "verdict_holm": unaffected or self.adjusted_verdict,
+            "n_seeds": estimate.n_seeds if estimate else None,
+            "pairing_correlation": estimate.pairing_correlation if estimate else None,
+            "flags": " ".join(estimate.flags) if estimate else None,
+            "saturated": self.saturated,
+            "claim": self.claim_text,
+            "published": self.published,
+            "claim_verdict": self._told_of_claim(estimate.verdict if estimate else None),
+            "claim_verdict_holm": self._told_of_claim(self.adjusted_verdict),
+            "seeds_for_power_80": self.seeds_needed,
+            "no_plan": self.no_plan,
+            "problem": self.problem,
+        }
+
+    def _told_of_claim(self, verdict: Verdict | None) -> str | None:
+        if self.claim is not None and self.unaffected:
+            return "unaffected"
+        return self.on_claim(verdict)
 
 
 @dataclass(frozen=True)
@@ -127,6 +217,30 @@ class StudyResults:
     outcomes: Mapping[str, Outcome]
     level: float = LEVEL
     looks: tuple[int, ...] = ()
+
+    def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...] | None:
+        """Return an arm's outcomes by seed; None where one failed, is missing or has no times."""
+        runs = (arm.condition.run(self.plan.code, seed) for seed in self.plan.seeds)
+        found = [self.outcomes.get(run.key) for run in runs]
+        complete = tuple(
+            outcome
+            for outcome in found
+            if outcome is not None and outcome.error is None and outcome.untimed is None
+        )
+        return complete if len(complete) == len(found) else None
+
+    def times_of(self, arm: Arm) -> Times | None:
+        """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""
+        outcomes = self.outcomes_of(arm)
+        return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)
+
+    def performance_table(self) -> list[dict[str, Value]]:
+        """Return P of every cell, one row each."""
+        return [cell.record() for cell in self.cells]
+
+    def indicator_table(self) -> list[dict[str, Value]]:
+        """Return every comparison with its verdicts, one row each."""
+        return [test.record() for test in self.tests]
 
 
 def judge(
@@ -290,24 +404,3 @@ def _adjusted(tests: list[IndicatorTest]) -> tuple[IndicatorTest, ...]:
             if not tests[index].unaffected:
                 adjusted[index] = replace(tests[index], adjusted_p=p, adjusted_verdict=verdict)
     return tuple(adjusted)
-
-
-Times = tuple[NDArray[np.float64], ...]
-
-
-def outcomes_of(results: StudyResults, arm: Arm) -> tuple[Outcome, ...] | None:
-    """Return an arm's outcomes seed by seed; None where one failed, is missing or has no times."""
-    plan = results.plan
-    found = [results.outcomes.get(arm.condition.run(plan.code, seed).key) for seed in plan.seeds]
-    complete = tuple(
-        outcome
-        for outcome in found
-        if outcome is not None and outcome.error is None and outcome.untimed is None
-    )
-    return complete if len(complete) == len(found) else None
-
-
-def times_of(results: StudyResults, arm: Arm) -> Times | None:
-    """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""
-    outcomes = outcomes_of(results, arm)
-    return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     BeforeValidator,
@@ -21,6 +21,7 @@ from pydantic import (
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label, policy_name
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 
@@ -29,7 +30,6 @@ ScenarioFields = dict[str, Any]
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
-Judged = Literal["S", "FT", "R", "A", "change"]
 
 
 def vary(base: Scenario, fields: ScenarioFields) -> Scenario:
@@ -197,7 +197,7 @@ class Specification(_Part):
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
-    indicators: Annotated[tuple[Judged, ...], Field(min_length=1)] = ("S", "FT", "R", "A", "change")
+    indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     looks: tuple[PositiveInt, ...] = ()
     reference: str | None = None
 
@@ -208,8 +208,11 @@ class Specification(_Part):
 
     @field_validator("indicators")
     @classmethod
-    def _distinct(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _each_once(values)
+    def _defined(cls, symbols: tuple[str, ...]) -> tuple[str, ...]:
+        for symbol in symbols:
+            if symbol not in DEFINITIONS:
+                raise ValueError(f"no indicator {symbol!r}{suggest(symbol, DEFINITIONS)}")
+        return _each_once(symbols)
 
     @field_validator("looks")
     @classmethod

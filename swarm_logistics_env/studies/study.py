@@ -249,9 +249,7 @@ class Study:
         _need_pandas()
         import pandas as pd
 
-        from swarm_logistics_env.report.report_files import indicator_record
-
-        return pd.DataFrame(indicator_record(j) for j in self.findings().tests)
+        return pd.DataFrame(self.findings().indicator_table())
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
         """Write report.md, cells.csv and claims.csv into a directory; return their paths.

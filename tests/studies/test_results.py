@@ -10,7 +10,6 @@ import pytest
 
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
-from swarm_logistics_env.report.report_files import indicator_record
 from swarm_logistics_env.report.result_tables import sections
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.agreement import agreement, agreements
@@ -198,7 +197,7 @@ def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
         assert test.estimate is not None
         assert test.estimate.value == test.comparison.changed.setting.value / 25
         assert (test.adjusted_p, test.adjusted_verdict) == (None, None)
-        record = indicator_record(test)
+        record = test.record()
         assert (record["verdict"], record["claim_verdict_holm"]) == ("unaffected", "unaffected")
     # Holm's family of R has nine members left, so the smallest p counts nine times.
     rest = [j for j in found.tests if j.comparison.family == ("swarm-dt", "R")]

@@ -51,7 +51,7 @@ def test_file_says_what_python_says(tmp_path: Path) -> None:
         ("[[faults]]\nmodes = ['FM1', 'FM1']", "each value once"),
         ("[[faults]]\nmodes = ['FM1']\nrobots = [1, 1]", "each value once"),
         ("[faults]\nmodes = ['FM1']", "Specification.faults = {'modes': ['FM1']}"),
-        ("indicators = ['Q']", "Specification.indicators.0 = 'Q'"),
+        ("indicators = ['Q']", "Specification.indicators = ['Q']: no indicator 'Q'"),
         ("looks = [10, 5]\nseeds = 10", "rising"),
         ("looks = [10, 20]\nseeds = 15", "seeds = 15: should be one of the looks (10, 20)"),
         ("scenario = { n_robot = 3 }", "did you mean 'n_robots'?"),
