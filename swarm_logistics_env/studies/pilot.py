@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -12,7 +10,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies.conditions import Condition
 from swarm_logistics_env.studies.engines import execute
 from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.studies.store import Store
 from swarm_logistics_env.tasks.task import Outcome
 
 PILOT = 3.0  # simulated seconds
@@ -66,13 +64,11 @@ def _pace(plan: Plan, condition: Condition) -> float:
 def _size(plan: Plan, n_seeds: int) -> int:
     """Return the size of a store with a full delivery of every run [bytes]."""
     sizes = []
-    with tempfile.TemporaryDirectory() as directory:
-        path = Path(directory) / FILE_NAME
+    with Store(None) as store:
         # Ten more seeds: a file grows by whole pages.
         for seeds in (range(1), range(1, 11)):
-            with Store(path) as store:
-                for run in (c.run(plan.code, seed) for c in plan.conditions for seed in seeds):
-                    times = np.zeros(run.condition.scenario.n_items)
-                    store.add(run, Outcome(run.key, delivery_times=times))
-            sizes.append(path.stat().st_size)
+            for run in (c.run(plan.code, seed) for c in plan.conditions for seed in seeds):
+                times = np.zeros(run.condition.scenario.n_items)
+                store.add(run, Outcome(run.key, delivery_times=times))
+            sizes.append(store.size)
     return sizes[0] + (n_seeds - 1) * (sizes[1] - sizes[0]) // 10

@@ -182,6 +182,14 @@ class Store:
             (count,) = self._database.execute("SELECT count(*) FROM runs").fetchone()
             return int(count)
 
+    @property
+    def size(self) -> int:
+        """Size of the database [bytes]."""
+        with self._explained():
+            (pages,) = self._database.execute("PRAGMA page_count").fetchone()
+            (page,) = self._database.execute("PRAGMA page_size").fetchone()
+            return int(pages) * int(page)
+
     def absorb(self, path: Path) -> None:
         """Add the runs of another store, to which `add`'s rule applies.
 

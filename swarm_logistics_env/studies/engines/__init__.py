@@ -48,9 +48,9 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
             raise StudyError(f"engine local: is one process, not {processes}")
         return serial
     if name == "process":
-        from swarm_logistics_env.studies.engines.process_pool import Processes
+        from swarm_logistics_env.studies.engines.process_pool import ProcessPool
 
-        return Processes(processes or os.cpu_count() or 1)
+        return ProcessPool(processes or os.cpu_count() or 1)
     from swarm_logistics_env.studies.engines.ray_cluster import Cluster
 
     if address is not None and processes is not None:

@@ -1,4 +1,4 @@
-"""Local processes: workers play runs and send the outcomes back; only the parent writes."""
+"""Worker processes on this machine: they play runs, only the parent writes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from multiprocessing.connection import Connection
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies.conditions import Run
@@ -23,11 +24,11 @@ from swarm_logistics_env.tasks.task import Outcome
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-class Processes:
+class ProcessPool:
     """An engine of `count` worker processes.
 
-    A worker that dies is replaced and its run played once more; a run that ends two workers is
-    an outcome with an error.
+    When a worker dies, each run that was being played is played once more, alone in a new worker; a
+    run that ends this worker as well is an outcome with an error.
 
     Raises:
         StudyError: a run cannot be sent to another process, or no worker comes up.
@@ -39,110 +40,105 @@ class Processes:
     def __call__(self, runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
         """Yield each run with its outcome, as they finish."""
         waiting = deque(runs)
-        again: set[str] = set()
-        workers = [_Worker() for _ in range(min(self.count, len(waiting)))]
-        try:
-            while workers:
-                for connection in wait([worker.connection for worker in workers]):
-                    worker = next(w for w in workers if w.connection is connection)
-                    run = worker.run
-                    outcome = worker.receive()
-                    if outcome is None and worker.died:
-                        workers.remove(worker)
-                        if run is not None and run.key in again:
-                            outcome = Outcome(run.key, error=worker.obituary())
-                        elif run is not None:
-                            again.add(run.key)
-                            waiting.appendleft(run)
-                        if waiting:
-                            workers.append(_Worker())
-                    elif waiting:
-                        worker.send(waiting.popleft())
+        while waiting:
+            interrupted: list[Run] = []
+            with _workers(min(self.count, len(waiting))) as pool:
+                for run, outcome in _played(pool, waiting, self.count):
+                    if outcome is None:
+                        interrupted.append(run)
                     else:
-                        workers.remove(worker)
-                        worker.stop()
-                    if run is not None and outcome is not None:
                         yield run, outcome
-        finally:
-            for worker in workers:
-                worker.stop()
+            for run in interrupted:
+                yield run, _played_alone(run)
 
 
-class _Worker:
-    """A process that plays the runs that it is sent."""
+def _played(
+    pool: ProcessPoolExecutor, waiting: deque[Run], at_once: int
+) -> Iterator[tuple[Run, Outcome | None]]:
+    """Yield runs with their outcomes until none waits, or with None once a worker has died."""
+    playing: dict[Future[Outcome], Run] = {}
+    broken = False
+    while playing or (waiting and not broken):
+        while waiting and not broken and len(playing) < at_once:
+            message = _pickled(waiting[0])
+            try:
+                playing[pool.submit(_play, waiting[0].key, message)] = waiting[0]
+            except BrokenProcessPool:  # a worker died between two runs
+                broken = True
+            else:
+                waiting.popleft()
+        for future in wait(playing, return_when=FIRST_COMPLETED).done:
+            try:
+                outcome = future.result()
+            except BrokenProcessPool:
+                broken, outcome = True, None
+            yield playing.pop(future), outcome
 
-    def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.connection, theirs = context.Pipe()
-        self.process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
-        with _one_thread_each(), _keyboard_ignored():
-            self.process.start()
-        theirs.close()  # or its end would never be seen to close
-        self.run: Run | None = None
-        self.ready = False
-        self.died = False
 
-    def send(self, run: Run) -> None:
+def _played_alone(run: Run) -> Outcome:
+    others = set(multiprocessing.active_children())
+    with _workers(1) as pool:
+        (worker,) = set(multiprocessing.active_children()) - others
         try:
-            message = pickle.dumps(run)
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            return pool.submit(_play, run.key, _pickled(run)).result()
+        except BrokenProcessPool:
+            worker.join()
+    code = worker.exitcode or 0
+    cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+    error = f"WorkerDied: two worker processes ended in this run, the second by {cause}\n"
+    return Outcome(run.key, error=error)
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Start worker processes, and end them at once with the block, or when this process dies."""
+    context = multiprocessing.get_context("spawn")
+    theirs, ours = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
+    try:
+        with _one_thread_each(), _interrupts_ignored():
+            started = [pool.submit(os.getpid) for _ in range(count)]
+        try:
+            started[0].result()
+        except BrokenProcessPool:
             raise StudyError(
-                f"policy {run.condition.policy.label!r} cannot be sent to another process "
-                f"({error}): use one process"
-            ) from error
-        self.run = run
-        try:
-            self.connection.send_bytes(message)
-        except OSError:
-            return  # it died meanwhile: the next wait says so
+                "a worker process ended before its first run; in a script, run the study "
+                'under `if __name__ == "__main__":`, or use one process'
+            ) from None
+        yield pool
+    finally:
+        ours.close()
+        pool.shutdown(cancel_futures=True)
+        theirs.close()
 
-    def receive(self) -> Outcome | None:
+
+def _end_with_parent(connection: Connection) -> None:
+    """End this worker when the parent closes its end of the pipe, which its death does as well."""
+
+    def watch() -> None:
         try:
-            outcome: Outcome | str | None = self.connection.recv()
+            connection.recv()
         except (EOFError, OSError):
-            self.process.join()
-            self.connection.close()
-            self.died = True
-            if not self.ready:
-                raise StudyError(
-                    "a worker process ended before its first run; in a script, run the study "
-                    'under `if __name__ == "__main__":`, or use one process'
-                ) from None
-            return None
-        if isinstance(outcome, str):
-            assert self.run is not None
-            outcome = Outcome(self.run.key, error=outcome)
-        self.ready = True
-        self.run = None
-        return outcome
+            os._exit(0)
 
-    def obituary(self) -> str:
-        code = self.process.exitcode or 0
-        cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        return f"WorkerDied: two worker processes ended in this run, the second by {cause}\n"
-
-    def stop(self) -> None:
-        self.connection.close()
-        self.process.terminate()
-        self.process.join()
+    threading.Thread(target=watch, daemon=True).start()
 
 
-def _work(connection: Connection) -> None:
-    connection.send(None)  # ready
-    while True:
-        try:
-            message = connection.recv_bytes()
-        except (EOFError, OSError):
-            return
-        reply: Outcome | str
-        try:
-            reply = execute(pickle.loads(message))
-        except Exception:  # noqa: BLE001 - a policy that only the parent can import
-            reply = traceback.format_exc()
-        try:
-            connection.send(reply)
-        except OSError:
-            return  # the parent was killed
+def _pickled(run: Run) -> bytes:
+    try:
+        return pickle.dumps(run)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise StudyError(
+            f"policy {run.condition.policy.label!r} cannot be sent to another process "
+            f"({error}): use one process"
+        ) from error
+
+
+def _play(key: str, message: bytes) -> Outcome:
+    try:
+        return execute(pickle.loads(message))
+    except Exception:  # noqa: BLE001 - a policy that only the parent can import
+        return Outcome(key, error=traceback.format_exc())
 
 
 @contextmanager
@@ -160,8 +156,8 @@ def _one_thread_each() -> Iterator[None]:
 
 
 @contextmanager
-def _keyboard_ignored() -> Iterator[None]:
-    """Let children be born deaf to Ctrl-C: the parent alone decides how the study stops."""
+def _interrupts_ignored() -> Iterator[None]:
+    """Start workers that ignore SIGINT: the parent alone decides how the study stops."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
