@@ -245,24 +245,20 @@ def _told(tally: Tally, players: str) -> str:
 
 
 def _show(asked: Study) -> None:
-    from dataclasses import replace
-
     from swarm_logistics_env.cli.tables import show
-    from swarm_logistics_env.report.further_measures import beyond_faults
+    from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.report_files import (
         how_to_get_figures,
         missing_packages,
         write_report,
     )
-    from swarm_logistics_env.report.result_tables import sections
 
     results = asked.findings()
-    for section in (*sections(results), *beyond_faults(results)):
-        if section.columns or section.lines:  # else it is a figure
-            show(replace(section, figures=()))
+    whole = document(results)
+    for section in whole.summary:
+        show(section)
     assert asked.out is not None
-    # Of the results that were shown: nothing is read and judged twice.
-    written = write_report(results, asked.out)
+    written = write_report(results, asked.out, whole)
     typer.echo(f"Written: {', '.join(str(path) for path in written)}")
     if missing := missing_packages():
         typer.echo(how_to_get_figures(missing))

@@ -31,11 +31,18 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Document:
-    """The whole report."""
+    """The whole report.
+
+    Attributes:
+        title, text: its heading and the sentences below it.
+        chapters: its parts, in order.
+        summary: the tables, warnings and measures of faults alone, for a terminal.
+    """
 
     title: str
     text: tuple[str, ...]
     chapters: tuple[Chapter, ...]
+    summary: tuple[Section, ...]
 
 
 def document(results: StudyResults) -> Document:
@@ -50,8 +57,20 @@ def document(results: StudyResults) -> Document:
     ]
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
-    chapters = (chapter for chapter in _chapters(results) if chapter.sections)
-    return Document(f"Study {plan.specification.name!r}", tuple(text), tuple(_names_once(chapters)))
+    table_sections, fault_sections = tuple(tables(results)), tuple(beyond_faults(results))
+    chapters = _chapters(results, table_sections, fault_sections)
+    lines = warnings(results)
+    summary = (
+        *table_sections,
+        *([Section("Warnings", lines=lines)] if lines else []),
+        *(replace(one, figures=()) for one in fault_sections if one.columns or one.lines),
+    )
+    return Document(
+        f"Study {plan.specification.name!r}",
+        tuple(text),
+        tuple(_names_once(chapter for chapter in chapters if chapter.sections)),
+        summary,
+    )
 
 
 def _names_once(chapters: Iterable[Chapter]) -> Iterator[Chapter]:
@@ -86,7 +105,11 @@ def figures_of(whole: Document) -> Iterator[Figure]:
             yield from section.figures
 
 
-def _chapters(results: StudyResults) -> Iterator[Chapter]:
+def _chapters(
+    results: StudyResults,
+    table_sections: tuple[Section, ...],
+    fault_sections: tuple[Section, ...],
+) -> Iterator[Chapter]:
     series = size_series(results)
     yield Chapter(
         "Warnings", "", tuple([Section("", lines=lines)] if (lines := warnings(results)) else [])
@@ -111,7 +134,7 @@ def _chapters(results: StudyResults) -> Iterator[Chapter]:
         "Results",
         "P is the number of items delivered. Square brackets hold intervals at the level that the "
         'heading gives; "one run" is where a single further run falls.',
-        tuple(tables(results)),
+        table_sections,
     )
     yield Chapter("Checks", "How far the verdicts hang on the method.", tuple(checks(results)))
     yield Chapter(
@@ -123,7 +146,7 @@ def _chapters(results: StudyResults) -> Iterator[Chapter]:
     yield Chapter(
         "Beyond the paper",
         "Measures that the paper does not define; none of them enters a verdict above.",
-        (*beyond(results, series), *beyond_faults(results)),
+        (*beyond(results, series), *fault_sections),
     )
     yield Chapter("Set-up", "", setup_sheet(results.plan))
 

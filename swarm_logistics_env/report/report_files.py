@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.report.document import document, figures_of
+from swarm_logistics_env.report.document import Document, document, figures_of
 from swarm_logistics_env.report.drawing import INK, PAPER, WIDTH
 from swarm_logistics_env.report.figures import Figure
 from swarm_logistics_env.report.markup import html, markdown
@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 
-def write_report(results: StudyResults, directory: Path) -> tuple[Path, ...]:
+def write_report(
+    results: StudyResults, directory: Path, whole: Document | None = None
+) -> tuple[Path, ...]:
     """Write report.md, cells.csv, claims.csv, every figure's data, and with the extra `study`
     installed report.html and every figure as SVG and PNG; return the paths of report and tables.
 
@@ -37,7 +39,7 @@ def write_report(results: StudyResults, directory: Path) -> tuple[Path, ...]:
     except OSError as error:
         raise StudyError(f"cannot write to {pictures}: {error.strerror}") from error
     cells, claims = results.performance_table(), results.indicator_table()
-    whole = document(results)
+    whole = whole or document(results)
     for figure in figures_of(whole):
         write_csv(pictures / f"{figure.name}.csv", figure.columns, figure.rows)
     missing = missing_packages()

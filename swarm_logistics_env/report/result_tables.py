@@ -40,13 +40,6 @@ class Section:
     figures: tuple[Figure, ...] = ()
 
 
-def sections(results: StudyResults) -> Iterator[Section]:
-    """Yield the results of a study, for whoever reads no more than them."""
-    yield from tables(results)
-    if lines := warnings(results):
-        yield Section("Warnings", lines=lines)
-
-
 def tables(results: StudyResults) -> Iterator[Section]:
     """Yield the tables of a study's results, policy by policy."""
     policies = tuple(dict.fromkeys(cell.policy for cell in results.cells))

@@ -31,7 +31,12 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
             ),
         ),
         *_failure_modes(plan),
-        Section("Base scenario", *_table(specification.scenario), lines=tuple(_variations(plan))),
+        Section(
+            "Base scenario",
+            ("condition", "value", "unit, meaning; source"),
+            tuple(specification.scenario.conditions()),
+            tuple(_variations(plan)),
+        ),
     )
 
 
@@ -99,15 +104,6 @@ def _failure_modes(plan: Plan) -> Iterator[Section]:
             ("mode", "what it does to a robot"),
             tuple((mode, FAILURE_MODES[mode].description) for mode in modes),
         )
-
-
-def _table(scenario: Scenario) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
-    """Return columns and rows of the scenario's own sheet, which is a Markdown table."""
-    head, _, *rows = (
-        tuple(value.strip() for value in line.strip("|").split(" | "))
-        for line in scenario.sheet().splitlines()
-    )
-    return head, tuple(rows)
 
 
 def _variations(plan: Plan) -> Iterator[str]:

@@ -10,7 +10,6 @@ import pytest
 
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
-from swarm_logistics_env.report.result_tables import sections
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.agreement import agreement, agreements
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Setting
@@ -183,7 +182,7 @@ def test_ablation_that_falls_is_supported(published: StudyResults) -> None:
     changes = [j for j in results(p).tests if j.comparison.indicator == "change"]
     # At N = 25: 39 -> 30; at N = 100: 74 -> 30, beyond a third.
     assert [j.on_claim(j.adjusted_verdict) for j in changes] == ["supported", "supported"]
-    titles = [section.title for section in sections(published)]
+    titles = [section.title for section in document(published).summary]
     assert "swarm-dt: Ablation: without taxis" in titles
 
 
