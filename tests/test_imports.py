@@ -53,8 +53,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "spi": set(),
     "watch": RUNS | {"rendering"},
     "tasks": RUNS,
-    "studies": RUNS | {"spi", "tasks"},
-    "report": RUNS | {"spi", "tasks", "studies"},
+    "studies": {"errors", "records", "streams", "spi", "tasks"},
+    "report": {"errors", "spi", "tasks", "studies"},
     "train": RUNS | ENVIRONMENT | {"wrappers", "adapters", "spi", "tasks", "studies"},
     "testing": RUNS | ENVIRONMENT | {"wrappers", "adapters"},
 }

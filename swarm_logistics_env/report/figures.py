@@ -98,7 +98,7 @@ def _faults(results: StudyResults) -> Iterator[Figure]:
             ]
             thresholds = tuple(definition.adjectives)
             panels.append(Panel("", definition.axis, tuple(series), thresholds, "failure mode"))
-        swarm = here[0].comparison.original.condition.scenario.n_robots
+        swarm = here[0].comparison.original.condition.size
         start = f", faults from {onset:g} s" if onset else ""
         yield _intervals(
             results,

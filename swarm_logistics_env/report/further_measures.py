@@ -148,7 +148,7 @@ def _budget(budget: ModeBudget) -> tuple[str, ...]:
     return (
         budget.comparison.policy,
         setting.name + (f" from {setting.onset:g} s" if setting.onset else ""),
-        str(budget.comparison.original.condition.scenario.n_robots),
+        str(budget.comparison.original.condition.size),
         ", ".join(map(str, budget.tested)),
         answer,
     )

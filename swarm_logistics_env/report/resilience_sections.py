@@ -148,7 +148,7 @@ def repair_figures(results: StudyResults, found: tuple[Resilience, ...]) -> Iter
         )
         if not rows:
             continue
-        swarm = members[0].comparison.original.condition.scenario.n_robots
+        swarm = members[0].comparison.original.condition.size
         yield Figure(
             slug("self-repair", policy, table, mode, f"{onset:g}s"),
             f"{policy}, {table}, N = {swarm}: share of runs whose delivery rate is not back yet "
@@ -193,7 +193,7 @@ def rate_figures(results: StudyResults) -> Iterator[Figure]:
         )
         if not rows:
             continue
-        swarm = comparisons[0].original.condition.scenario.n_robots
+        swarm = comparisons[0].original.condition.size
         yield Figure(
             slug("deliveries", policy, table, mode, f"{onset:g}s"),
             f"{policy}, {table}, N = {swarm}: deliveries in the trailing {window:g} s around "

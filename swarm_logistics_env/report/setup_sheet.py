@@ -7,10 +7,8 @@ from collections.abc import Iterator
 from importlib.metadata import version
 
 from swarm_logistics_env.report.result_tables import NOTHING, Section
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.specification import vary
-from swarm_logistics_env.warehouse.faults import FAILURE_MODES
+from swarm_logistics_env.tasks.warehouse import Scenario
 
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:
@@ -99,10 +97,11 @@ def _listed(parameters: object) -> str:
 def _failure_modes(plan: Plan) -> Iterator[Section]:
     modes = dict.fromkeys(fault.mode for c in plan.conditions for fault in c.faults)
     if modes:
+        task = plan.conditions[0].task
         yield Section(
             "Failure modes",
             ("mode", "what it does to a robot"),
-            tuple((mode, FAILURE_MODES[mode].description) for mode in modes),
+            tuple((mode, task.failure_modes[mode]) for mode in modes),
         )
 
 
@@ -114,7 +113,7 @@ def _variations(plan: Plan) -> Iterator[str]:
         *specification.parameters,
         *specification.ablations,
     ):
-        scenario = vary(specification.scenario, factor.scenario)
+        scenario = plan.conditions[0].task.vary(specification.scenario, factor.scenario)
         if differing := _differing(scenario, specification.scenario):
             yield f"{factor.title or type(factor).__name__} differs: {differing}."
 

@@ -177,7 +177,7 @@ def sentence(results: StudyResults, test: IndicatorTest) -> Sentence:
 def _conditions(test: IndicatorTest) -> str:
     comparison = test.comparison
     before, after = comparison.original.setting, comparison.changed.setting
-    swarm = comparison.original.condition.scenario.n_robots
+    swarm = comparison.original.condition.size
     if after.kind == "size":
         return f"N = {before.value:g} → {after.value:g} (m = {after.value - before.value:g} more)"
     if after.kind == "fault":

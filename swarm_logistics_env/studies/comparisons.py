@@ -167,7 +167,7 @@ class Comparison:
         change = Change(
             self.original.setting.value,
             self.changed.setting.value,
-            self.original.condition.scenario.n_robots,
+            self.original.condition.size,
         )
         return definition.function(
             **{name: performance(arm) for name, arm in named.items()},

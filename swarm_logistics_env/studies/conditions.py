@@ -10,8 +10,8 @@ from functools import cached_property
 from itertools import pairwise
 
 from swarm_logistics_env import streams
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Fault, Scenario
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,27 @@ class Condition:
     """All of a run but its seed. Conditions of equal content have equal keys and share runs.
 
     Attributes:
+        policy, scenario, faults: what is played, under which conditions.
         behaviour: 0: the policy's randomness follows from the run's seed; another number: from
             that number as well, so that the same worlds are met by another behaviour.
+        task: that plays it.
     """
 
     policy: StudiedPolicy
     scenario: Scenario
     faults: tuple[Fault, ...] = ()
     behaviour: int = 0
+    task: Task = field(default=WAREHOUSE, compare=False, repr=False)
+
+    @property
+    def size(self) -> int:
+        """Swarm size N."""
+        return self.task.size(self.scenario)
+
+    @property
+    def duration(self) -> float:
+        """Time at which a run ends at the latest [s]."""
+        return self.task.duration(self.scenario)
 
     @cached_property
     def scenario_json(self) -> str:
@@ -60,8 +73,10 @@ class Condition:
 
     @property
     def _content(self) -> tuple[str, ...]:
-        # Behaviour 0 adds nothing: the keys are those of stores that knew no other.
+        # Behaviour 0 and the warehouse add nothing: the keys are those of stores without them.
         other = (str(self.behaviour),) if self.behaviour else ()
+        if self.task.name != WAREHOUSE.name:
+            other = (*other, f"task {self.task.name}")
         return (self.scenario_json, self.faults_json, self.policy.identity, *other)
 
     def run(self, code: str, seed: int) -> Run:

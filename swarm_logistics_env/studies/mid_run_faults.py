@@ -72,7 +72,7 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
     for comparison in mid_run_faults(results):
         assert comparison.removed is not None
-        m, n = comparison.changed.setting.value, comparison.original.condition.scenario.n_robots
+        m, n = comparison.changed.setting.value, comparison.original.condition.size
         faulty, removed, whole = (
             results.times_of(arm)
             for arm in (comparison.changed, comparison.removed, comparison.original)
@@ -141,7 +141,7 @@ def _self_repair(
     comparison: Comparison, pair: Pair, null: Pair
 ) -> tuple[SelfRepair, SingleRepairs]:
     onset = comparison.changed.setting.onset
-    end = comparison.original.condition.scenario.duration
+    end = comparison.original.condition.duration
     generator = streams.generator(0, "self-repair")
     pooled = spi.self_repair(*pair, null, onset=onset, end=end, generator=generator)
     times = [spi.repair_times(*runs, onset=onset, end=end) for runs in (pair, null)]
@@ -179,7 +179,7 @@ class RateCurve:
 
 def window_of(comparison: Comparison) -> float:
     """Return the trailing window [s]: 100, or a third of what is left after the onset, rounded."""
-    left = comparison.original.condition.scenario.duration - comparison.changed.setting.onset
+    left = comparison.original.condition.duration - comparison.changed.setting.onset
     return min(_LONGEST_WINDOW, float(round(left / 3)) or left / 3)
 
 
@@ -192,7 +192,7 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
         "fault": comparison.changed,
     }
     window = window_of(comparison)
-    end = comparison.original.condition.scenario.duration
+    end = comparison.original.condition.duration
     seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
     curves = []
     for label, arm in arms.items():

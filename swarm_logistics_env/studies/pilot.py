@@ -37,20 +37,20 @@ def expect(plan: Plan) -> Expectation:
     """
     shortened = {_kind(condition): condition for condition in plan.conditions}
     pace = {kind: _pace(plan, condition) for kind, condition in shortened.items()}
-    per_seed = sum(pace[_kind(c)] * c.scenario.duration for c in plan.conditions)
+    per_seed = sum(pace[_kind(c)] * c.duration for c in plan.conditions)
     n_seeds = len(plan.seeds)
     return Expectation(per_seed * n_seeds, _size(plan, n_seeds))
 
 
 def _kind(condition: Condition) -> tuple[str, int]:
-    return condition.policy.identity, condition.scenario.n_robots
+    return condition.policy.identity, condition.size
 
 
 def _pace(plan: Plan, condition: Condition) -> float:
     """Return the wall time of a simulated second [s]."""
-    duration = min(PILOT, condition.scenario.duration)
-    scenario = condition.scenario.replace(duration=duration)
-    run = Condition(condition.policy, scenario).run(plan.code, 0)
+    duration = min(PILOT, condition.duration)
+    scenario = condition.task.vary(condition.scenario, {"duration": duration})
+    run = Condition(condition.policy, scenario, task=condition.task).run(plan.code, 0)
     outcomes = [execute(run) for _ in range(2)]  # the first may compile
     for outcome in outcomes:
         if outcome.error is not None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS, comparing
 from swarm_logistics_env.studies.comparisons import (
     NO_FAULT,
@@ -25,11 +24,10 @@ from swarm_logistics_env.studies.specification import (
     Parameter,
     Sizes,
     Specification,
-    vary,
 )
-from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Scenario
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -104,12 +102,14 @@ def make_plan(
     *,
     code: str | None = None,
     identities: Mapping[str, str] | None = None,
+    task: Task = WAREHOUSE,
 ) -> Plan:
     """Return the plan of a study.
 
     Args:
         code: version of the code that played it; None: that of this process.
         identities: of its policies when it was played; None: they are loaded and asked.
+        task: what is played.
 
     Raises:
         StudyError: the specification varies nothing, or a step of it cannot be.
@@ -127,7 +127,7 @@ def make_plan(
         known[part] = policy.identity
         return policy
 
-    found = list(_asked(specification, policy_of))
+    found = list(_asked(specification, policy_of, task))
     comparisons = tuple(
         item
         for item in found
@@ -142,11 +142,13 @@ def make_plan(
     null_pairs = [item for item in found if isinstance(item, NullPair)]
     if not any(DEFINITIONS[symbol].needs_removed for symbol in specification.indicators):
         null_pairs = []
-    return Plan(specification, comparisons, code or code_version(), known, tuple(null_pairs))
+    return Plan(specification, comparisons, code or task.code(), known, tuple(null_pairs))
 
 
 def _asked(
-    specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
+    specification: Specification,
+    policy_of: Callable[[str, object], StudiedPolicy],
+    task: Task,
 ) -> Iterator[Comparison | NullPair]:
     base = specification.scenario
     lesser = [
@@ -156,14 +158,14 @@ def _asked(
     for source in specification.policies:
         policy = policy_of(f"policy {policy_label(source)}", source)
         for sizes in specification.sizes:
-            yield from scalability(base, sizes, policy)
+            yield from scalability(base, sizes, policy, task)
         for faults in specification.faults:
-            yield from robustness(base, faults, policy)
+            yield from robustness(base, faults, policy, task)
         for parameter in specification.parameters:
-            yield from adaptability(base, parameter, policy)
+            yield from adaptability(base, parameter, policy, task)
         for ablation, part in lesser:
             if part.identity != policy.identity:
-                yield from _ablation(base, ablation, policy, part)
+                yield from _ablation(base, ablation, policy, part, task)
 
 
 def studied(source: object) -> StudiedPolicy:
@@ -180,12 +182,16 @@ def _title(factor: Factor, general: str) -> str:
     return factor.title or (f"{general} ({changes})" if changes else general)
 
 
-def scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
+def scalability(
+    base: Scenario, sizes: Sizes, policy: StudiedPolicy, task: Task = WAREHOUSE
+) -> Iterator[Comparison]:
     """Yield the comparisons between neighbouring swarm sizes."""
-    scenario = vary(base, sizes.scenario)
+    scenario = task.vary(base, sizes.scenario)
     table = _title(sizes, "Scalability")
     arms = {
-        size: Arm(Setting("size", "n_robots", size), _condition(policy, scenario, n_robots=size))
+        size: Arm(
+            Setting("size", "n_robots", size), _condition(task, policy, scenario, n_robots=size)
+        )
         for size in sizes.values
     }
     steps = list(zip(sizes.values, sizes.values[1:]))
@@ -206,52 +212,53 @@ def scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator
 
 
 def robustness(
-    base: Scenario, faults: Faults, policy: StudiedPolicy
+    base: Scenario, faults: Faults, policy: StudiedPolicy, task: Task = WAREHOUSE
 ) -> Iterator[Comparison | NullPair]:
     """Yield the indicators of every mode, m and onset; the null pair where faults start late."""
-    scenario = vary(base, faults.scenario)
+    scenario = task.vary(base, faults.scenario)
     table = _title(faults, "Fault tolerance and robustness")
     for m in faults.robots:
-        if m >= scenario.n_robots:
+        if m >= task.size(scenario):
             raise StudyError(
-                f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, "
+                f"faults.robots = {m}: should be less than n_robots = {task.size(scenario)}, "
                 "or no working robot is left"
             )
     for onset in faults.onsets:
-        if onset >= scenario.duration:
+        if onset >= task.duration(scenario):
             raise StudyError(
                 f"faults.onsets = {onset:g} s: should be less than duration = "
-                f"{scenario.duration:g} s, or nothing fails"
+                f"{task.duration(scenario):g} s, or nothing fails"
             )
-    original = Arm(NO_FAULT, _condition(policy, scenario))
+    original = Arm(NO_FAULT, _condition(task, policy, scenario))
     if any(faults.onsets):
-        other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1))
+        other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1, task=task))
         yield NullPair(table, original, other)
 
     def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
-        fault = Fault(mode, m, onset=onset, duration=duration)
-        return Arm(Setting("fault", mode, m, onset), Condition(policy, scenario, (fault,)))
+        fault = task.fault(mode, m, onset, duration)
+        condition = Condition(policy, scenario, (fault,), task=task)
+        return Arm(Setting("fault", mode, m, onset), condition)
 
     for onset in faults.onsets:
         for mode in faults.modes:
             for m in faults.robots:
                 failed = arm(mode, m, onset, faults.duration)
-                removed = arm("removed", m, onset, None)
+                removed = arm(task.removed, m, onset, None)
                 for definition in comparing("fault"):
                     third = removed if definition.needs_removed else None
                     yield Comparison(table, definition.symbol, original, failed, third)
 
 
 def adaptability(
-    base: Scenario, parameter: Parameter, policy: StudiedPolicy
+    base: Scenario, parameter: Parameter, policy: StudiedPolicy, task: Task = WAREHOUSE
 ) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
-    scenario = vary(base, parameter.scenario)
+    scenario = task.vary(base, parameter.scenario)
     table = _title(parameter, f"Adaptability to {parameter.name}")
     original, *changed = (
         Arm(
             Setting("parameter", parameter.name, value),
-            _condition(policy, scenario, **{parameter.name: value}),
+            _condition(task, policy, scenario, **{parameter.name: value}),
         )
         for value in parameter.values
     )
@@ -261,11 +268,11 @@ def adaptability(
 
 
 def _ablation(
-    base: Scenario, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy
+    base: Scenario, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy, task: Task
 ) -> Iterator[Comparison]:
-    scenario = vary(base, ablation.scenario)
+    scenario = task.vary(base, ablation.scenario)
     whole, part = (
-        Arm(Setting("policy", label.label, scenario.n_robots), _condition(label, scenario))
+        Arm(Setting("policy", label.label, task.size(scenario)), _condition(task, label, scenario))
         for label in (policy, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".
@@ -281,5 +288,5 @@ def _ablation(
         )
 
 
-def _condition(policy: StudiedPolicy, scenario: Scenario, **fields: float) -> Condition:
-    return Condition(policy, scenario.replace(**fields))
+def _condition(task: Task, policy: StudiedPolicy, scenario: Scenario, **fields: float) -> Condition:
+    return Condition(policy, task.vary(scenario, fields), task=task)

@@ -20,10 +20,9 @@ from pydantic import (
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label, policy_name
-from swarm_logistics_env.warehouse.faults import FAILURE_MODES
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Scenario
 
 ScenarioFields = dict[str, Any]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
@@ -32,16 +31,8 @@ MOST_SEEDS = 100_000
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 
 
-def vary(base: Scenario, fields: ScenarioFields) -> Scenario:
-    """Return `base` with `fields` changed; the field "preset" starts from that preset instead."""
-    changes = dict(fields)
-    if "preset" in changes:
-        base = Scenario.preset(str(changes.pop("preset")))
-    return base.replace(**changes)
-
-
 def _scenario(value: object) -> object:
-    return vary(Scenario(), value) if isinstance(value, dict) else value
+    return WAREHOUSE.vary(Scenario(), value) if isinstance(value, dict) else value
 
 
 def _each(record: type[Record]) -> Callable[[object], object]:
@@ -113,7 +104,7 @@ class Faults(Factor):
     @field_validator("modes")
     @classmethod
     def _known(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
-        known = set(FAILURE_MODES) - {"removed"}
+        known = set(WAREHOUSE.failure_modes) - {WAREHOUSE.removed}
         for mode in modes:
             if mode not in known:
                 raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
@@ -139,15 +130,10 @@ class Parameter(Factor):
     @field_validator("name")
     @classmethod
     def _numeric(cls, name: str) -> str:
-        known = {
-            field
-            for field, value in Scenario().model_dump().items()
-            if isinstance(value, int | float) and not isinstance(value, bool)
-        } - {"n_robots"}
         if name == "n_robots":
             raise ValueError("swarm sizes belong in `sizes`, where S judges them")
-        if name not in known:
-            raise ValueError(f"no numeric scenario field {name!r}{suggest(name, known)}")
+        if name not in WAREHOUSE.fields:
+            raise ValueError(f"no numeric scenario field {name!r}{suggest(name, WAREHOUSE.fields)}")
         return name
 
     @field_validator("values")

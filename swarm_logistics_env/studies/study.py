@@ -22,7 +22,8 @@ from swarm_logistics_env.studies.run_progress import Progress
 from swarm_logistics_env.studies.shards import Shard
 from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
-from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,6 +51,7 @@ class Study:
 
     Args:
         out: directory of the store and the report; None: kept in memory.
+        task: what is played; policies, sizes, faults and parameters are its own.
         fields: those of `Specification`, e.g. `policies=["swarm-dt"]`, `seeds=20`,
             `faults=[{"modes": ["FM1"], "robots": [1, 2]}]`.
 
@@ -64,7 +66,10 @@ class Study:
         3
     """
 
-    def __init__(self, *, out: str | Path | None = None, **fields: Any) -> None:
+    def __init__(
+        self, *, out: str | Path | None = None, task: Task = WAREHOUSE, **fields: Any
+    ) -> None:
+        self.task = task
         self.specification = Specification(**fields)
         self.out = None if out is None else Path(out)
         self._plan: Plan | None = None
@@ -132,7 +137,7 @@ class Study:
     def plan(self) -> Plan:
         """Return the conditions and comparisons, shared conditions once; nothing is run."""
         if self._plan is None:
-            self._plan = make_plan(self.specification)
+            self._plan = make_plan(self.specification, task=self.task)
         return self._plan
 
     def run(
@@ -157,10 +162,10 @@ class Study:
             StudyError: the store or the engine cannot be used, or the store is another study's.
         """
         plan = self.plan()
-        if plan.code != code_version():
+        if plan.code != (code := self.task.code()):
             raise StudyError(
                 f"this study was played under code version {plan.code}, this is "
-                f"{code_version()}: plan it anew, and all of it runs again"
+                f"{code}: plan it anew, and all of it runs again"
             )
         if engine is None:
             engine = "process" if processes is not None and processes > 1 else "local"

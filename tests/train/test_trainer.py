@@ -58,12 +58,16 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
 def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_call(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from swarm_logistics_env.studies import engines
+    from swarm_logistics_env.tasks.warehouse import WarehouseTask
 
     training = small(scores=Scores(seeds=1, sizes=(2, 3), n_robots=3))
+
+    def broken(*_: object) -> None:
+        raise RuntimeError("a wheel came off")
+
     with monkeypatch.context() as changed:
-        changed.setattr(engines, "code_version", lambda: "another")
-        with pytest.raises(TrainingError, match=r"runs of the scores failed .*the package changed"):
+        changed.setattr(WarehouseTask, "play", broken)
+        with pytest.raises(TrainingError, match=r"runs of the scores failed .*a wheel came off"):
             train(training, tmp_path)
     card = policies.read_card(tmp_path / "small.safetensors")
     assert (card.scores, card.scored_with) == ((), {})

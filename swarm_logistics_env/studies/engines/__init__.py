@@ -6,14 +6,10 @@ import os
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterable
+from dataclasses import replace
 
-import numpy as np
-
-from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.studies.conditions import Run
-from swarm_logistics_env.tasks.code_version import code_version
-from swarm_logistics_env.tasks.policy_choice import policy_of
 from swarm_logistics_env.tasks.task import Outcome
 
 Engine = Callable[[Iterable[Run]], Generator[tuple[Run, Outcome], None, None]]
@@ -63,27 +59,13 @@ def execute(run: Run) -> Outcome:
     start = time.perf_counter()
     condition = run.condition
     try:
-        if run.code != code_version():
+        code = condition.task.code()
+        if run.code != code:
             raise StudyError(
-                f"this process runs code version {code_version()}, the study {run.code}: "
+                f"this process runs code version {code}, the study {run.code}: "
                 "the package changed while the study ran"
             )
-        # A policy of its own: one that remembers must not make rows depend on the order of runs.
-        policy = policy_of(condition.policy.source)
-        episode = run_episode(
-            condition.scenario, policy, run.seed, condition.faults, run.policy_seed
-        )
+        outcome = condition.task.play(condition.policy.source, condition, run.seed, run.policy_seed)
     except Exception:  # noqa: BLE001 - kept as the run's row, and blocks the verdict
-        return Outcome(
-            run.key, error=traceback.format_exc(), wall_seconds=time.perf_counter() - start
-        )
-    return Outcome(
-        run.key,
-        delivery_times=np.asarray(episode.delivery_times, dtype=np.float64),
-        ended_at=float(episode.ended_at),
-        all_delivered=bool(episode.all_delivered),
-        failed_robots=tuple(int(robot) for robot in episode.failed_robots),
-        anchoring_seconds=float(episode.anchoring_seconds),
-        digest=episode.digest,
-        wall_seconds=time.perf_counter() - start,
-    )
+        outcome = Outcome("", error=traceback.format_exc())
+    return replace(outcome, run=run.key, wall_seconds=time.perf_counter() - start)
