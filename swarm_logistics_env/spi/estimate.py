@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
 
 from .bootstrap import MIN_SEEDS
 from .inputs import IndicatorError, between_0_and_1, finite, performance, positive_mean, same_seeds
-from .ratio import paired_ratio
+from .ratio import RatioTest, paired_ratio
 from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Verdict = Literal["supported", "refuted", "inconclusive"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """One indicator over n seeds: theta = mean(num) / mean(den) + offset, with its judgement.
 
@@ -61,19 +61,19 @@ class Estimate:
 
     indicator: str
     value: float
-    low: float | None
-    high: float | None
-    probability: float | None
-    verdict: Verdict
+    low: float | None = None
+    high: float | None = None
+    probability: float | None = None
+    verdict: Verdict = "inconclusive"
     threshold: float
     level: float
     n_seeds: int
-    p_value: float | None
+    p_value: float | None = None
     paired: bool
-    pairing_correlation: float | None
-    difference_sd: float | None
+    pairing_correlation: float | None = None
+    difference_sd: float | None = None
     mean_denominator: float
-    degrees_of_freedom: float | None
+    degrees_of_freedom: float | None = None
     flags: tuple[str, ...] = ()
 
     @property
@@ -139,43 +139,25 @@ def judge(
             reference 0, threshold or level out of range, an unknown name in `saturated`, or
             `identical` with performances that differ.
     """
-    weighted = {
-        name: Term(performance(name, sample), in_num, in_den)
-        for name, (sample, in_num, in_den) in terms.items()
-    }
     finite("threshold", threshold)
     between_0_and_1("level", level)
+    weighted = _checked(terms, saturated, paired=paired, identical=identical)
     samples = {name: term.sample for name, term in weighted.items()}
-    if paired:
-        same_seeds(**samples)
-    for name in saturated:
-        if name not in samples:
-            raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
-    if identical:
-        _refuse_differing(samples, paired=paired)
-    *_, (reference_name, reference) = samples.items()
-    positive_mean(reference_name, reference)
+    *_, reference = samples.values()
     n_seeds = min(sample.size for sample in samples.values())
+    asked = _Asked(
+        indicator=indicator, threshold=threshold, level=level, n_seeds=n_seeds, paired=paired
+    )
     if identical or n_seeds == 1:
         mean_den = float(reference.mean())
         mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
         value = mean_num / mean_den + offset
         return Estimate(
-            indicator=indicator,
+            **asked,
             value=value,
             low=value if identical else None,
             high=value if identical else None,
-            probability=None,
-            verdict="inconclusive",
-            threshold=threshold,
-            level=level,
-            n_seeds=n_seeds,
-            p_value=None,
-            paired=paired,
-            pairing_correlation=None,
-            difference_sd=None,
             mean_denominator=mean_den,
-            degrees_of_freedom=None,
             flags=("identical",) if identical else ("single_seed",),
         )
 
@@ -193,13 +175,7 @@ def judge(
             list(weighted.values()), offset=offset, threshold=threshold, level=level
         )
     p_value, probability = float(test.p_value), float(test.probability)
-    capped_side = _capped_side(weighted, saturated)
-    if n_seeds < LEAST_SEEDS:
-        flags.append("too_few_seeds")
-    if test.degenerate:
-        flags.append("degenerate")
-    if ("supported" if probability > 0.5 else "refuted") in capped_side:
-        flags.append("capped")
+    flags += _flags(test, n_seeds, _capped_side(weighted, saturated))
     if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
         p_value, probability = 1.0, 0.5
     elif not paired or n_seeds < MIN_SEEDS:
@@ -207,23 +183,61 @@ def judge(
     if test.unbounded:
         flags.append("unbounded")
     return Estimate(
-        indicator=indicator,
+        **asked,
         value=float(test.value),
         low=None if test.degenerate else float(test.low),
         high=None if test.degenerate else float(test.high),
         probability=probability,
         verdict=verdict_at(1.0 - level, p_value, probability),
-        threshold=threshold,
-        level=level,
-        n_seeds=n_seeds,
         p_value=p_value,
-        paired=paired,
         pairing_correlation=correlation,
         difference_sd=float(test.difference_sd),
         mean_denominator=float(test.mean_denominator),
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flags),
     )
+
+
+class _Asked(TypedDict):
+    indicator: str
+    threshold: float
+    level: float
+    n_seeds: int
+    paired: bool
+
+
+def _checked(
+    terms: Mapping[str, tuple[ArrayLike, float, float]],
+    saturated: Collection[str],
+    *,
+    paired: bool,
+    identical: bool,
+) -> dict[str, Term]:
+    weighted = {
+        name: Term(performance(name, sample), in_num, in_den)
+        for name, (sample, in_num, in_den) in terms.items()
+    }
+    samples = {name: term.sample for name, term in weighted.items()}
+    if paired:
+        same_seeds(**samples)
+    for name in saturated:
+        if name not in samples:
+            raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
+    if identical:
+        _refuse_differing(samples, paired=paired)
+    *_, (reference_name, reference) = samples.items()
+    positive_mean(reference_name, reference)
+    return weighted
+
+
+def _flags(test: RatioTest, n_seeds: int, capped_side: set[Verdict]) -> Iterator[str]:
+    """Yield why a test gives no verdict."""
+    if n_seeds < LEAST_SEEDS:
+        yield "too_few_seeds"
+    if test.degenerate:
+        yield "degenerate"
+    if ("supported" if test.probability > 0.5 else "refuted") in capped_side:
+        yield "capped"
 
 
 def _refuse_differing(samples: Mapping[str, NDArray[np.float64]], *, paired: bool) -> None:

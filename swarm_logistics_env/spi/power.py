@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from typing import TYPE_CHECKING
 
 from .inputs import IndicatorError, between_0_and_1, count, finite
@@ -72,11 +73,7 @@ def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> in
     high = 2
     while not enough(high):
         high *= 2
-    low = high // 2  # one too few, or 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high
+    return 2 + bisect_left(range(2, high), x=True, key=enough)
 
 
 def lower_decile_of_power(estimate: Estimate, effect: float, n_seeds: int) -> float | None:
