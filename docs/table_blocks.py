@@ -149,9 +149,7 @@ def policies_block(results: StudyResults, skewed: StudyResults) -> str:
         mark = _EXACT if test.unaffected else ""
         rows.setdefault(label, {})[comparison.policy] = wording.ratio(test) + mark
     first, count, more = results.plan.seeds[0], len(results.plan.seeds), len(skewed.plan.seeds)
-    replaced = dict.fromkeys(
-        f"{j.comparison.indicator}, {j.comparison.label}" for j in skewed.tests
-    )
+    replaced = dict.fromkeys(f"{j.indicator}, {j.comparison.label}" for j in skewed.tests)
     fewer = [f"`{name}`" for name in judged_policies(skewed)]
     text = (
         f"{count} seeds from {first:,} on, on which nothing was fitted; {more} for "

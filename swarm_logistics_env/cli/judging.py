@@ -75,7 +75,7 @@ def power_command(
     if not rows:
         asked_for = [] if indicator is None else [f"--indicator {indicator}"]
         asked_for += [f"--at {at!r}"] if at else []
-        made = dict.fromkeys(j.comparison.indicator for j in results.tests)
+        made = dict.fromkeys(j.indicator for j in results.tests)
         raise StudyError(
             f"{' '.join(asked_for) or asked}: the study makes no such comparison; "
             f"it asks about {', '.join(made) or 'nothing'}"

@@ -152,13 +152,13 @@ def _chapters(
 
 
 def _verdicts(results: StudyResults) -> Iterator[Section]:
-    families = dict.fromkeys((j.comparison.policy, j.comparison.indicator) for j in results.tests)
+    families = dict.fromkeys((j.policy, j.indicator) for j in results.tests)
     for policy, indicator in families:
         yield Section(
             f"{policy}: {DEFINITIONS[indicator].heading}",
             sentences=tuple(
                 sentence(results, test)
                 for test in results.tests
-                if (test.comparison.policy, test.comparison.indicator) == (policy, indicator)
+                if (test.policy, test.indicator) == (policy, indicator)
             ),
         )

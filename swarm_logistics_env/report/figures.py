@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from swarm_logistics_env.report import drawing
@@ -55,49 +55,29 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
 
 
 def _scalability(results: StudyResults) -> Iterator[Figure]:
-    asked = _thresholded(results, "size")
-    for table in _tables(asked):
-        here = [j for j in asked if j.comparison.table == table]
-        panels = []
-        for definition, tests in _by_definition(here):
-            series = [
-                Series(policy, tuple(_points(js, _step, published=not index)))
-                for index, (policy, js) in enumerate(_grouped(tests, lambda j: j.comparison.policy))
-            ]
-            thresholds = tuple(definition.adjectives)
-            panels.append(
-                Panel("", definition.axis, tuple(series), thresholds, "swarm size N → N + m")
-            )
+    for table, here in _grouped(_thresholded(results, "size"), lambda j: j.table):
         yield _intervals(
             results,
             slug(_symbols(here), table),
             f"{_policies(here)}, {table}: {_caption(here, 'per step in N')}",
             here,
-            tuple(panels),
+            _panels(here, "swarm size N → N + m", lambda js: _by_policy(js, _step)),
         )
 
 
 def _faults(results: StudyResults) -> Iterator[Figure]:
     asked = _thresholded(results, "fault")
-    first = asked[0].comparison.policy if asked else ""
-    keys = dict.fromkeys(
-        (j.comparison.policy, j.comparison.table, j.comparison.changed.setting.onset) for j in asked
-    )
-    for policy, table, onset in keys:
-        here = [
-            j
-            for j in asked
-            if (j.comparison.policy, j.comparison.table, j.comparison.changed.setting.onset)
-            == (policy, table, onset)
-        ]
-        panels = []
-        for definition, tests in _by_definition(here):
-            series = [
-                Series(f"m = {m:g}", tuple(_points(js, _mode, published=policy == first)))
+    first = asked[0].policy if asked else ""
+    for (policy, table, onset), here in _grouped(
+        asked, lambda j: (j.policy, j.table, j.comparison.changed.setting.onset)
+    ):
+
+        def by_m(tests: list[IndicatorTest], shown: bool = policy == first) -> tuple[Series, ...]:
+            return tuple(
+                Series(f"m = {m:g}", tuple(_points(js, _mode, published=shown)))
                 for m, js in _grouped(tests, lambda j: j.comparison.changed.setting.value)
-            ]
-            thresholds = tuple(definition.adjectives)
-            panels.append(Panel("", definition.axis, tuple(series), thresholds, "failure mode"))
+            )
+
         swarm = here[0].comparison.original.condition.size
         start = f", faults from {onset:g} s" if onset else ""
         yield _intervals(
@@ -106,58 +86,59 @@ def _faults(results: StudyResults) -> Iterator[Figure]:
             f"{policy}, {table}, N = {swarm}{start}: "
             f"{_caption(here, 'per failure mode and number m of faulty robots')}",
             here,
-            tuple(panels),
+            _panels(here, "failure mode", by_m),
         )
 
 
 def _adaptability(results: StudyResults) -> Iterator[Figure]:
     asked = _thresholded(results, "parameter")
-    if not asked:
-        return
-    panels = []
-    for (table, name, definition), js in _grouped(
-        asked,
-        lambda j: (
-            j.comparison.table,
-            j.comparison.changed.setting.name,
-            j.comparison.definition.symbol,
-        ),
-    ):
-        series = [
-            Series(policy, tuple(_points(of_policy, _step, published=not index)))
-            for index, (policy, of_policy) in enumerate(_grouped(js, lambda j: j.comparison.policy))
-        ]
-        row = DEFINITIONS[definition]
-        thresholds = tuple(row.adjectives)
-        panels.append(Panel(table, row.axis, tuple(series), thresholds, f"{name}, x_o → x_new"))
-    yield _intervals(
-        results,
-        slug(_symbols(asked)),
-        f"{_policies(asked)}: {_caption(asked, 'per parameter')}",
-        asked,
-        tuple(panels),
-    )
+    panels = [
+        replace(panel, title=table)
+        for (table, name), here in _grouped(
+            asked, lambda j: (j.table, j.comparison.changed.setting.name)
+        )
+        for panel in _panels(here, f"{name}, x_o → x_new", lambda js: _by_policy(js, _step))
+    ]
+    if asked:
+        caption = f"{_policies(asked)}: {_caption(asked, 'per parameter')}"
+        yield _intervals(results, slug(_symbols(asked)), caption, asked, panels)
 
 
 def _ablations(results: StudyResults) -> Iterator[Figure]:
     asked = [j for j in results.tests if j.comparison.definition.compares == "policy"]
-    for table in _tables(asked):
-        here = [j for j in asked if j.comparison.table == table]
-        series = [
-            Series(policy, tuple(_points(js, lambda j: j.comparison.label)))
-            for policy, js in _grouped(here, lambda j: j.comparison.policy)
-        ]
+    for table, here in _grouped(asked, lambda j: j.table):
         # 0 first: it is the threshold that always stands in the picture.
-        thresholds = {0.0: None, **{j.comparison.threshold: None for j in here}}
-        panel = Panel("", "change of P", tuple(series), tuple(thresholds), "in its place")
+        thresholds = tuple(dict.fromkeys([0.0, *(j.comparison.threshold for j in here)]))
+        panels = _panels(here, "in its place", lambda js: _by_policy(js, _label))
         yield _intervals(
             results,
             slug(_symbols(here), table),
             f"{_policies(here)}, {table}: relative change of P where another policy takes its "
             "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share.",
             here,
-            (panel,),
+            [replace(panel, thresholds=thresholds) for panel in panels],
         )
+
+
+def _by_policy(
+    tests: list[IndicatorTest], category: Callable[[IndicatorTest], str]
+) -> tuple[Series, ...]:
+    return tuple(
+        Series(policy, tuple(_points(js, category, published=not index)))
+        for index, (policy, js) in enumerate(_grouped(tests, lambda j: j.policy))
+    )
+
+
+def _panels(
+    tests: list[IndicatorTest],
+    x_label: str,
+    series: Callable[[list[IndicatorTest]], tuple[Series, ...]],
+) -> list[Panel]:
+    """Return a pair of axes for each indicator."""
+    return [
+        Panel("", definition.axis, series(js), tuple(definition.adjectives), x_label)
+        for definition, js in _by_definition(tests)
+    ]
 
 
 def scaling_figure(results: StudyResults, series: SizeSeries) -> Figure:
@@ -199,7 +180,7 @@ def _intervals(
     name: str,
     caption: str,
     tests: list[IndicatorTest],
-    panels: tuple[Panel, ...],
+    panels: Sequence[Panel],
 ) -> Figure:
     columns = (
         "policy", "table", "indicator", "comparison", "value", "low", "high",
@@ -225,7 +206,7 @@ def _saturation(saturated: bool) -> str:
 
 
 def _by_definition(tests: list[IndicatorTest]) -> list[tuple[Definition, list[IndicatorTest]]]:
-    by_symbol = dict(_grouped(tests, lambda j: j.comparison.indicator))
+    by_symbol = dict(_grouped(tests, lambda j: j.indicator))
     return [(row, by_symbol[symbol]) for symbol, row in DEFINITIONS.items() if symbol in by_symbol]
 
 
@@ -286,12 +267,12 @@ def _mode(test: IndicatorTest) -> str:
     return test.comparison.changed.setting.name
 
 
-def _tables(tests: list[IndicatorTest]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(test.comparison.table for test in tests))
+def _label(test: IndicatorTest) -> str:
+    return test.comparison.label
 
 
 def _policies(tests: list[IndicatorTest]) -> str:
-    return listed(list(dict.fromkeys(test.comparison.policy for test in tests)))
+    return listed(list(dict.fromkeys(test.policy for test in tests)))
 
 
 def _grouped(

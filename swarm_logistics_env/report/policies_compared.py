@@ -65,7 +65,7 @@ def _matrix(results: StudyResults, policies: tuple[str, ...]) -> Section:
             verdicts = Counter[str](
                 wording.counted_as(j, j.adjusted_verdict)
                 for j in results.tests
-                if j.comparison.policy == policy and j.property_name == name
+                if j.policy == policy and j.property_name == name
             )
             row.append(wording.counted(verdicts) or wording.NOTHING)
         rows.append(tuple(row))
@@ -173,7 +173,7 @@ def _of_indicator(contest: IndicatorContest) -> tuple[str, Differences]:
     before, after = comparison.original.setting, comparison.changed.setting
     category = _cell(after) if after.kind == "fault" else f"{before.value:g}→{after.value:g}"
     differences = [
-        (test.comparison.policy, category, difference)
+        (test.policy, category, difference)
         for test, difference in zip(contest.tests, contest.differences)
         if test is not None and difference is not None
     ]

@@ -62,18 +62,14 @@ def _tables(results: StudyResults, policy: str, table: str) -> Iterator[Section]
     cells = _grouped(
         [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
     )
-    tests = [
-        test
-        for test in results.tests
-        if (test.comparison.policy, test.comparison.table) == (policy, table)
-    ]
+    tests = [test for test in results.tests if (test.policy, test.table) == (policy, table)]
     published = any(cell.published is not None for cell in cells)
     performance = [_performance(cell, published=published) for cell in cells]
     columns = ["", *(["P paper", "P ours [95 %]"] if published else ["P [95 %]"])]
     columns.append("one run [95 %]")
     title = f"{policy}: {table}"
-    for indicator in dict.fromkeys(test.comparison.indicator for test in tests):
-        asked = [j for j in tests if j.comparison.indicator == indicator]
+    for indicator in dict.fromkeys(test.indicator for test in tests):
+        asked = [j for j in tests if j.indicator == indicator]
         more, answers = _answers(results, cells, asked, published=published)
         rows = [tuple(left + right) for left, right in zip(performance, answers)]
         judged = [row for row in rows if row[-len(more)] != NOTHING]
@@ -127,11 +123,7 @@ def _answers(
 
 
 def _claims(results: StudyResults, policy: str) -> Iterator[Section]:
-    claims = [
-        test
-        for test in results.tests
-        if test.comparison.policy == policy and test.claim is not None
-    ]
+    claims = [test for test in results.tests if test.policy == policy and test.claim is not None]
     if not claims:
         return
     rows, plain, adjusted = [], Counter[str](), Counter[str]()
@@ -144,7 +136,7 @@ def _claims(results: StudyResults, policy: str) -> Iterator[Section]:
         unaffected = wording.UNAFFECTED if test.unaffected else None
         rows.append(
             (
-                f"{test.comparison.indicator}, {test.comparison.label}",
+                f"{test.indicator}, {test.comparison.label}",
                 test.claim_text or NOTHING,
                 wording.number(test.published),
                 wording.ratio(test),

@@ -29,7 +29,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.studies.conditions import seeds_in_words
 from swarm_logistics_env.studies.matching import Match, match, outcomes
-from swarm_logistics_env.studies.results import StudyResults, same_runs
+from swarm_logistics_env.studies.results import StudyResults, estimate_of, same_runs
 
 SUBJECTS = "|".join(DEFINITIONS)
 _GATE = re.compile(
@@ -150,39 +150,21 @@ def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -
 
 
 def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
-    performance = {(cell.policy, cell.table, cell.arm): cell for cell in new.cells}
     # Once each, however many thresholds it was asked against.
-    comparisons = {
-        replace(test.comparison, threshold=gate.number): test.unaffected
+    comparisons = dict.fromkeys(
+        replace(test.comparison, threshold=gate.number)
         for test in new.tests
-        if test.comparison.indicator == gate.subject
-    }
+        if test.indicator == gate.subject
+    )
     labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
-    for comparison, unaffected in comparisons.items():
+    for comparison in comparisons:
         name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
         if labels[comparison.policy, comparison.label] > 1:
             name += f" ({comparison.table})"
         if gate.at not in name:
             continue
-        used = {
-            arm: performance[comparison.policy, comparison.table, arm] for arm in comparison.arms
-        }
-        problems = [f"{arm.setting}: {cell.problem}" for arm, cell in used.items() if cell.problem]
-        if problems:
-            yield name, "; ".join(problems)
-            continue
-        try:
-            estimate = comparison.estimate(
-                # No type can be given to a lambda's default.
-                lambda arm, used=used: used[arm].performance,  # type: ignore[misc]
-                paired=new.plan.paired,
-                saturated=[arm for arm, cell in used.items() if cell.saturated],
-                identical=unaffected,
-            )
-        except spi.IndicatorError as error:
-            yield name, str(error)
-        else:
-            yield name, estimate.value if unaffected else estimate
+        found = estimate_of(comparison, new.by_arm, paired=new.plan.paired)
+        yield name, found.value if isinstance(found, Estimate) and found.identical else found
 
 
 def _changes(gate: Gate, old: StudyResults, new: StudyResults) -> Iterator[tuple[str, _Found]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.studies.comparisons import Arm, Comparison, Setting
+from swarm_logistics_env.studies.comparisons import Comparison, Setting
 from swarm_logistics_env.studies.results import Cell, IndicatorTest, StudyResults
 
 
@@ -104,7 +104,6 @@ def _ratio(baseline: NDArray[np.float64], performance: NDArray[np.float64]) -> I
 def indicator_contests(results: StudyResults) -> Iterator[IndicatorContest]:
     """Yield every question that more than one policy was asked, with the differences."""
     policies = judged_policies(results)
-    performance = {(cell.policy, cell.table, cell.arm): cell.performance for cell in results.cells}
     asked: dict[object, dict[str, IndicatorTest]] = {}
     for test in results.tests:
         comparison = test.comparison
@@ -121,7 +120,7 @@ def indicator_contests(results: StudyResults) -> Iterator[IndicatorContest]:
             tuple(
                 None
                 if baseline is None or test is None or test is baseline
-                else _difference(results, baseline, test, performance)
+                else _difference(results, baseline, test)
                 for test in tests
             ),
         )
@@ -131,14 +130,13 @@ def _difference(
     results: StudyResults,
     baseline: IndicatorTest,
     test: IndicatorTest,
-    performance: dict[tuple[str, str, Arm], NDArray[np.float64]],
 ) -> Interval | None:
     if baseline.estimate is None or test.estimate is None or not results.plan.paired:
         return None
 
     def value(comparison: Comparison, seeds: NDArray[np.intp]) -> float:
         key = comparison.policy, comparison.table
-        return comparison.estimate(lambda arm: performance[*key, arm][seeds]).value
+        return comparison.estimate(lambda arm: results.by_arm[*key, arm].performance[seeds]).value
 
     try:
         return jackknife_interval(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,11 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Arm, Comparison, Reference, load_reference
-from swarm_logistics_env.studies.conditions import Condition
 from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.tasks.task import Outcome
 
+CellKey = tuple[str, str, Arm]  # policy, table, arm
 Value = str | float | int | bool | list[float] | None
 Times = tuple[NDArray[np.float64], ...]
 POWER = 0.8
@@ -33,6 +34,7 @@ class Cell:
         performance: P [items], shape (n,), seed by seed.
         problem: why the runs are not complete; None: they are.
         saturated: whether any seed delivered every item, so that P is capped.
+        digests: of the runs, seed by seed; equal: the same run.
         published: P of the reference; counted: whether it is one of the reference's cells.
     """
 
@@ -42,6 +44,7 @@ class Cell:
     performance: NDArray[np.float64]
     problem: str | None
     saturated: bool
+    digests: tuple[str | None, ...]
     published: float | None
     counted: bool
 
@@ -118,6 +121,21 @@ class IndicatorTest:
     def unaffected(self) -> bool:
         """Whether both conditions gave the same runs: the value is exact, and no evidence."""
         return self.estimate is not None and self.estimate.identical
+
+    @property
+    def policy(self) -> str:
+        """Label of the policy that is tested."""
+        return self.comparison.policy
+
+    @property
+    def table(self) -> str:
+        """Heading of the report's table that it stands in."""
+        return self.comparison.table
+
+    @property
+    def indicator(self) -> str:
+        """Symbol of the indicator."""
+        return self.comparison.indicator
 
     @property
     def _asks_for_fall(self) -> bool:
@@ -234,6 +252,11 @@ class StudyResults:
         outcomes = self.outcomes_of(arm)
         return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)
 
+    @cached_property
+    def by_arm(self) -> dict[CellKey, Cell]:
+        """Every cell by policy, table and arm."""
+        return _by_arm(self.cells)
+
     def performance_table(self) -> list[dict[str, Value]]:
         """Return P of every cell, one row each."""
         return [cell.record() for cell in self.cells]
@@ -261,17 +284,12 @@ def judge(
     verdicts of its family, whose size would else be too small.
     """
     reference = load_reference(plan.specification.reference)
-    by_condition = {
-        condition.key: _result(condition, plan, outcomes) for condition in plan.conditions
-    }
-    cells = tuple(
-        _cell(policy, table, arm, by_condition[arm.condition.key], reference)
-        for policy, table, arm in plan.cells
-    )
+    cells = tuple(_cell(*key, plan, outcomes, reference) for key in plan.cells)
+    by_arm = _by_arm(cells)
     declared = range(declared_first_seed, declared_first_seed + declared_seeds)
     level, exploratory = _level(plan, Declaration(declared, declared_looks))
     tests = [
-        _indicator_test(comparison, by_condition, reference, level=level, paired=plan.paired)
+        _indicator_test(comparison, by_arm, reference, level=level, paired=plan.paired)
         for comparison in plan.comparisons
     ]
     return StudyResults(
@@ -295,16 +313,19 @@ def _level(plan: Plan, declared: Declaration) -> tuple[float, bool]:
     return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False
 
 
-@dataclass(frozen=True)
-class _Result:
-    performance: NDArray[np.float64]
-    problem: str | None
-    saturated: bool
-    digests: tuple[str | None, ...]
+def _by_arm(cells: Iterable[Cell]) -> dict[CellKey, Cell]:
+    return {(cell.policy, cell.table, cell.arm): cell for cell in cells}
 
 
-def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -> _Result:
-    found = [outcomes.get(condition.run(plan.code, seed).key) for seed in plan.seeds]
+def _cell(
+    policy: str,
+    table: str,
+    arm: Arm,
+    plan: Plan,
+    outcomes: Mapping[str, Outcome],
+    reference: Reference | None,
+) -> Cell:
+    found = [outcomes.get(arm.condition.run(plan.code, seed).key) for seed in plan.seeds]
     finished = [outcome for outcome in found if outcome is not None]
     succeeded = [outcome for outcome in finished if outcome.error is None]
     failed, missing = len(finished) - len(succeeded), len(found) - len(finished)
@@ -315,18 +336,17 @@ def _result(condition: Condition, plan: Plan, outcomes: Mapping[str, Outcome]) -
         for count, what in ((failed, "failed"), (missing, "missing"))
         if count
     ]
-    return _Result(
+    return Cell(
+        policy,
+        table,
+        arm,
         np.array([outcome.delivered for outcome in succeeded], dtype=np.float64),
         ", ".join(parts) or None,
         any(outcome.all_delivered for outcome in succeeded),
         tuple(outcome.digest for outcome in succeeded),
+        published=reference.performance.get(arm.setting) if reference else None,
+        counted=reference is not None and arm.setting in reference.cells,
     )
-
-
-def _identical(comparison: Comparison, used: Mapping[Arm, _Result]) -> bool:
-    """Return whether what was changed changed no run: equal digests, seed by seed."""
-    before, after = used[comparison.original].digests, used[comparison.changed].digests
-    return comparison.removed is None and same_runs(before, after)
 
 
 def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool:
@@ -334,41 +354,37 @@ def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool
     return list(before) == list(after) and None not in before
 
 
-def _cell(policy: str, table: str, arm: Arm, result: _Result, reference: Reference | None) -> Cell:
-    return Cell(
-        policy,
-        table,
-        arm,
-        result.performance,
-        result.problem,
-        result.saturated,
-        published=reference.performance.get(arm.setting) if reference else None,
-        counted=reference is not None and arm.setting in reference.cells,
-    )
+def estimate_of(
+    comparison: Comparison, cells: Mapping[CellKey, Cell], *, paired: bool, level: float = LEVEL
+) -> Estimate | str:
+    """Return the estimate of a comparison from a study's cells, or why there is none."""
+    used = {arm: cells[comparison.policy, comparison.table, arm] for arm in comparison.arms}
+    problems = [f"{arm.setting}: {cell.problem}" for arm, cell in used.items() if cell.problem]
+    if problems:
+        return "; ".join(problems)
+    before, after = used[comparison.original], used[comparison.changed]
+    try:
+        return comparison.estimate(
+            lambda arm: used[arm].performance,
+            level=level,
+            paired=paired,
+            saturated=[arm for arm, cell in used.items() if cell.saturated],
+            identical=comparison.removed is None and same_runs(before.digests, after.digests),
+        )
+    except spi.IndicatorError as error:
+        return str(error)
 
 
 def _indicator_test(
     comparison: Comparison,
-    by_condition: Mapping[str, _Result],
+    cells: Mapping[CellKey, Cell],
     reference: Reference | None,
     *,
     level: float,
     paired: bool,
 ) -> IndicatorTest:
-    used = {arm: by_condition[arm.condition.key] for arm in comparison.arms}
-    problems = [f"{arm.setting}: {used[arm].problem}" for arm in used if used[arm].problem]
-    estimate = None
-    if not problems:
-        try:
-            estimate = comparison.estimate(
-                lambda arm: used[arm].performance,
-                level=level,
-                paired=paired,
-                saturated=[arm for arm in used if used[arm].saturated],
-                identical=_identical(comparison, used),
-            )
-        except spi.IndicatorError as error:
-            problems = [str(error)]
+    found = estimate_of(comparison, cells, paired=paired, level=level)
+    estimate = None if isinstance(found, str) else found
     published = reference.estimate(comparison) if reference else None
     claim = comparison.claim
     if claim is None and reference:
@@ -376,8 +392,8 @@ def _indicator_test(
     test = IndicatorTest(
         comparison,
         estimate,
-        "; ".join(problems) or None,
-        any(result.saturated for result in used.values()),
+        found if isinstance(found, str) else None,
+        any(cells[comparison.policy, comparison.table, a].saturated for a in comparison.arms),
         claim,
         published.value if published else None,
     )
