@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.study import (
+from swarm_logistics_env.cli.study_commands import (
     PolicyOption,
     ProcessesOption,
     TrustCodeOption,
@@ -50,7 +50,7 @@ def power_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
-    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.studies.seeds_needed import demands
@@ -113,7 +113,7 @@ def compare_command(
     before, after = (Study.stored(directory).findings() for directory in (old, new))
     left_out = match(before, after).notes
     failed = False
-    # What is shown without a gate fails nothing.
+    # Without a gate the change is shown, and nothing fails.
     for gate in gates or [Gate.parse("change < 0")]:
         said = answers(gate, before, after)
         fails = bool(gates) and any(answer.fails for answer in said)
@@ -146,7 +146,7 @@ def _pilot(
 
 
 def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
-    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.result_tables import Section
 
     rows = []

@@ -73,7 +73,7 @@ def train_command(
 
 
 def _show(asked: Tuning, trials: list[Trial], path: Path) -> None:
-    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies.tuned import read_tuned
     from swarm_logistics_env.report.result_tables import Section
 

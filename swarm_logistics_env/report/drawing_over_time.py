@@ -74,7 +74,7 @@ def repairs(canvas: Canvas, panels: Sequence[RepairPanel]) -> None:
                 for first, column in zip((0.0, 1.0, 1.0, 1.0), curve.curve)
             )
             seconds[-1] = curve.followed
-            # Where all runs are back no interval is defined; the last one ends there.
+            # Once all runs are back no interval is defined, so the last one ends there.
             known = int(np.count_nonzero(share > 0.0))
             ends = [*range(known), known - 1]
             axes.fill_between(

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.conditions import seeds_in_words
 from swarm_logistics_env.studies.results import POWER, IndicatorTest, StudyResults
+from swarm_logistics_env.studies.runs import seeds_in_words
 
 SATURATED = "†"
 UNAFFECTED = "unaffected by construction"

@@ -167,7 +167,7 @@ def judge(
         num, den = _numerator(weighted), reference
         test = paired_ratio(num, den, offset=offset, threshold=threshold, level=level)
         correlation = pairing_correlation(*list(samples.values())[:2])
-        # Where D has no spread there is nothing but rounding to be skewed.
+        # Without spread the skewness of D would be one of rounding errors.
         if not test.degenerate and _skewed(num - (threshold - offset) * den):
             flags.append("skewed")
     else:

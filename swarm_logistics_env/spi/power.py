@@ -16,7 +16,7 @@ MAX_SEEDS = 1_000_000
 # than it rises on the other: planned with it, a promised 0.80 is 0.56 to 0.74 on average for pilots
 # of 3 to 10 seeds. With this upper confidence limit of the spread it is 0.79 to 0.82.
 PLANNED_LIMIT = 0.6
-UNLUCKY_LIMIT = 0.9  # of the spread: one pilot in ten is further off
+UNLUCKY_LIMIT = 0.9  # confidence limit of the spread that one pilot in ten exceeds
 # Beyond this critical t, as of two seeds at an early look, the statistic's normal part is lost
 # beside its chi-squared one, and the noncentral t would be summed over so many terms.
 _FAR_OUT = 1e3

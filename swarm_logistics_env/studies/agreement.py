@@ -1,4 +1,4 @@
-"""How well one policy's runs agree with the published values: cells met, errors, order of sizes."""
+"""Agreement of a policy's runs with the published values: cells met, errors, order of sizes."""
 
 from __future__ import annotations
 

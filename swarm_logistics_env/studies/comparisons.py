@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.conditions import Condition
+from swarm_logistics_env.studies.runs import Condition
 
 Performance = Callable[["Arm"], NDArray[np.float64]]
 

@@ -1,4 +1,4 @@
-"""What faults do beyond P: how many robots may fail, how far the others hang about the failed."""
+"""Measures of faults besides P: how many robots may fail, how long others stay by the failed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ModeBudget:
 class AnchoringLoad:
     """Time that working robots spent in contact range of failed ones.
 
-    In the paired run with the robots removed nobody is there to linger at: it is 0.
+    In the paired run with the robots removed there is no failed robot, so it is 0.
 
     Attributes:
         comparison: of the fault with the robots removed.

@@ -27,9 +27,9 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
-from swarm_logistics_env.studies.conditions import seeds_in_words
 from swarm_logistics_env.studies.matching import Match, match, outcomes
 from swarm_logistics_env.studies.results import StudyResults, estimate_of, same_runs
+from swarm_logistics_env.studies.runs import seeds_in_words
 
 SUBJECTS = "|".join(DEFINITIONS)
 _GATE = re.compile(
@@ -101,7 +101,7 @@ _Found = Estimate | float | str
 
 @dataclass(frozen=True)
 class Answer:
-    """What one comparison or condition says to a gate.
+    """The answer of one comparison or condition to a gate.
 
     Attributes:
         name: policy, subject and comparison.
@@ -150,7 +150,7 @@ def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -
 
 
 def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
-    # Once each, however many thresholds it was asked against.
+    # A comparison tested against several thresholds answers once.
     comparisons = dict.fromkeys(
         replace(test.comparison, threshold=gate.number)
         for test in new.tests

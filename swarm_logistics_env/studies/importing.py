@@ -13,8 +13,8 @@ from typing import Any
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Comparison, Setting
-from swarm_logistics_env.studies.conditions import StudiedPolicy
 from swarm_logistics_env.studies.plan import Plan, adaptability, robustness, scalability
+from swarm_logistics_env.studies.runs import StudiedPolicy
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import new_store, refuse_study_in
 from swarm_logistics_env.tasks.task import Outcome
@@ -221,7 +221,7 @@ def _specification(file: Path, rows: list[_Row], seeds: int) -> Specification:
         "faults": [],
         "parameters": [],
     }
-    # In order of appearance: a parameter's first value is x_o.
+    # Tables keep the order of the file, because a parameter's first value is x_o.
     for title in dict.fromkeys(row.title for row in rows):
         table = [row for row in rows if row.title == title]
         settings = list(dict.fromkeys(row.setting for row in table))

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from swarm_logistics_env.studies.conditions import seeds_in_words
 from swarm_logistics_env.studies.results import Cell, StudyResults
+from swarm_logistics_env.studies.runs import seeds_in_words
 from swarm_logistics_env.tasks.task import Outcome
 
-_Content = tuple[object, ...]  # of a condition: all but its policy
-_Judged = dict[str, dict[_Content, Cell]]  # by the policy's label
+_Content = tuple[object, ...]  # everything about a condition but its policy
+_Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Unmatched:
 
 @dataclass(frozen=True)
 class Matching:
-    """What two studies have in common, and what only one of them has.
+    """The conditions that two studies share, and those that only one of them has.
 
     Attributes:
         seeds: the shared ones; None: one of the studies has no seeds to share.

@@ -12,7 +12,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.studies.conditions import seeds_in_words
+from swarm_logistics_env.studies.runs import seeds_in_words
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.plan import Plan
@@ -30,7 +30,7 @@ IMPORTED = "imported"  # where the runs came from; absent: they were run
 _NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
 
 
-# Written with digits alone, as int() reads it.
+# int() reads them back, so nothing but digits may stand there.
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
 
@@ -42,7 +42,7 @@ class _Origin(Record):
     seeds: tuple[int, ...] = ()
 
 
-# What is read as JSON; the specification says itself what is wrong with it.
+# These are read as JSON. The specification is not here: it explains its own errors.
 _FORMS: dict[str, TypeAdapter[Any]] = {
     IDENTITIES: TypeAdapter(dict[str, str]),
     DECLARED_SEEDS: TypeAdapter(_Count),
@@ -86,7 +86,7 @@ FEWEST_TO_PROPOSE = 10
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a study was declared to be judged on.
+    """The seeds and looks that a study declared before its first run.
 
     Attributes:
         seeds: of every condition.
@@ -107,10 +107,10 @@ class Declaration:
         return cls(range(first, first + int(count)), tuple(looks))
 
     def note(self, store: Store) -> None:
-        """Note it in a store."""
+        """Write it into a store."""
         store.set_note(DECLARED_FIRST_SEED, str(self.seeds.start))
         store.set_note(DECLARED_LOOKS, json.dumps(self.looks))
-        # Last: where it is noted, the others are.
+        # The number of seeds is written last, so a store that has it has the others as well.
         store.set_note(DECLARED_SEEDS, str(len(self.seeds)))
 
     def covers(self, plan: Plan) -> bool:
@@ -126,7 +126,7 @@ class Declaration:
         )
 
     def warning(self, plan: Plan) -> str:
-        """Return what a plan that this does not cover costs, and what to declare instead."""
+        """Return the warning for a plan that this does not cover, and what to declare instead."""
         declared = _counted(self.seeds)
         if self.looks:
             declared = (

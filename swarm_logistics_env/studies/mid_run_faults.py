@@ -23,7 +23,7 @@ Pair = tuple[Times, Times]
 
 @dataclass(frozen=True)
 class Resilience:
-    """What one fault in mid-run does.
+    """The measures of one fault that begins during the run.
 
     Attributes:
         comparison: FT's: no fault, the robots removed at the onset, the fault.

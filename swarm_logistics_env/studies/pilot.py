@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.conditions import Condition
 from swarm_logistics_env.studies.engines import execute
 from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.runs import Condition
 from swarm_logistics_env.studies.store import Store
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -18,7 +18,7 @@ PILOT = 3.0  # simulated seconds
 
 @dataclass(frozen=True)
 class Expectation:
-    """What a whole study takes at most; less where runs end early, their items delivered.
+    """Upper bounds of time and space for a study; runs that deliver all items end earlier.
 
     Attributes:
         seconds: on one process of this machine [s].

@@ -16,7 +16,7 @@ from swarm_logistics_env.studies.comparisons import (
     NullPair,
     Setting,
 )
-from swarm_logistics_env.studies.conditions import Condition, Run, StudiedPolicy
+from swarm_logistics_env.studies.runs import Condition, Run, StudiedPolicy
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Factor,
@@ -34,7 +34,7 @@ SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study will run and what it will ask of the results.
+    """The runs and the comparisons of a study.
 
     Attributes:
         specification: what it was made from.

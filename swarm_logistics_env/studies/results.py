@@ -23,7 +23,9 @@ Value = str | float | int | bool | list[float] | None
 Times = tuple[NDArray[np.float64], ...]
 POWER = 0.8
 LEVEL = 0.95
-_LEAST_ALPHA = 1e-12  # of a look: a level is no nearer to 1 than this, whose numbers end at 1e-16
+_LEAST_ALPHA = (
+    1e-12  # a float cannot hold a level much nearer to 1, and an early look may ask for one
+)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 
-from swarm_logistics_env.studies.conditions import Run
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ class Progress:
     """Shows on standard error how many of the runs are done, while it is entered.
 
     Args:
-        runs: that are going to be played.
+        runs: the runs that are going to be played.
         label: name of the study.
-        console: to write on; None: standard error.
+        console: where to write; None: standard error.
     """
 
     def __init__(self, runs: Iterable[Run], label: str, console: Console | None = None) -> None:

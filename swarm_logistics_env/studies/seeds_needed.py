@@ -10,7 +10,7 @@ from swarm_logistics_env.studies.results import IndicatorTest, StudyResults
 
 @dataclass(frozen=True)
 class Demand:
-    """What one comparison needs.
+    """The number of seeds that one comparison needs.
 
     Attributes:
         test: of the pilot.

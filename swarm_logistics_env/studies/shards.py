@@ -12,7 +12,7 @@ from typing import Any, Self
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import metadata
-from swarm_logistics_env.studies.conditions import Run
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
 
@@ -50,7 +50,7 @@ class Shard:
 
     def of(self, runs: Iterable[Run]) -> Iterator[Run]:
         """Yield every n-th run from the i-th on."""
-        # Of all runs, not of the missing ones: what a shard plays depends on nothing but the plan.
+        # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
         return islice(runs, self.number - 1, None, self.count)
 
 
@@ -88,7 +88,7 @@ def _notes(directory: Path) -> dict[str, str]:
 
 
 def _united(planned: dict[Path, dict[str, str]]) -> dict[str, str]:
-    # By their seeds, so that no study comes before the one that joins it to the others.
+    # Sort by seeds, so that each study joins the seeds of those before it.
     first, *others = sorted(planned, key=lambda directory: _seeds(planned[directory]).start)
     united = dict(planned[first])
     for other in others:
@@ -119,7 +119,7 @@ def _declared(ours: dict[str, str], theirs: dict[str, str]) -> range:
         for first in [int(one.get(metadata.DECLARED_FIRST_SEED, 0))]
     )
     both = range(max(mine.start, yours.start), min(mine.stop, yours.stop))
-    # With none in common, any less than all: the whole was declared by nobody.
+    # Without a common seed any part will do: nobody declared the whole.
     return both or mine
 
 

@@ -42,7 +42,7 @@ class SizeSeries:
 
 @dataclass(frozen=True)
 class Step:
-    """What the step from one size to the next is worth.
+    """The gain of the step from one swarm size to the next.
 
     Attributes:
         before, after: swarm sizes N [robots].

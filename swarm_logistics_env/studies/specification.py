@@ -56,7 +56,7 @@ def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 class Factor(_Part):
-    """What is varied, from which scenario.
+    """One thing that a study varies, and the scenario in which it does.
 
     Args:
         title: heading in the report; empty: made from the factor.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import metadata
-from swarm_logistics_env.studies.conditions import Run
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
 FILE_NAME = "study.sqlite"
@@ -93,7 +93,7 @@ class Store:
         place = str(path or ":memory:")
         if path is not None and read_only:
             _refuse_unmerged(path)
-            # Without it SQLite makes two files beside one that is in WAL mode, even to read it.
+            # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
             place = f"{path.absolute().as_uri()}?immutable=1"
         with self._explained():
             # Autocommit: transactions are opened by hand, one per run.
@@ -321,7 +321,7 @@ class Store:
             try:
                 self._database.execute("PRAGMA journal_mode = WAL")
             except sqlite3.OperationalError as error:
-                # Where two change a new file at once SQLite refuses one, without its timeout.
+                # When two processes change a new file at once, SQLite refuses one without waiting.
                 if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:
                     raise
                 time.sleep(0.01)

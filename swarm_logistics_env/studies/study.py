@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Tally:
-    """What one call of `Study.run` did.
+    """The numbers of one call of `Study.run`.
 
     Attributes:
         played: runs played now; failed: those of them that failed; kept: found in the store.

@@ -7,7 +7,7 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-# No policy is here, only what calls them: each has an identity of its own.
+# Policies are not here, only what calls them: each policy has an identity of its own.
 SOURCES = (
     "scenario.py",
     "streams.py",
@@ -18,7 +18,7 @@ SOURCES = (
     "policies/policy.py",
     "warehouse",
 )
-# Of those, what shares out the worlds of a vector environment: a run is one world.
+# These files share out the worlds of a vector environment; a run is one world.
 LEFT_OUT = ("warehouse/crew.py", "warehouse/atomic.py")
 
 

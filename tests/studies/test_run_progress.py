@@ -6,8 +6,8 @@ import pytest
 from rich.console import Console
 
 from swarm_logistics_env.studies import Study, run_progress
-from swarm_logistics_env.studies.conditions import Run
 from swarm_logistics_env.studies.run_progress import Progress, clock
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.conditions import Condition, Run, StudiedPolicy
+from swarm_logistics_env.studies.runs import Condition, Run, StudiedPolicy
 from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
 from swarm_logistics_env.tasks.task import Outcome
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import replace
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies.conditions import Run
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
 Engine = Callable[[Iterable[Run]], Generator[tuple[Run, Outcome], None, None]]

@@ -16,8 +16,8 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.conditions import Run
 from swarm_logistics_env.studies.engines import execute
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
 # One thread per worker: n workers with n threads each would wait for each other.

@@ -8,8 +8,8 @@ from collections.abc import Generator, Iterable
 from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.conditions import Run
 from swarm_logistics_env.studies.engines import execute
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Cluster:
         pending: dict[Any, Run] = {}
         try:
             play = ray.remote(num_cpus=1, max_retries=RETRIES)(execute)
-            # Not all at once: a policy travels with every run.
+            # A policy travels with every run, so only a few runs are sent at a time.
             limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
             pending[_submitted(play, first)] = first
             while pending:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.policies import SwarmDT, identity
-from swarm_logistics_env.studies.conditions import Condition, StudiedPolicy
 from swarm_logistics_env.studies.engines import execute
+from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.tasks.code_version import code_version
 
 SCENARIO = Scenario(n_robots=3, n_items=5, warehouse_width=3, warehouse_height=3, duration=10)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from swarm_logistics_env.cli.tables import show
+from swarm_logistics_env.cli.terminal_tables import show
 from swarm_logistics_env.report.result_tables import Section
 
 

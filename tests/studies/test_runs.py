@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from swarm_logistics_env.studies.conditions import seeds_in_words
+from swarm_logistics_env.studies.runs import seeds_in_words
 
 
 @pytest.mark.parametrize(

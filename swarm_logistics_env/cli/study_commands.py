@@ -53,7 +53,7 @@ def plan_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
-    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.studies.pilot import expect
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
@@ -245,7 +245,7 @@ def _told(tally: Tally, players: str) -> str:
 
 
 def _show(asked: Study) -> None:
-    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.report_files import (
         how_to_get_figures,
