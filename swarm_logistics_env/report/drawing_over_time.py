@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -12,21 +12,26 @@ from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, MARKERS, leg
 from swarm_logistics_env.studies.mid_run_faults import RateCurve, RepairCurve
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
 
+CurveT = TypeVar("CurveT", RateCurve, RepairCurve)
+
+
 @dataclass(frozen=True)
-class RatePanel:
-    """Delivery rates of paired runs around one fault."""
+class TimePanel(Generic[CurveT]):
+    """Curves of paired runs around one fault."""
 
     title: str
-    curves: tuple[RateCurve, ...]
+    curves: tuple[CurveT, ...]
 
 
-def rates(canvas: Canvas, panels: Sequence[RatePanel], onset: float, y_label: str) -> None:
+def rates(
+    canvas: Canvas, panels: Sequence[TimePanel[RateCurve]], onset: float, y_label: str
+) -> None:
     """Draw deliveries over time, one panel below the other, on one scale."""
-    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
-    for axes, panel in zip(grid[:, 0], panels):
+    for axes, panel in _axes(canvas, panels, "end of the window [s]", y_label):
         for index, curve in enumerate(panel.curves):
             colour = COLOURS[index % len(COLOURS)]
             known = [(r.low, r.high) for r in curve.rates]
@@ -47,25 +52,11 @@ def rates(canvas: Canvas, panels: Sequence[RatePanel], onset: float, y_label: st
             )
         axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
         axes.set_ylim(bottom=0.0)
-        axes.set(ylabel=y_label)
-        axes.set_title(panel.title, fontsize="medium", loc="left")
-        axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
-    grid[-1, 0].set_xlabel("end of the window [s]")
-    legend(canvas, grid[0, 0], lines=True)
 
 
-@dataclass(frozen=True)
-class RepairPanel:
-    """Self-repair times of single runs, with and without one fault."""
-
-    title: str
-    curves: tuple[RepairCurve, ...]
-
-
-def repairs(canvas: Canvas, panels: Sequence[RepairPanel]) -> None:
+def repairs(canvas: Canvas, panels: Sequence[TimePanel[RepairCurve]]) -> None:
     """Draw the share of runs that are not back, one panel below the other, on one scale."""
-    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
-    for axes, panel in zip(grid[:, 0], panels):
+    for axes, panel in _axes(canvas, panels, "time from the onset [s]", "share not back"):
         for place, curve in enumerate(panel.curves):
             # The fault's colour is that of the rates; the null's is none of theirs.
             colour, line = ((COLOURS[2], LINES[0]), (INK, LINES[1]))[place]
@@ -99,8 +90,17 @@ def repairs(canvas: Canvas, panels: Sequence[RepairPanel]) -> None:
                 axes.plot(seconds[-1], share[-1], "x", color=colour, markersize=6, clip_on=False)
         axes.set_ylim(0.0, 1.05)
         axes.set_xlim(left=0.0)
-        axes.set(ylabel="share not back")
+
+
+def _axes(
+    canvas: Canvas, panels: Sequence[TimePanel[CurveT]], x_label: str, y_label: str
+) -> Iterator[tuple[Axes, TimePanel[CurveT]]]:
+    """Yield the axes of each panel to draw on, then label them."""
+    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
+    for axes, panel in zip(grid[:, 0], panels):
+        yield axes, panel
+        axes.set(ylabel=y_label)
         axes.set_title(panel.title, fontsize="medium", loc="left")
         axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
-    grid[-1, 0].set_xlabel("time from the onset [s]")
+    grid[-1, 0].set_xlabel(x_label)
     legend(canvas, grid[0, 0], lines=True)

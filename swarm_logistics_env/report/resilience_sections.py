@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import partial
+from typing import NamedTuple
 
-from swarm_logistics_env.report import drawing_over_time, wording
-from swarm_logistics_env.report.drawing import Draw
+from swarm_logistics_env.report import wording
+from swarm_logistics_env.report.drawing_over_time import TimePanel, rates, repairs
 from swarm_logistics_env.report.figures import Figure, slug
 from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.spi.estimate import Estimate
@@ -29,12 +31,12 @@ def beyond_resilience(results: StudyResults) -> Iterator[Section]:
     found = tuple(resiliences(results))
     if not found:
         return
-    rows, repairs, singles, problems = [], [], [], []
+    rows, times, singles, problems = [], [], [], []
     for one in found:
         who = one.comparison.policy, str(one.comparison.changed.setting)
         rows.append((*who, *_index(one.against_removed), *_index(one.against_whole)))
         if one.repair is not None:
-            repairs.append((*who, *_repair(one.repair)))
+            times.append((*who, *_repair(one.repair)))
         if one.single is not None:
             singles.append((*who, *_single(one.single.fault), *_single(one.single.null)))
         if one.problem:
@@ -58,7 +60,7 @@ def beyond_resilience(results: StudyResults) -> Iterator[Section]:
             "policy", "fault", "self-repair [s, 95 %]", "p of no loss", "followed for [s]",
             "without a fault [s]", "reading",
         ),
-        tuple(repairs),
+        tuple(times),
         (
             ("From the onset to the change point of the delivery counts, pooled over seeds: before "
             "it the swarm delivers a share of what the paired runs with the robots removed do, "
@@ -128,83 +130,86 @@ def _single(curve: RepairCurve) -> tuple[str, str]:
 
 def repair_figures(results: StudyResults, found: tuple[Resilience, ...]) -> Iterator[Figure]:
     """Yield the curves of single runs' self-repair times, a figure per failure mode."""
-    groups: dict[tuple[str, str, str, float], list[Resilience]] = {}
-    for one in found:
-        if one.single is not None:
-            groups.setdefault(_fault_of(one.comparison), []).append(one)
-    for (policy, table, mode, onset), members in groups.items():
-        panels = [
-            drawing_over_time.RepairPanel(
-                f"m = {one.comparison.changed.setting.value:g}", one.single
-            )
-            for one in members
-            if one.single is not None
-        ]
+    singles = {one.comparison: one.single for one in found if one.single is not None}
+    for fault, comparisons in _by_fault(singles):
+        panels = tuple(TimePanel(_members(c), singles[c]) for c in comparisons)
         rows = tuple(
             (panel.title, curve.label, *values)
             for panel in panels
             for curve in panel.curves
             for values in zip(*(column.tolist() for column in curve.curve))
         )
-        if not rows:
-            continue
-        swarm = members[0].comparison.original.condition.size
-        yield Figure(
-            slug("self-repair", policy, table, mode, f"{onset:g}s"),
-            f"{policy}, {table}, N = {swarm}: share of runs whose delivery rate is not back yet "
-            f"after failure mode {mode} from {onset:g} s, beside pairs of runs without fault that "
-            "differ in behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals "
-            f"(Greenwood, log-log); {wording.seeds_text(results)}; a cross where runs are "
-            "censored.",
-            ("panel", "runs", "seconds", "share_not_back", "low", "high"),
-            rows,
-            0.6 + 2.1 * len(panels),
-            _draw_repairs(panels),
-        )
-
-
-def _draw_repairs(panels: list[drawing_over_time.RepairPanel]) -> Draw:
-    return lambda canvas: drawing_over_time.repairs(canvas, panels)
-
-
-def _fault_of(comparison: Comparison) -> tuple[str, str, str, float]:
-    setting = comparison.changed.setting
-    return comparison.policy, comparison.table, setting.name, setting.onset
+        if rows:
+            yield Figure(
+                slug("self-repair", *fault.names),
+                f"{fault.where}: share of runs whose delivery rate is not back yet after failure "
+                f"mode {fault.mode} from {fault.onset:g} s, beside pairs of runs without fault "
+                "that differ in behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals "
+                f"(Greenwood, log-log); {wording.seeds_text(results)}; a cross where runs are "
+                "censored.",
+                ("panel", "runs", "seconds", "share_not_back", "low", "high"),
+                rows,
+                0.6 + 2.1 * len(panels),
+                partial(repairs, panels=panels),
+            )
 
 
 def rate_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
-    groups: dict[tuple[str, str, str, float], list[Comparison]] = {}
-    for comparison in mid_run_faults(results):
-        groups.setdefault(_fault_of(comparison), []).append(comparison)
-    for (policy, table, mode, onset), comparisons in groups.items():
-        panels = [
-            drawing_over_time.RatePanel(
-                f"m = {comparison.changed.setting.value:g}", rate_curves(results, comparison)
-            )
-            for comparison in comparisons
-        ]
+    for fault, comparisons in _by_fault(mid_run_faults(results)):
+        panels = tuple(TimePanel(_members(c), rate_curves(results, c)) for c in comparisons)
         window = window_of(comparisons[0])
         rows = tuple(
-            (panel.title, curve.label, second, rate.value, rate.low, rate.high)
+            (panel.title, curve.label, second, *rate)
             for panel in panels
             for curve in panel.curves
             for second, rate in zip(curve.seconds, curve.rates)
         )
-        if not rows:
-            continue
-        swarm = comparisons[0].original.condition.size
-        yield Figure(
-            slug("deliveries", policy, table, mode, f"{onset:g}s"),
-            f"{policy}, {table}, N = {swarm}: deliveries in the trailing {window:g} s around "
-            f"failure mode {mode} from {onset:g} s (dotted line). Mean over "
-            f"{wording.seeds_text(results)} with pointwise 95 % t-intervals.",
-            ("panel", "runs", "seconds", "deliveries", "low", "high"),
-            rows,
-            0.6 + 2.3 * len(panels),
-            _draw(panels, onset, f"deliveries in {window:g} s"),
-        )
+        if rows:
+            yield Figure(
+                slug("deliveries", *fault.names),
+                f"{fault.where}: deliveries in the trailing {window:g} s around failure mode "
+                f"{fault.mode} from {fault.onset:g} s (dotted line). Mean over "
+                f"{wording.seeds_text(results)} with pointwise 95 % t-intervals.",
+                ("panel", "runs", "seconds", "deliveries", "low", "high"),
+                rows,
+                0.6 + 2.3 * len(panels),
+                partial(
+                    rates,
+                    panels=panels,
+                    onset=fault.onset,
+                    y_label=f"deliveries in {window:g} s",
+                ),
+            )
 
 
-def _draw(panels: list[drawing_over_time.RatePanel], onset: float, y_label: str) -> Draw:
-    return lambda canvas: drawing_over_time.rates(canvas, panels, onset, y_label)
+class _Fault(NamedTuple):
+    """A failure mode and its onset [s], in the swarm that one table is about."""
+
+    policy: str
+    table: str
+    n_robots: int
+    mode: str
+    onset: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.policy, self.table, self.mode, f"{self.onset:g}s"
+
+    @property
+    def where(self) -> str:
+        return f"{self.policy}, {self.table}, N = {self.n_robots}"
+
+
+def _by_fault(comparisons: Iterable[Comparison]) -> list[tuple[_Fault, list[Comparison]]]:
+    groups: dict[_Fault, list[Comparison]] = {}
+    for c in comparisons:
+        setting = c.changed.setting
+        size = c.original.condition.size
+        fault = _Fault(c.policy, c.table, size, setting.name, setting.onset)
+        groups.setdefault(fault, []).append(c)
+    return list(groups.items())
+
+
+def _members(comparison: Comparison) -> str:
+    return f"m = {comparison.changed.setting.value:g}"
