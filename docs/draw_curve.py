@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.studies.reporting.drawing import COLOURS, INK, MARKERS, WIDTH
+from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
 from swarm_logistics_env.train.evaluation import evaluate
 from swarm_logistics_env.train.specification import Training
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from table_blocks import costs_block, paper_block, policies_block
 
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.judgement import Findings
+from swarm_logistics_env.studies.results import StudyResults
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -57,7 +57,7 @@ def policy_studies(out: Path) -> tuple[Study, ...]:
     )
 
 
-def play(studies: Iterable[Study]) -> list[Findings]:
+def play(studies: Iterable[Study]) -> list[StudyResults]:
     """Play what is missing of each study; return what the runs say.
 
     Raises:

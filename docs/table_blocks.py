@@ -9,11 +9,11 @@ from typing import Any
 from record_tables import table
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies.agreement import agreement
-from swarm_logistics_env.studies.analysis.policies import judged_policies
-from swarm_logistics_env.studies.comparisons import Level
-from swarm_logistics_env.studies.judgement import Cell, Findings, Judgement
-from swarm_logistics_env.studies.reporting import wording
+from swarm_logistics_env.studies.comparisons import Setting
+from swarm_logistics_env.studies.policy_comparison import judged_policies
+from swarm_logistics_env.studies.results import Cell, IndicatorTest, StudyResults
 
 _EXACT = " ="
 _FAULTS = {
@@ -28,19 +28,19 @@ _FAULTS = {
 # -- the paper's table --------------------------------------------------------------------------
 
 
-def paper_block(parts: list[Findings]) -> str:
+def paper_block(parts: list[StudyResults]) -> str:
     """Return the paper's table: P of the paper beside ours, and how well they agree."""
     counted = [cell for part in parts for cell in part.cells if cell.counted]
-    counted.sort(key=lambda cell: ("size", "fault", "parameter").index(cell.arm.level.kind))
-    cells = {cell.arm.level: cell for cell in counted}
+    counted.sort(key=lambda cell: ("size", "fault", "parameter").index(cell.arm.setting.kind))
+    cells = {cell.arm.setting: cell for cell in counted}
     ablated = {
-        cell.arm.level: cell
+        cell.arm.setting: cell
         for part in parts
         for cell in part.cells
-        if cell.arm.level.kind == "policy"
+        if cell.arm.setting.kind == "policy"
     }
     figure = agreement("", tuple(cells.values()))
-    missed = {cell.arm.level for cell in figure.misses or ()}
+    missed = {cell.arm.setting for cell in figure.misses or ()}
     rows = [
         _row(label, [cells[level] for level in levels if level in cells], missed)
         for label, levels in _paper_rows(cells)
@@ -73,13 +73,13 @@ def paper_block(parts: list[Findings]) -> str:
             f"{wording.SATURATED}: in some run every item was delivered, so this P is capped and "
             "what rests on it as well."
         )
-    lines += ["", *_claims([judgement for part in parts for judgement in part.judgements])]
+    lines += ["", *_claims([test for part in parts for test in part.tests])]
     return "\n".join(lines)
 
 
-def _paper_rows(cells: Mapping[Level, Cell]) -> list[tuple[str, list[Level]]]:
+def _paper_rows(cells: Mapping[Setting, Cell]) -> list[tuple[str, list[Setting]]]:
     """Return the rows: a label, and the levels that stand side by side in it."""
-    factors: dict[str, list[Level]] = {}
+    factors: dict[str, list[Setting]] = {}
     for level in cells:
         factors.setdefault(level.name, []).append(level)
     rows = []
@@ -91,7 +91,7 @@ def _paper_rows(cells: Mapping[Level, Cell]) -> list[tuple[str, list[Level]]]:
     return rows
 
 
-def _label(levels: list[Level], n_items: int) -> str:
+def _label(levels: list[Setting], n_items: int) -> str:
     values = ", ".join(f"{level.value:g}" for level in levels)
     kind, name = levels[0].kind, levels[0].name
     if kind == "size":
@@ -101,9 +101,9 @@ def _label(levels: list[Level], n_items: int) -> str:
     return f"{_FAULTS[name]}, m = {values}" if levels[0].value else "no fault"
 
 
-def _row(label: str, cells: list[Cell], missed: set[Level]) -> tuple[str, ...]:
+def _row(label: str, cells: list[Cell], missed: set[Setting]) -> tuple[str, ...]:
     published = [
-        f"**{cell.published:g}**" if cell.arm.level in missed else f"{cell.published:g}"
+        f"**{cell.published:g}**" if cell.arm.setting in missed else f"{cell.published:g}"
         for cell in cells
     ]
     seeds = dict.fromkeys(str(cell.performance.size) for cell in cells)
@@ -115,22 +115,19 @@ def _performance(cell: Cell) -> str:
     return wording.items(cell.mean) + (wording.SATURATED if cell.saturated else "")
 
 
-def _claims(judgements: list[Judgement]) -> list[str]:
+def _claims(tests: list[IndicatorTest]) -> list[str]:
     """Return how many claims of the paper's text are supported, and which are not."""
-    claims = [judgement for judgement in judgements if judgement.claim is not None]
+    claims = [test for test in tests if test.claim is not None]
     if not claims:
         return []
-    said = [
-        wording.counted_as(judgement, judgement.on_claim(judgement.adjusted_verdict))
-        for judgement in claims
-    ]
+    said = [wording.counted_as(test, test.on_claim(test.adjusted_verdict)) for test in claims]
     text = (
         f"Of {len(claims)} claims (those of the paper's text, and that P falls without taxis), "
         f"adjusted after Holm: {wording.counted(Counter(said))}."
     )
     refuted = [
-        f"{wording.claimed(judgement)}, {judgement.comparison.label}"
-        for judgement, verdict in zip(claims, said)
+        f"{test.claim_text}, {test.comparison.label}"
+        for test, verdict in zip(claims, said)
         if verdict == "refuted"
     ]
     return [text, *([f"Refuted: {'; '.join(refuted)}."] if refuted else [])]
@@ -139,22 +136,20 @@ def _claims(judgements: list[Judgement]) -> list[str]:
 # -- the table of policies ----------------------------------------------------------------------
 
 
-def policies_block(findings: Findings, skewed: Findings) -> str:
+def policies_block(results: StudyResults, skewed: StudyResults) -> str:
     """Return P and the indicators of every policy, those of `skewed` in place of the others."""
-    names = judged_policies(findings)
+    names = judged_policies(results)
     rows: dict[str, dict[str, str]] = {}
-    for cell in findings.cells:
-        if cell.arm.level.kind in ("size", "parameter"):
-            rows.setdefault(f"P, {cell.arm.level}", {})[cell.policy] = _performance(cell)
-    for judgement in (*findings.judgements, *skewed.judgements):
-        comparison = judgement.comparison
+    for cell in results.cells:
+        if cell.arm.setting.kind in ("size", "parameter"):
+            rows.setdefault(f"P, {cell.arm.setting}", {})[cell.policy] = _performance(cell)
+    for test in (*results.tests, *skewed.tests):
+        comparison = test.comparison
         label = f"{comparison.indicator}, {comparison.label}"
-        mark = _EXACT if judgement.unaffected else ""
-        rows.setdefault(label, {})[comparison.policy] = wording.ratio(judgement) + mark
-    first, count, more = findings.plan.seeds[0], len(findings.plan.seeds), len(skewed.plan.seeds)
-    replaced = dict.fromkeys(
-        f"{j.comparison.indicator}, {j.comparison.label}" for j in skewed.judgements
-    )
+        mark = _EXACT if test.unaffected else ""
+        rows.setdefault(label, {})[comparison.policy] = wording.ratio(test) + mark
+    first, count, more = results.plan.seeds[0], len(results.plan.seeds), len(skewed.plan.seeds)
+    replaced = dict.fromkeys(f"{j.indicator}, {j.comparison.label}" for j in skewed.tests)
     fewer = [f"`{name}`" for name in judged_policies(skewed)]
     text = (
         f"{count} seeds from {first:,} on, on which nothing was fitted; {more} for "
@@ -162,20 +157,20 @@ def policies_block(findings: Findings, skewed: Findings) -> str:
     )
     head = ("", *(f"`{name}`" for name in names))
     body = [(label, *(row.get(name, "") for name in names)) for label, row in rows.items()]
-    if any(judgement.unaffected for judgement in findings.judgements):
+    if any(test.unaffected for test in results.tests):
         text += (
             f"\nThe sign{_EXACT} marks what is {wording.UNAFFECTED}: equal runs, an exact value, "
             "and no evidence."
         )
-    return "\n".join([table(head, body), "", text, *_shortfall(findings)])
+    return "\n".join([table(head, body), "", text, *_shortfall(results)])
 
 
-def _shortfall(findings: Findings) -> list[str]:
+def _shortfall(results: StudyResults) -> list[str]:
     """Return a sentence: by how much the networks fall short of `homing`, which they imitate."""
     unbroken = {
         cell.policy: cell
-        for cell in findings.cells
-        if cell.arm.level.kind == "fault" and cell.arm.level.name == "none"
+        for cell in results.cells
+        if cell.arm.setting.kind == "fault" and cell.arm.setting.name == "none"
     }
     networks = [name for name in unbroken if name.startswith("ppo-")]
     if "homing" not in unbroken or not networks:

@@ -10,8 +10,7 @@ import sys
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparing import answers
-from swarm_logistics_env.studies.gate import Gate
+from swarm_logistics_env.studies.gate import Gate, answers
 
 GATES = ("change < 0", "R < -0.5 at FM1")
 
@@ -21,7 +20,7 @@ def main(seeds=10, duration=200.0, out="results/gate"):
         "old": policies.load("swarm-dt"),
         "new": policies.load("swarm-dt", taxis_gain=0.2),  # the change to be judged
     }
-    findings = {}
+    results = {}
     for name, controller in controllers.items():
         study = Study(
             policies=[controller],
@@ -31,11 +30,11 @@ def main(seeds=10, duration=200.0, out="results/gate"):
             out=f"{out}/{name}",
         )
         study.run()
-        findings[name] = study.findings()
+        results[name] = study.findings()
 
     failed = False
     for text in GATES:
-        for answer in answers(Gate.parse(text), findings["old"], findings["new"]):
+        for answer in answers(Gate.parse(text), results["old"], results["new"]):
             failed |= answer.fails
             print(f"{'FAILS ' if answer.fails else 'passes'} {text!r}: {answer.name}")
     return int(failed)

@@ -282,12 +282,18 @@ class Scenario(Record):
 
     def sheet(self) -> str:
         """Return the set-up sheet: one Markdown table of every condition, unit and source."""
-        rows = ["| condition | value | unit, meaning; source |", "|---|---|---|"]
+        head = ["| condition | value | unit, meaning; source |", "|---|---|---|"]
+        rows = (f"| {' | '.join(row)} |" for row in self.conditions())
+        return "\n".join([*head, *rows]) + "\n"
+
+    def conditions(self) -> list[tuple[str, str, str]]:
+        """Return name, value and description (unit, meaning; source) of every condition."""
+        rows = []
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
             mark = "" if value == field.default else f" (default {_shown(field.default)})"
-            rows.append(f"| {name} | {_shown(value)}{mark} | {field.description} |")
-        return "\n".join(rows) + "\n"
+            rows.append((name, f"{_shown(value)}{mark}", str(field.description)))
+        return rows
 
 
 def _shown(value: object) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
+import pytest
 from hypothesis import settings
 
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
@@ -20,3 +22,24 @@ if not (Path(__file__).parents[1] / "swarm_logistics_env").is_dir():
         "trust/test_mutants.py",
         "trust/test_ignores.py",
     ]
+
+
+@pytest.fixture
+def small() -> dict[str, Any]:
+    """Fields of a study with all four kinds of factor, of 20 s of simulated time."""
+    return {
+        "name": "small",
+        "seeds": 2,
+        "scenario": {
+            "n_robots": 4,
+            "n_items": 8,
+            "warehouse_width": 3.0,
+            "warehouse_height": 3.0,
+            "delivery_width": 1.0,
+            "duration": 20.0,
+        },
+        "sizes": [{"values": [2, 4, 6]}],
+        "faults": [{"modes": ["FM1", "FM4"], "robots": [1]}],
+        "parameters": [{"name": "delivery_width", "values": [1.0, 0.5]}],
+        "ablations": [{"policy": "random-walk"}],
+    }

@@ -40,10 +40,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "episode": WORLD | {"policies"},
     "spi": set(),
     "watch": RUNS | {"rendering"},
-    "studies": RUNS | {"spi"},
-    "train": RUNS | ENVIRONMENT | {"wrappers", "adapters", "spi", "studies"},
+    "tasks": RUNS,
+    "studies": {"errors", "records", "streams", "spi", "tasks"},
+    "report": {"errors", "spi", "tasks", "studies"},
+    "train": RUNS | ENVIRONMENT | {"wrappers", "adapters", "spi", "tasks", "studies"},
     "testing": RUNS | ENVIRONMENT | {"wrappers", "adapters"},
 }
+# A Study offers its report, so it stands above both; the other modules of studies stand below.
+MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report"}
+MAY_IMPORT["train"] |= {"Study"}
 # The front doors import whatever they offer.
 MAY_IMPORT["cli"] = set(MAY_IMPORT)
 MAY_IMPORT["__init__"] = set(MAY_IMPORT)
@@ -112,6 +117,8 @@ OWN_IMPORTS = [i for i in IMPORTS if i.imported.split(".")[0] == PACKAGE]
 
 def part(module: str) -> str:
     """The part of the package a module belongs to: `warehouse` for `….warehouse.physics`."""
+    if module in {f"{PACKAGE}.studies", f"{PACKAGE}.studies.study"}:
+        return "Study"
     return module.split(".")[1] if "." in module else "__init__"
 
 

@@ -105,17 +105,15 @@ def test_the_blocks_quote_what_was_played(tables: Any, small: Path, tmp_path: Pa
     assert f"is {np.mean(logs):.3f} over the {len(counted)} published values" in paper
 
     main, skewed = (study.findings() for study in tables.policy_studies(tmp_path / "out"))
-    unbroken = {c.policy: c.performance for c in main.cells if c.arm.level.name == "none"}
+    unbroken = {c.policy: c.performance for c in main.cells if c.arm.setting.name == "none"}
     change = spi.relative_change(unbroken["homing"], unbroken["ppo-delivery"])
     assert f"`ppo-delivery` {abs(100 * change.value):.1f} %" in policies
     assert policies.rstrip().endswith("less." if change.value < 0 else "more.")
     assert "The networks imitate `homing`" in policies
     # FM4 of swarm-dt comes from the study with more seeds, of the others from the first.
     row = next(line for line in policies.splitlines() if line.startswith("| R, FM4, m = 2"))
-    values = {
-        j.comparison.policy: j.estimate for j in main.judgements if j.comparison.indicator == "R"
-    }
-    (more,) = [j.estimate for j in skewed.judgements if j.comparison.indicator == "R"]
+    values = {j.comparison.policy: j.estimate for j in main.tests if j.comparison.indicator == "R"}
+    (more,) = [j.estimate for j in skewed.tests if j.comparison.indicator == "R"]
     assert row.split("|")[2].strip().startswith(f"{more.value:.3f}")
     assert row.split("|")[3].strip().startswith(f"{values['homing'].value:.3f}")
 

@@ -16,7 +16,7 @@ from swarm_logistics_env.cli.options import (
     fault_of,
     scenario_of,
 )
-from swarm_logistics_env.cli.study import study
+from swarm_logistics_env.cli.study_commands import study
 from swarm_logistics_env.cli.train import train_command
 
 app = Application(

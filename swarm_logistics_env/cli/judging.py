@@ -7,18 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.study import (
+from swarm_logistics_env.cli.study_commands import (
     PolicyOption,
     ProcessesOption,
     TrustCodeOption,
     study,
     study_of,
 )
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.studies.comparing import Answer
-    from swarm_logistics_env.studies.judgement import Findings
+    from swarm_logistics_env.studies.gate import Answer
+    from swarm_logistics_env.studies.results import StudyResults
 
+SYMBOLS = tuple(DEFINITIONS)
 AtOption = Annotated[
     str, typer.Option(metavar="TEXT", help="Only comparisons whose name holds this.")
 ]
@@ -38,7 +40,9 @@ def power_command(
         typer.Option(help="Assumed true value of the indicator; the paper's if not given."),
     ] = None,
     power: Annotated[float, typer.Option(help="Wanted probability of a verdict.")] = 0.8,
-    indicator: Annotated[str | None, typer.Option(help="Only S, FT, R, A or change.")] = None,
+    indicator: Annotated[
+        str | None, typer.Option(help=f"Only {', '.join(SYMBOLS[:-1])} or {SYMBOLS[-1]}.")
+    ] = None,
     at: AtOption = "",
     pilot_seeds: Annotated[int, typer.Option(min=2, help="Seeds of the pilot.")] = 5,
     policies: PolicyOption = None,
@@ -46,15 +50,15 @@ def power_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
-    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.errors import StudyError
-    from swarm_logistics_env.studies.power import demands
-    from swarm_logistics_env.studies.reporting.sections import Section
+    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.studies.seeds_needed import demands
 
-    findings = _pilot(asked, pilot_seeds, policies, processes, trust_code)
+    results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
-    for demand in demands(findings, effect, power):
-        comparison = demand.judgement.comparison
+    for demand in demands(results, effect, power):
+        comparison = demand.test.comparison
         name = f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}"
         if indicator not in (None, comparison.indicator) or at not in name:
             continue
@@ -71,12 +75,12 @@ def power_command(
     if not rows:
         asked_for = [] if indicator is None else [f"--indicator {indicator}"]
         asked_for += [f"--at {at!r}"] if at else []
-        made = dict.fromkeys(j.comparison.indicator for j in findings.judgements)
+        made = dict.fromkeys(j.indicator for j in results.tests)
         raise StudyError(
             f"{' '.join(asked_for) or asked}: the study makes no such comparison; "
             f"it asks about {', '.join(made) or 'nothing'}"
         )
-    n_seeds = len(findings.plan.seeds)
+    n_seeds = len(results.plan.seeds)
     columns = (
         "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power on average",
         "power in nine pilots of ten at least",
@@ -93,7 +97,8 @@ def compare_command(
         list[str] | None,
         typer.Option(
             metavar="GATE",
-            help="[possibly] S|FT|R|A|change <|> NUMBER [at TEXT]; may be repeated. change is "
+            help=f"[possibly] {'|'.join(SYMBOLS)} <|> NUMBER [at TEXT]; may be "
+            "repeated. change is "
             "(P_new - P_old) / P_old; the others are NEW's. Plain: fails where it is so beyond "
             "chance; possibly: where that is not ruled out.",
         ),
@@ -101,15 +106,14 @@ def compare_command(
 ) -> None:
     """Compare two studies, condition by condition; end with 1 if a gate fails."""
     from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.comparing import answers
-    from swarm_logistics_env.studies.gate import Gate
+    from swarm_logistics_env.studies.gate import Gate, answers
     from swarm_logistics_env.studies.matching import match
 
     gates = [Gate.parse(text) for text in fail_if or []]
     before, after = (Study.stored(directory).findings() for directory in (old, new))
     left_out = match(before, after).notes
     failed = False
-    # What is shown without a gate fails nothing.
+    # Without a gate the change is shown, and nothing fails.
     for gate in gates or [Gate.parse("change < 0")]:
         said = answers(gate, before, after)
         fails = bool(gates) and any(answer.fails for answer in said)
@@ -126,7 +130,7 @@ def _pilot(
     policies: list[str] | None,
     processes: int | None,
     trust_code: bool,
-) -> Findings:
+) -> StudyResults:
     import os
 
     from swarm_logistics_env.errors import StudyError
@@ -142,8 +146,8 @@ def _pilot(
 
 
 def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
-    from swarm_logistics_env.cli.tables import show
-    from swarm_logistics_env.studies.reporting.sections import Section
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.result_tables import Section
 
     rows = []
     for answer in said:

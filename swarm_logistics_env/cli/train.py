@@ -73,9 +73,9 @@ def train_command(
 
 
 def _show(asked: Tuning, trials: list[Trial], path: Path) -> None:
-    from swarm_logistics_env.cli.tables import show
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies.tuned import read_tuned
-    from swarm_logistics_env.studies.reporting.sections import Section
+    from swarm_logistics_env.report.result_tables import Section
 
     names = list(trials[0].parameters)
     shown = [trial for trial in trials if trial.is_best or trial.number == 0]

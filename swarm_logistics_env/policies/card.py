@@ -92,7 +92,7 @@ class PolicyCard(_Part):
         network: how it decides.
         command: the command line that made it.
         versions: of the packages that trained it, and as "simulation" the digest of the world's
-            code (`studies.code_version`) that it was trained in.
+            code (`tasks.code_version`) that it was trained in.
         scored_with: the version of this package and the digest that its scores are of.
         scenario: what it was trained in, fields that differ from the defaults, and always
             `heading_drift`: cards from before there was one read it as 0.

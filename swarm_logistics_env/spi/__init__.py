@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from .efficiency import karp_flatt, marginal_gain, per_robot_efficiency
-from .errors import IndicatorError
 from .estimate import Estimate, Verdict
 from .fault_budget import FaultBudget, fault_budget
 from .indicators import (
@@ -13,6 +12,7 @@ from .indicators import (
     robustness,
     scalability,
 )
+from .inputs import IndicatorError
 from .multiplicity import adjust, adjusted_p_values, holm
 from .power import (
     lower_decile_of_power,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from .errors import IndicatorError
-from .inputs import finite
+from .inputs import IndicatorError, finite
 
 
 def per_robot_efficiency(p: float, n: float) -> float:

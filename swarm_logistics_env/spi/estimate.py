@@ -1,15 +1,29 @@
-"""The record that every indicator returns, and the rule that turns a test into a verdict."""
+"""The record that every indicator returns, and the one path from samples to it."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
-Indicator = Literal["S", "FT", "R", "A", "change", "resilience"]
+import numpy as np
+
+from .bootstrap import MIN_SEEDS
+from .inputs import IndicatorError, between_0_and_1, finite, performance, positive_mean, same_seeds
+from .ratio import RatioTest, paired_ratio
+from .summaries import pairing_correlation
+from .unpaired import Term, unpaired_ratio
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+
 Verdict = Literal["supported", "refuted", "inconclusive"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """One indicator over n seeds: theta = mean(num) / mean(den) + offset, with its judgement.
 
@@ -45,21 +59,21 @@ class Estimate:
             more often than its level at this n).
     """
 
-    indicator: Indicator
+    indicator: str
     value: float
-    low: float | None
-    high: float | None
-    probability: float | None
-    verdict: Verdict
+    low: float | None = None
+    high: float | None = None
+    probability: float | None = None
+    verdict: Verdict = "inconclusive"
     threshold: float
     level: float
     n_seeds: int
-    p_value: float | None
+    p_value: float | None = None
     paired: bool
-    pairing_correlation: float | None
-    difference_sd: float | None
+    pairing_correlation: float | None = None
+    difference_sd: float | None = None
     mean_denominator: float
-    degrees_of_freedom: float | None
+    degrees_of_freedom: float | None = None
     flags: tuple[str, ...] = ()
 
     @property
@@ -86,3 +100,178 @@ def verdict_at(alpha: float, p_value: float | None, probability: float | None) -
     if p_value is None or probability is None or not p_value < alpha:
         return "inconclusive"
     return "supported" if probability > 0.5 else "refuted"
+
+
+# The two differences of two seeds are close to each other by chance so often, counts being whole
+# numbers, that their spread says nothing.
+LEAST_SEEDS = 3
+
+
+def judge(
+    indicator: str,
+    terms: Mapping[str, tuple[ArrayLike, float, float]],
+    *,
+    offset: float,
+    threshold: float,
+    level: float,
+    paired: bool,
+    saturated: Collection[str] = (),
+    identical: bool = False,
+) -> Estimate:
+    """Estimate one ratio of means and judge it against `threshold`.
+
+    Args:
+        indicator: Its name.
+        terms: Name to performances over seeds [items] and their weights in numerator and
+            denominator; the first two are compared, the last is the reference that the ratio
+            divides by.
+        offset: Added to the ratio of means.
+        threshold: What theta is tested against, finite.
+        level: Confidence level, in (0, 1).
+        paired: Whether row i of every sample is the same seed.
+        saturated: Names of the terms whose P is capped (every item delivered in a run). The true P
+            is then larger: a reference that is capped blocks "supported", a changed condition that
+            is capped blocks "refuted".
+        identical: Whether the runs compared are the same runs, seed by seed.
+
+    Raises:
+        IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
+            reference 0, threshold or level out of range, an unknown name in `saturated`, or
+            `identical` with performances that differ.
+    """
+    finite("threshold", threshold)
+    between_0_and_1("level", level)
+    weighted = _checked(terms, saturated, paired=paired, identical=identical)
+    samples = {name: term.sample for name, term in weighted.items()}
+    *_, reference = samples.values()
+    n_seeds = min(sample.size for sample in samples.values())
+    asked = _Asked(
+        indicator=indicator, threshold=threshold, level=level, n_seeds=n_seeds, paired=paired
+    )
+    if identical or n_seeds == 1:
+        mean_den = float(reference.mean())
+        mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
+        value = mean_num / mean_den + offset
+        return Estimate(
+            **asked,
+            value=value,
+            low=value if identical else None,
+            high=value if identical else None,
+            mean_denominator=mean_den,
+            flags=("identical",) if identical else ("single_seed",),
+        )
+
+    flags = []
+    correlation = None
+    if paired:
+        num, den = _numerator(weighted), reference
+        test = paired_ratio(num, den, offset=offset, threshold=threshold, level=level)
+        correlation = pairing_correlation(*list(samples.values())[:2])
+        # Without spread the skewness of D would be one of rounding errors.
+        if not test.degenerate and _skewed(num - (threshold - offset) * den):
+            flags.append("skewed")
+    else:
+        test = unpaired_ratio(
+            list(weighted.values()), offset=offset, threshold=threshold, level=level
+        )
+    p_value, probability = float(test.p_value), float(test.probability)
+    flags += _flags(test, n_seeds, _capped_side(weighted, saturated))
+    if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
+        p_value, probability = 1.0, 0.5
+    elif not paired or n_seeds < MIN_SEEDS:
+        flags.append("assumes_normal")
+    if test.unbounded:
+        flags.append("unbounded")
+    return Estimate(
+        **asked,
+        value=float(test.value),
+        low=None if test.degenerate else float(test.low),
+        high=None if test.degenerate else float(test.high),
+        probability=probability,
+        verdict=verdict_at(1.0 - level, p_value, probability),
+        p_value=p_value,
+        pairing_correlation=correlation,
+        difference_sd=float(test.difference_sd),
+        mean_denominator=float(test.mean_denominator),
+        degrees_of_freedom=test.degrees_of_freedom,
+        flags=tuple(flags),
+    )
+
+
+class _Asked(TypedDict):
+    indicator: str
+    threshold: float
+    level: float
+    n_seeds: int
+    paired: bool
+
+
+def _checked(
+    terms: Mapping[str, tuple[ArrayLike, float, float]],
+    saturated: Collection[str],
+    *,
+    paired: bool,
+    identical: bool,
+) -> dict[str, Term]:
+    weighted = {
+        name: Term(performance(name, sample), in_num, in_den)
+        for name, (sample, in_num, in_den) in terms.items()
+    }
+    samples = {name: term.sample for name, term in weighted.items()}
+    if paired:
+        same_seeds(**samples)
+    for name in saturated:
+        if name not in samples:
+            raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
+    if identical:
+        _refuse_differing(samples, paired=paired)
+    *_, (reference_name, reference) = samples.items()
+    positive_mean(reference_name, reference)
+    return weighted
+
+
+def _flags(test: RatioTest, n_seeds: int, capped_side: set[Verdict]) -> Iterator[str]:
+    """Yield why a test gives no verdict."""
+    if n_seeds < LEAST_SEEDS:
+        yield "too_few_seeds"
+    if test.degenerate:
+        yield "degenerate"
+    if ("supported" if test.probability > 0.5 else "refuted") in capped_side:
+        yield "capped"
+
+
+def _refuse_differing(samples: Mapping[str, NDArray[np.float64]], *, paired: bool) -> None:
+    (name, first), *others = samples.items()
+    for other_name, other in others:
+        if not paired or not np.array_equal(first, other):
+            raise IndicatorError(
+                f"identical = True, but {name} and {other_name} differ: should be paired and equal"
+            )
+
+
+def _capped_side(terms: Mapping[str, Term], saturated: Collection[str]) -> set[Verdict]:
+    """Return the verdicts that a capped P may have brought about: the true P is larger."""
+    return {"refuted" if terms[name].in_num > 0.0 else "supported" for name in saturated}
+
+
+def _numerator(terms: Mapping[str, Term]) -> NDArray[np.float64]:
+    numerator = np.zeros_like(next(iter(terms.values())).sample)
+    for term in terms.values():
+        numerator += term.in_num * term.sample
+    return numerator
+
+
+def _skewed(difference: NDArray[np.float64]) -> bool:
+    """Whether n is too small for the skewness of D: Cochran's n > 25 g^2 fails, beyond chance.
+
+    Cochran (1977, Sampling Techniques, 2.15) gives the rule for the population's g. That of a few
+    seeds scatters, so it must also exceed twice its standard error under a normal D.
+    """
+    n = difference.size
+    deviation = difference - difference.mean()
+    spread = math.sqrt(float(np.mean(deviation**2)))
+    if n < 3 or spread == 0.0:
+        return False
+    g = float(np.mean((deviation / spread) ** 3)) * math.sqrt(n * (n - 1)) / (n - 2)
+    standard_error = math.sqrt(6 * n * (n - 1) / ((n - 2) * (n + 1) * (n + 3)))
+    return abs(g) > max(math.sqrt(n / 25), 2.0 * standard_error)

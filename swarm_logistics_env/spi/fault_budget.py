@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from .errors import IndicatorError
+from .inputs import IndicatorError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, SupportsIndex
 
-from .errors import IndicatorError
-from .inputs import count, finite
-from .judgement import judge
+from .estimate import judge
+from .inputs import IndicatorError, count, finite
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -50,10 +49,7 @@ def scalability(
     gain = count("n", n) / count("m", m)
     return judge(
         "S",
-        {
-            "p_nm": (p_nm, gain, 0.0),
-            "p_n": (p_n, -gain, 1.0),
-        },
+        {"p_nm": (p_nm, gain, 0.0), "p_n": (p_n, -gain, 1.0)},
         offset=0.0,
         threshold=threshold,
         level=level,
@@ -100,11 +96,7 @@ def fault_tolerance(
         raise IndicatorError(f"m = {m} of n = {n} robots: should leave a robot for P_S (m < n)")
     return judge(
         "FT",
-        {
-            "p_f": (p_f, 1.0, 0.0),
-            "p_s": (p_s, -1.0, 0.0),
-            "p_o": (p_o, 0.0, 1.0),
-        },
+        {"p_f": (p_f, 1.0, 0.0), "p_s": (p_s, -1.0, 0.0), "p_o": (p_o, 0.0, 1.0)},
         offset=0.0,
         threshold=threshold,
         level=level,
@@ -149,10 +141,7 @@ def robustness(
         raise IndicatorError(f"m = {faulty}: should be at most n = {robots} robots")
     return judge(
         "R",
-        {
-            "p_f": (p_f, 1.0, 0.0),
-            "p_o": (p_o, -1.0, 1.0),
-        },
+        {"p_f": (p_f, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)},
         offset=faulty / robots,
         threshold=threshold,
         level=level,
@@ -200,10 +189,7 @@ def adaptability(
     gain = 1.0 / abs((x_new - x_o) / x_o)
     return judge(
         "A",
-        {
-            "p_new": (p_new, gain, 0.0),
-            "p_o": (p_o, -gain, 1.0),
-        },
+        {"p_new": (p_new, gain, 0.0), "p_o": (p_o, -gain, 1.0)},
         offset=1.0,
         threshold=threshold,
         level=level,
@@ -242,10 +228,7 @@ def relative_change(
     """
     return judge(
         "change",
-        {
-            "p_new": (p_new, 1.0, 0.0),
-            "p_o": (p_o, -1.0, 1.0),
-        },
+        {"p_new": (p_new, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)},
         offset=0.0,
         threshold=threshold,
         level=level,

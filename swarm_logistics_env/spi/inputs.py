@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, SupportsIndex
 
 import numpy as np
 
-from .errors import IndicatorError
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -108,3 +106,7 @@ def _number(name: str, value: float) -> float:
     except (TypeError, OverflowError):
         raise IndicatorError(f"{name} = {value!r}: should be a number") from None
     return float(value)
+
+
+class IndicatorError(ValueError):
+    """Input from which an indicator is undefined; the message names the field and the value."""

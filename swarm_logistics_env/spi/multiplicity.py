@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import IndicatorError
 from .estimate import verdict_at
-from .inputs import numbers
+from .inputs import IndicatorError, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

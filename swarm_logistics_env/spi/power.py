@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from typing import TYPE_CHECKING
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, count, finite
+from .inputs import IndicatorError, between_0_and_1, count, finite
 
 if TYPE_CHECKING:
     from .estimate import Estimate
@@ -16,7 +16,7 @@ MAX_SEEDS = 1_000_000
 # than it rises on the other: planned with it, a promised 0.80 is 0.56 to 0.74 on average for pilots
 # of 3 to 10 seeds. With this upper confidence limit of the spread it is 0.79 to 0.82.
 PLANNED_LIMIT = 0.6
-UNLUCKY_LIMIT = 0.9  # of the spread: one pilot in ten is further off
+UNLUCKY_LIMIT = 0.9  # confidence limit of the spread that one pilot in ten exceeds
 # Beyond this critical t, as of two seeds at an early look, the statistic's normal part is lost
 # beside its chi-squared one, and the noncentral t would be summed over so many terms.
 _FAR_OUT = 1e3
@@ -73,11 +73,7 @@ def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> in
     high = 2
     while not enough(high):
         high *= 2
-    low = high // 2  # one too few, or 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high
+    return 2 + bisect_left(range(2, high), x=True, key=enough)
 
 
 def lower_decile_of_power(estimate: Estimate, effect: float, n_seeds: int) -> float | None:

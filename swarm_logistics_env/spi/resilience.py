@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .estimate import judge
 from .inputs import delivery_times, finite
-from .judgement import judge
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, performance
+from .inputs import IndicatorError, between_0_and_1, performance
 from .scaling_laws import (
     CURVES,
     peak_of,
@@ -100,7 +99,7 @@ def fit_scaling(
     peak = peak_of(law, fitted)
     low, high = None, None
     if peak is not None:
-        # From below that of the fit, which may be nearly flat.
+        # The search starts below the sharpness of the fit, which may be nearly flat.
         bluntest = min(-_SHARPNESS, sharpness_of(law, fitted, peak) - 5.0)
         low, high = _peak_limits(law, peak, bluntest, residual_sum, n, observed, weights, level)
     names = ("g", "a", "b") if law == "usl" else ("k", "p", "q")
@@ -126,7 +125,7 @@ def compare_scaling(
         IndicatorError: As `fit_scaling`.
     """
     fits = [fit_scaling(sizes, p, law=law, weighting=weighting, level=level) for law in CURVES]
-    # Both have three parameters: where AICc is undefined the residual sum gives the same order.
+    # Both laws have three parameters, so the residual sum gives the order of AICc, defined or not.
     return tuple(sorted(fits, key=lambda fit: fit.residual_sum))
 
 

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, delivery_times
+from .inputs import IndicatorError, between_0_and_1, delivery_times
 
-SWAPS = 999  # of the test that there is any loss
-SIMULATIONS = 400  # of each candidate time: the 95 % limit of its likelihood ratio is then +-1 %
+SWAPS = 999  # random swaps in the test that there is any loss
+SIMULATIONS = 400  # for each candidate time; they fix its 95 % limit to +-1 %
 _CANDIDATES = 16  # times at which that limit is simulated; between them it is interpolated
 _FAR_OFF = 25.0  # likelihood ratio that no candidate's limit comes near
 _MOST_BINS = 400

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .errors import IndicatorError
 from .estimate import verdict_at
-from .inputs import between_0_and_1, count
+from .inputs import IndicatorError, between_0_and_1, count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -48,9 +48,9 @@ def interquartile_mean(p: ArrayLike) -> float:
     Raises:
         IndicatorError: p empty, negative or not finite.
     """
-    ascending = np.sort(performance("p", p))
-    cut = ascending.size // 4
-    return float(ascending[cut : ascending.size - cut].mean())
+    from scipy.stats import trim_mean
+
+    return float(trim_mean(performance("p", p), 0.25))
 
 
 def worst_decile(p: ArrayLike) -> float:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .errors import IndicatorError
-from .inputs import between_0_and_1, numbers
+from .inputs import IndicatorError, between_0_and_1, numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -41,7 +41,7 @@ def kaplan_meier(seconds: ArrayLike, happened: ArrayLike, level: float = 0.95) -
     Raises:
         IndicatorError: Empty or unequal arrays, a time negative or not finite, level out of range.
     """
-    from scipy.special import ndtri
+    from scipy.stats import CensoredData, ecdf
 
     between_0_and_1("level", level)
     time = numbers("seconds", seconds)
@@ -53,15 +53,15 @@ def kaplan_meier(seconds: ArrayLike, happened: ArrayLike, level: float = 0.95) -
     for value in time.tolist():
         if not 0.0 <= value < np.inf:
             raise IndicatorError(f"seconds holds {value}: should be finite and not negative")
-    times, events = np.unique(time[event], return_counts=True)
-    at_risk = (time >= times[:, np.newaxis]).sum(axis=1)
-    share = np.cumprod(1.0 - events / at_risk)
-    inside = (share > 0.0) & (share < 1.0)
-    left = np.where(at_risk > events, at_risk - events, 1)
-    variance = np.cumsum(events / (at_risk * left))
-    log_share = np.log(np.where(inside, share, 0.5))
-    half = float(ndtri(0.5 + level / 2)) * np.sqrt(variance) / np.abs(log_share)
+    if not event.any():
+        return SurvivalCurve(*np.empty((4, 0)))
+    curve = ecdf(CensoredData(uncensored=time[event], right=time[~event])).sf
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # share 0 has no limits, which is dealt with below
+        limits: Any = curve.confidence_interval(level, method="log-log")
+    times, share, low, high = np.array(
+        [curve.quantiles, curve.probabilities, limits.low.probabilities, limits.high.probabilities]
+    )[:, np.isin(curve.quantiles, time[event])]
     # At share 0 the scale ends and no interval is defined: all that is known is [0, 1].
-    low = np.where(inside, np.exp(log_share * np.exp(half)), 0.0)
-    high = np.where(inside, np.exp(log_share * np.exp(-half)), 1.0)
-    return SurvivalCurve(times, share, low, high)
+    inside = (share > 0.0) & (share < 1.0)
+    return SurvivalCurve(times, share, np.where(inside, low, 0.0), np.where(inside, high, 1.0))

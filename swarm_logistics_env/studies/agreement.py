@@ -1,4 +1,4 @@
-"""How well one policy's runs agree with the published values: cells met, errors, order of sizes."""
+"""Agreement of a policy's runs with the published values: cells met, errors, order of sizes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from itertools import combinations
 
-from swarm_logistics_env.studies.judgement import Cell, Findings
+from swarm_logistics_env.studies.results import Cell, StudyResults
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class Agreement:
     largest_ordered: int
 
 
-def agreements(findings: Findings) -> tuple[Agreement, ...]:
+def agreements(results: StudyResults) -> tuple[Agreement, ...]:
     """Return the figures of every policy all of whose cells have runs; none without reference."""
-    labels = dict.fromkeys(cell.policy for cell in findings.cells)
+    labels = dict.fromkeys(cell.policy for cell in results.cells)
     found = []
     for label in labels:
-        cells = tuple(cell for cell in findings.cells if cell.policy == label and cell.counted)
+        cells = tuple(cell for cell in results.cells if cell.policy == label and cell.counted)
         if cells and not any(cell.problem for cell in cells):
             found.append(agreement(label, cells))
     return tuple(found)
@@ -63,10 +63,10 @@ def agreement(policy: str, cells: tuple[Cell, ...]) -> Agreement:
         if low is not None and high is not None:
             widths.append(high - low)
     # Beyond the peak the published fall is within one run's noise.
-    sizes = [cell for cell in cells if cell.arm.level.kind == "size"]
+    sizes = [cell for cell in cells if cell.arm.setting.kind == "size"]
     peak = max(sizes, key=_published) if sizes else None
-    largest = int(peak.arm.level.value) if peak else 0
-    ordered = [cell for cell in sizes if cell.arm.level.value <= largest]
+    largest = int(peak.arm.setting.value) if peak else 0
+    ordered = [cell for cell in sizes if cell.arm.setting.value <= largest]
     return Agreement(
         policy,
         cells,

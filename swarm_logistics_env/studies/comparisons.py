@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypedDict
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import spi
-from swarm_logistics_env.spi.estimate import Estimate, Indicator
-from swarm_logistics_env.studies.conditions import Condition
+from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.studies.runs import Condition
 
 Performance = Callable[["Arm"], NDArray[np.float64]]
 
 
-class Level(NamedTuple):
-    """One level of a factor: a swarm size, a fault, a parameter's value, or another policy."""
+class Setting(NamedTuple):
+    """One setting of a factor: a swarm size, a fault, a parameter's value, or another policy."""
 
-    kind: Literal["size", "fault", "parameter", "policy"]
+    kind: Factor
     name: str
     value: float
     onset: float = 0.0
@@ -39,20 +40,20 @@ class Level(NamedTuple):
         return f"{self.name}, m = {self.value:g}{start}"
 
 
-NO_FAULT = Level("fault", "none", 0)
-OTHER_BEHAVIOUR = Level("fault", "other behaviour", 0)
+NO_FAULT = Setting("fault", "none", 0)
+OTHER_BEHAVIOUR = Setting("fault", "other behaviour", 0)
 
 
 @dataclass(frozen=True)
 class Arm:
     """A condition in the part that it plays in a comparison."""
 
-    level: Level
+    setting: Setting
     condition: Condition
 
 
 @dataclass(frozen=True)
-class Twins:
+class NullPair:
     """Two arms without fault that share worlds, not behaviour: what chance alone makes of them.
 
     Attributes:
@@ -74,9 +75,9 @@ class Twins:
 class Question(NamedTuple):
     """What a comparison asks, whichever policy it is asked of."""
 
-    indicator: Indicator
-    original: Level
-    changed: Level
+    indicator: str
+    original: Setting
+    changed: Setting
     threshold: float
 
 
@@ -86,16 +87,16 @@ class Comparison:
 
     Attributes:
         table: heading of the report's table that it stands in.
-        indicator: "S", "FT", "R", "A" or "change".
+        indicator: a symbol of `spi.definitions.DEFINITIONS`.
         original: the arm of P_o (P_N for S).
         changed: the arm of P_F, P_new or P_(N+m).
-        removed: the arm of P_S, for FT alone.
+        removed: the arm of P_S, where the indicator needs it.
         threshold: that the indicator is tested against.
         claim: whether the study claims that it is above; None: the study claims nothing.
     """
 
     table: str
-    indicator: Indicator
+    indicator: str
     original: Arm
     changed: Arm
     removed: Arm | None = None
@@ -108,12 +109,17 @@ class Comparison:
         return self.original.condition.policy.label
 
     @property
-    def question(self) -> Question:
-        """The comparison without its policy."""
-        return Question(self.indicator, self.original.level, self.changed.level, self.threshold)
+    def definition(self) -> Definition:
+        """The indicator's row in the table of indicators."""
+        return DEFINITIONS[self.indicator]
 
     @property
-    def family(self) -> tuple[str, Indicator]:
+    def question(self) -> Question:
+        """The comparison without its policy."""
+        return Question(self.indicator, self.original.setting, self.changed.setting, self.threshold)
+
+    @property
+    def family(self) -> tuple[str, str]:
         """Holm's family: all comparisons of one indicator for one policy."""
         return self.policy, self.indicator
 
@@ -125,7 +131,7 @@ class Comparison:
     @property
     def label(self) -> str:
         """The step in words, e.g. "N 5 -> 10" or "FM1, m = 2"."""
-        before, after = self.original.level, self.changed.level
+        before, after = self.original.setting, self.changed.setting
         if after.kind == "size":
             return f"N {before.value:g} -> {after.value:g}"
         if after.kind == "parameter":
@@ -153,52 +159,65 @@ class Comparison:
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
         """
-        before, after = self.original.level.value, self.changed.level.value
-        p_o, p_new = performance(self.original), performance(self.changed)
-        swarm = self.original.condition.scenario.n_robots
-        asked: _Asked = {
-            "threshold": self.threshold,
-            "level": level,
-            "paired": paired,
-            "saturated": [
-                name
-                for name, arm in zip(_NAMES[self.indicator], self._named_arms())
-                if arm in saturated
-            ],
-        }
-        if self.indicator == "S":
-            return spi.scalability(
-                p_o, p_new, n=int(before), m=int(after - before), identical=identical, **asked
-            )
-        if self.indicator == "FT":
-            assert self.removed is not None
-            p_s = performance(self.removed)
-            return spi.fault_tolerance(p_o, p_new, p_s, n=swarm, m=int(after), **asked)
-        if self.indicator == "R":
-            return spi.robustness(p_o, p_new, n=swarm, m=int(after), identical=identical, **asked)
-        if self.indicator == "A":
-            return spi.adaptability(
-                p_o, p_new, x_o=before, x_new=after, identical=identical, **asked
-            )
-        return spi.relative_change(p_o, p_new, identical=identical, **asked)
-
-    def _named_arms(self) -> tuple[Arm, ...]:
-        """Return the arms in the order of `_NAMES`."""
-        return (self.original, self.changed, *([self.removed] if self.removed else []))
+        definition = self.definition
+        # In the definition's order of performances, which is not that of `arms`.
+        named = dict(
+            zip(definition.performances, filter(None, (self.original, self.changed, self.removed)))
+        )
+        change = Change(
+            self.original.setting.value,
+            self.changed.setting.value,
+            self.original.condition.size,
+        )
+        return definition.function(
+            **{name: performance(arm) for name, arm in named.items()},
+            **definition.arguments(change),
+            threshold=self.threshold,
+            level=level,
+            paired=paired,
+            saturated=[name for name, arm in named.items() if arm in saturated],
+            # The removed robots make the third condition another one by construction.
+            **({} if self.removed else {"identical": identical}),
+        )
 
 
-# What each indicator calls the P of the original, the changed and the removed arm.
-_NAMES = {
-    "S": ("p_n", "p_nm"),
-    "FT": ("p_o", "p_f", "p_s"),
-    "R": ("p_o", "p_f"),
-    "A": ("p_o", "p_new"),
-    "change": ("p_o", "p_new"),
-}
+@dataclass(frozen=True)
+class Reference:
+    """Performances and yes/no claims that somebody published, without a number of runs.
+
+    Each performance is treated as one run.
+
+    Attributes:
+        source: whose they are, for the report.
+        performance: P at each setting [items].
+        cells: the settings that count as cells of the tables; a baseline repeated under another
+            name is none.
+        claims: whether the text says that the indicator is above the threshold.
+    """
+
+    source: str
+    performance: Mapping[Setting, float]
+    cells: tuple[Setting, ...]
+    claims: Mapping[Question, bool]
+
+    def estimate(self, comparison: Comparison) -> Estimate | None:
+        """Return the published value of an indicator, without interval, where there is one."""
+        if any(arm.setting not in self.performance for arm in comparison.arms):
+            return None
+        return comparison.estimate(lambda arm: np.array([self.performance[arm.setting]]))
 
 
-class _Asked(TypedDict):
-    threshold: float
-    level: float
-    paired: bool
-    saturated: list[str]
+def load_reference(name: str | None) -> Reference | None:
+    """Return the reference of that name; None for none.
+
+    Raises:
+        StudyError: there is none of that name.
+    """
+    if name is None:
+        return None
+    from swarm_logistics_env.studies.paper import PAPER
+
+    known = {"paper": PAPER}
+    if name not in known:
+        raise StudyError(f"no reference {name!r}{suggest(name, known)}")
+    return known[name]

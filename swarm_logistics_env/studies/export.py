@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.reporting.files import export_rows
+from swarm_logistics_env.studies.results import Value
 from swarm_logistics_env.studies.store import Store
 
 
@@ -20,12 +22,19 @@ def export(store: Store, path: Path) -> tuple[int, str]:
         StudyError: another suffix, pyarrow is missing, or the file cannot be written.
     """
     if path.suffix == ".csv":
-        count = export_rows(store, path)
+        count = _csv(store, path)
     elif path.suffix == ".parquet":
         count = _parquet(store, path)
     else:
         raise StudyError(f"cannot export to {path}: should end in .csv or .parquet")
     return count, hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _csv(store: Store, path: Path) -> int:
+    rows = list(store.rows())
+    columns = list(rows[0]) if rows else []
+    write_csv(path, columns, (list(row.values()) for row in rows))
+    return len(rows)
 
 
 def _parquet(store: Store, path: Path) -> int:
@@ -57,3 +66,28 @@ def _parquet(store: Store, path: Path) -> int:
     except OSError as error:
         raise StudyError(f"cannot write {path}: {error}") from error
     return len(rows)
+
+
+def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Value]]) -> None:
+    """Write a CSV file with Unix line ends; floats in shortest exact form.
+
+    Raises:
+        StudyError: the file cannot be written.
+    """
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(_texts(row) for row in rows)
+    except OSError as error:
+        raise StudyError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _texts(row: Sequence[Value]) -> Iterator[str]:
+    for value in row:
+        if isinstance(value, list):
+            yield " ".join(repr(number) for number in value)
+        elif isinstance(value, float):
+            yield repr(value)
+        else:
+            yield "" if value is None else str(value)

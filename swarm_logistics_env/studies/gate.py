@@ -1,11 +1,12 @@
 """Gates: conditions under which a comparison of two studies fails, for continuous integration.
 
     gate     := ["possibly"] subject ("<" | ">") number ["at" text]
-    subject  := "S" | "FT" | "R" | "A" | "change"
+    subject  := symbol of an indicator in `spi.definitions`, "change" among them
 
-S, FT, R and A are those of the newer study; `change` is (P_new - P_old) / P_old of every condition
-under which both studies judge a policy, over the seeds that they share. "R < 0" fails where R lies
-below 0 beyond chance, "possibly R < 0" wherever that is not ruled out, for want of seeds as well.
+Indicators are those of the newer study. Only `change` is about both studies: (P_new - P_old) /
+P_old of every condition under which both judge a policy, over the seeds that they share. "R < 0"
+fails where R lies below 0 beyond chance, "possibly R < 0" wherever that is not ruled out, for want
+of seeds as well.
 `at` keeps the comparisons and conditions whose name holds the text, e.g. "R < 0 at FM4, m = 1".
 Verdicts are Holm-adjusted over what is kept. What cannot be judged fails: a policy without a match
 in the other study, failed runs, studies that share no seed. Where the runs of both studies are the
@@ -15,16 +16,24 @@ same the change is exactly 0, and the gate fails where "0 < number" (or ">") is 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import Literal, Self, cast
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
 
+import numpy as np
+
+from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.estimate import Verdict
+from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.studies.matching import Match, match, outcomes
+from swarm_logistics_env.studies.results import StudyResults, estimate_of, same_runs
+from swarm_logistics_env.studies.runs import seeds_in_words
 
-Subject = Literal["S", "FT", "R", "A", "change"]
-
+SUBJECTS = "|".join(DEFINITIONS)
 _GATE = re.compile(
-    r"(?P<possibly>possibly\s+)?(?P<subject>S|FT|R|A|change)\s*(?P<sign>[<>])\s*(?P<number>\S+)"
+    rf"(?P<possibly>possibly\s+)?(?P<subject>{SUBJECTS})\s*(?P<sign>[<>])\s*(?P<number>\S+)"
     r"(\s+at\s+(?P<at>.+))?"
 )
 
@@ -43,7 +52,7 @@ class Gate:
 
     text: str
     possibly: bool
-    subject: Subject
+    subject: str
     below: bool
     number: float
     at: str
@@ -58,7 +67,7 @@ class Gate:
         match = _GATE.fullmatch(text.strip())
         if match is None:
             raise StudyError(
-                f"gate {text!r}: should be [possibly] S|FT|R|A|change <|> NUMBER [at TEXT], "
+                f"gate {text!r}: should be [possibly] {SUBJECTS} <|> NUMBER [at TEXT], "
                 'e.g. "R < 0" or "possibly change < -0.1 at N = 25"'
             )
         try:
@@ -70,7 +79,7 @@ class Gate:
         return cls(
             text.strip(),
             match["possibly"] is not None,
-            cast("Subject", match["subject"]),
+            match["subject"],
             match["sign"] == "<",
             number,
             (match["at"] or "").strip(),
@@ -84,3 +93,117 @@ class Gate:
         """Return whether a verdict on "above the number" makes the gate fail."""
         holds, opposite = ("refuted", "supported") if self.below else ("supported", "refuted")
         return verdict != opposite if self.possibly else verdict == holds
+
+
+# An estimate; a number that is exact, as the runs are the same runs; or why it cannot be judged.
+_Found = Estimate | float | str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer of one comparison or condition to a gate.
+
+    Attributes:
+        name: policy, subject and comparison.
+        fails: whether it makes the gate fail; what cannot be judged does.
+        estimate: against the gate's number; None: it is exact, or cannot be judged.
+        verdict: on "above the number", Holm-adjusted over the gate's estimates.
+        exact: the value where the runs compared are the same runs, so that nothing is estimated.
+        problem: why it cannot be judged.
+    """
+
+    name: str
+    fails: bool
+    estimate: Estimate | None = None
+    verdict: Verdict | None = None
+    exact: float | None = None
+    problem: str | None = None
+
+
+def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[Answer, ...]:
+    """Return what everything that a gate is about says to it.
+
+    A change is asked of every judged policy: one that the other study gives nothing to compare
+    with answers that it cannot be judged.
+
+    Raises:
+        StudyError: the gate is about nothing that the studies hold.
+    """
+    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
+    asked = list(found)
+    if not asked:
+        where = f" at {gate.at!r}" if gate.at else ""
+        raise StudyError(
+            f"gate {gate.text!r}: the studies hold no {gate.subject}{where}, so it tests nothing"
+        )
+    verdicts = iter(spi.adjust([value for _, value in asked if isinstance(value, Estimate)]))
+    return tuple(_answer(gate, name, value, verdicts) for name, value in asked)
+
+
+def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -> Answer:
+    if isinstance(value, str):
+        return Answer(name, fails=True, problem=value)
+    if isinstance(value, float):
+        return Answer(name, gate.holds_for(value), exact=value)
+    verdict = next(verdicts)
+    return Answer(name, gate.fails_on(verdict), estimate=value, verdict=verdict)
+
+
+def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
+    # A comparison tested against several thresholds answers once.
+    comparisons = dict.fromkeys(
+        replace(test.comparison, threshold=gate.number)
+        for test in new.tests
+        if test.indicator == gate.subject
+    )
+    labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
+    for comparison in comparisons:
+        name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
+        if labels[comparison.policy, comparison.label] > 1:
+            name += f" ({comparison.table})"
+        if gate.at not in name:
+            continue
+        found = estimate_of(comparison, new.by_arm, paired=new.plan.paired)
+        yield name, found.value if isinstance(found, Estimate) and found.identical else found
+
+
+def _changes(gate: Gate, old: StudyResults, new: StudyResults) -> Iterator[tuple[str, _Found]]:
+    matching = match(old, new)
+    for unmatched in matching.unmatched:
+        if any(gate.at in name for name in unmatched.names):
+            yield f"{unmatched.policy}: change", unmatched.problem
+    for matched in matching.matches:
+        if gate.at in matched.name:
+            yield matched.name, _change(gate, old, new, matched, matching.seeds)
+
+
+def _change(
+    gate: Gate, old: StudyResults, new: StudyResults, matched: Match, seeds: Sequence[int] | None
+) -> _Found:
+    before, after = matched.before, matched.after
+    if problem := before.problem or after.problem:
+        return problem
+    p_o, p_new = before.performance, after.performance
+    if seeds is not None:
+        if not seeds:
+            return (
+                f"the studies share no seed: the old one has {seeds_in_words(old.plan.seeds)}, "
+                f"the new one {seeds_in_words(new.plan.seeds)}; play one of them on the other's "
+                "seeds"
+            )
+        pair = outcomes(old, before, seeds), outcomes(new, after, seeds)
+        if same_runs(*([outcome.digest for outcome in side] for side in pair)):
+            return 0.0
+        p_o, p_new = (np.array([o.delivered for o in side], dtype=np.float64) for side in pair)
+    try:
+        return spi.relative_change(
+            p_o,
+            p_new,
+            threshold=gate.number,
+            paired=seeds is not None,
+            saturated=[
+                name for name, cell in (("p_o", before), ("p_new", after)) if cell.saturated
+            ],
+        )
+    except spi.IndicatorError as error:
+        return str(error)

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies import notes
-from swarm_logistics_env.studies.comparisons import NO_FAULT, Comparison, Level
-from swarm_logistics_env.studies.conditions import StudiedPolicy
-from swarm_logistics_env.studies.execution import Outcome
-from swarm_logistics_env.studies.new_store import new_store, refuse_study_in
+from swarm_logistics_env.studies import metadata
+from swarm_logistics_env.studies.comparisons import NO_FAULT, Comparison, Setting
 from swarm_logistics_env.studies.plan import Plan, adaptability, robustness, scalability
+from swarm_logistics_env.studies.runs import StudiedPolicy
 from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.store import new_store, refuse_study_in
+from swarm_logistics_env.tasks.task import Outcome
 
 CODE = "imported"
 _NEEDED = ("kind", "name", "value", "delivered")
@@ -45,7 +45,7 @@ class Origin:
 class _Row:
     line: int
     policy: str
-    level: Level
+    setting: Setting
     n_robots: int | None
     seed: int | None
     delivered: int
@@ -53,7 +53,7 @@ class _Row:
     @property
     def title(self) -> str:
         """Heading of the table it belongs to."""
-        return _TITLES.get(self.level.kind, f"Adaptability to {self.level.name}")
+        return _TITLES.get(self.setting.kind, f"Adaptability to {self.setting.name}")
 
 
 def import_results(file: Path, out: Path) -> int:
@@ -92,15 +92,15 @@ def import_results(file: Path, out: Path) -> int:
     plan = imported_plan(specification, origin)
     with new_store(out) as store:
         for policy, title, arm in plan.cells:
-            found = cells.get((policy, title, arm.level), [])
+            found = cells.get((policy, title, arm.setting), [])
             for number, row in enumerate(found):
                 run = arm.condition.run(CODE, number if row.seed is None else row.seed)
                 store.add(run, Outcome(run.key, untimed=row.delivered))
-        store.set_note(notes.SPECIFICATION, specification.to_json())
-        store.set_note(notes.CODE, CODE)
-        store.set_note(notes.IDENTITIES, "{}")
-        store.set_note(notes.DECLARED_SEEDS, str(specification.seeds))
-        store.set_note(notes.IMPORTED, json.dumps(asdict(origin)))
+        store.set_note(metadata.SPECIFICATION, specification.to_json())
+        store.set_note(metadata.CODE, CODE)
+        store.set_note(metadata.IDENTITIES, "{}")
+        store.set_note(metadata.DECLARED_SEEDS, str(specification.seeds))
+        store.set_note(metadata.IMPORTED, json.dumps(asdict(origin)))
     return len(rows)
 
 
@@ -147,32 +147,32 @@ def _rows(file: Path, text: str) -> Iterator[_Row]:
         place = f"{file}, line {reader.line_num}"
         if "" in values:
             raise StudyError(f"{place}: has more values than the file has columns")
-        level = _level(place, values)
-        if level.kind == "fault" and not values.get("n_robots"):
+        setting = _level(place, values)
+        if setting.kind == "fault" and not values.get("n_robots"):
             raise StudyError(f"{place}: n_robots is missing, without which R is undefined")
         yield _Row(
             reader.line_num,
             values.get("policy") or "imported",
-            level,
+            setting,
             _whole(place, "n_robots", values.get("n_robots"), 1),
             _whole(place, "seed", values.get("seed"), 0),
             _whole(place, "delivered", values["delivered"] or "nothing", 0) or 0,
         )
 
 
-def _level(place: str, values: dict[str, str]) -> Level:
+def _level(place: str, values: dict[str, str]) -> Setting:
     kind, name = values["kind"], values["name"]
     try:
         value = float(values["value"])
     except ValueError:
         raise StudyError(f"{place}: value = {values['value']!r}: should be a number") from None
     if kind == "size":
-        return Level("size", "n_robots", _whole(place, "value", values["value"], 1) or 0)
+        return Setting("size", "n_robots", _whole(place, "value", values["value"], 1) or 0)
     if kind == "fault":
         m = _whole(place, "value", values["value"], 0) or 0
-        return NO_FAULT if name == "none" else Level("fault", name, m)
+        return NO_FAULT if name == "none" else Setting("fault", name, m)
     if kind == "parameter":
-        return Level("parameter", name, value)
+        return Setting("parameter", name, value)
     known = ("size", "fault", "parameter")
     raise StudyError(f"{place}: kind = {kind!r}{suggest(kind, known)}")
 
@@ -189,24 +189,24 @@ def _whole(place: str, name: str, text: str | None, least: int) -> int | None:
     return int(value)
 
 
-def _cells(file: Path, rows: list[_Row]) -> dict[tuple[str, str, Level], list[_Row]]:
-    cells: dict[tuple[str, str, Level], list[_Row]] = {}
+def _cells(file: Path, rows: list[_Row]) -> dict[tuple[str, str, Setting], list[_Row]]:
+    cells: dict[tuple[str, str, Setting], list[_Row]] = {}
     for row in rows:
-        cells.setdefault((row.policy, row.title, row.level), []).append(row)
+        cells.setdefault((row.policy, row.title, row.setting), []).append(row)
     with_seed = [row for row in rows if row.seed is not None]
     if with_seed and len(with_seed) < len(rows):
         bare = next(row for row in rows if row.seed is None)
         raise StudyError(f"{file}, line {bare.line}: has no seed, as other rows have")
     seeds = sorted({row.seed for row in with_seed if row.seed is not None})
-    for (policy, _, level), found in cells.items():
+    for (policy, _, setting), found in cells.items():
         if not seeds:
             continue
         theirs = sorted(row.seed for row in found if row.seed is not None)
         if len(set(theirs)) < len(theirs):
-            raise StudyError(f"{file}: {policy}, {level} has two rows of one seed")
+            raise StudyError(f"{file}: {policy}, {setting} has two rows of one seed")
         if theirs != seeds:
             raise StudyError(
-                f"{file}: {policy}, {level} has {len(theirs)} of the file's {len(seeds)} seeds: "
+                f"{file}: {policy}, {setting} has {len(theirs)} of the file's {len(seeds)} seeds: "
                 "give every condition the same seeds, or leave the column out"
             )
     return cells
@@ -221,18 +221,22 @@ def _specification(file: Path, rows: list[_Row], seeds: int) -> Specification:
         "faults": [],
         "parameters": [],
     }
-    # In order of appearance: a parameter's first value is x_o.
+    # Tables keep the order of the file, because a parameter's first value is x_o.
     for title in dict.fromkeys(row.title for row in rows):
         table = [row for row in rows if row.title == title]
-        levels = list(dict.fromkeys(row.level for row in table))
-        values = [level.value for level in levels]
-        kind = levels[0].kind
-        if kind != "fault" and len(levels) < 2:
-            raise StudyError(f"{file}: {title}: {levels[0]} stands alone, nothing to compare with")
+        settings = list(dict.fromkeys(row.setting for row in table))
+        values = [setting.value for setting in settings]
+        kind = settings[0].kind
+        if kind != "fault" and len(settings) < 2:
+            raise StudyError(
+                f"{file}: {title}: {settings[0]} stands alone, nothing to compare with"
+            )
         if kind == "size":
             fields["sizes"].append({"title": title, "values": sorted(int(v) for v in values)})
         elif kind == "parameter":
-            fields["parameters"].append({"title": title, "name": levels[0].name, "values": values})
+            fields["parameters"].append(
+                {"title": title, "name": settings[0].name, "values": values}
+            )
         else:
             fields["faults"].append(_faults(file, title, table))
     try:
@@ -243,15 +247,15 @@ def _specification(file: Path, rows: list[_Row], seeds: int) -> Specification:
 
 def _faults(file: Path, title: str, table: list[_Row]) -> dict[str, Any]:
     for policy in dict.fromkeys(row.policy for row in table):
-        if not any(row.level == NO_FAULT for row in table if row.policy == policy):
+        if not any(row.setting == NO_FAULT for row in table if row.policy == policy):
             raise StudyError(f"{file}: {policy} has faults, but no row without one (name none)")
     swarms = {row.n_robots for row in table}
     if len(swarms) > 1:
         raise StudyError(f"{file}: faults in swarms of several sizes {sorted(map(str, swarms))}")
-    failing = [row.level for row in table if row.level != NO_FAULT]
+    failing = [row.setting for row in table if row.setting != NO_FAULT]
     return {
         "title": title,
         "modes": list(dict.fromkeys(lv.name for lv in failing if lv.name != "removed")),
-        "robots": sorted({int(level.value) for level in failing}),
+        "robots": sorted({int(setting.value) for setting in failing}),
         "scenario": {"n_robots": swarms.pop()},
     }

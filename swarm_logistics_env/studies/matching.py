@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from swarm_logistics_env.studies.execution import Outcome
-from swarm_logistics_env.studies.judgement import Cell, Findings
-from swarm_logistics_env.studies.seeds import seeds_in_words
+from swarm_logistics_env.studies.results import Cell, StudyResults
+from swarm_logistics_env.studies.runs import seeds_in_words
+from swarm_logistics_env.tasks.task import Outcome
 
-_Content = tuple[object, ...]  # of a condition: all but its policy
-_Judged = dict[str, dict[_Content, Cell]]  # by the policy's label
+_Content = tuple[object, ...]  # everything about a condition but its policy
+_Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Unmatched:
 
 @dataclass(frozen=True)
 class Matching:
-    """What two studies have in common, and what only one of them has.
+    """The conditions that two studies share, and those that only one of them has.
 
     Attributes:
         seeds: the shared ones; None: one of the studies has no seeds to share.
@@ -60,7 +60,7 @@ class Matching:
     notes: tuple[str, ...]
 
 
-def match(old: Findings, new: Findings) -> Matching:
+def match(old: StudyResults, new: StudyResults) -> Matching:
     """Match the conditions of two studies' judged policies, by what is varied.
 
     A policy matches the one of its label; where each study judges a single policy these two match,
@@ -96,27 +96,27 @@ def match(old: Findings, new: Findings) -> Matching:
     return Matching(tuple(matches), tuple(unmatched), seeds, tuple(notes))
 
 
-def outcomes(findings: Findings, cell: Cell, seeds: Sequence[int]) -> list[Outcome]:
+def outcomes(results: StudyResults, cell: Cell, seeds: Sequence[int]) -> list[Outcome]:
     """Return the outcomes of a cell at the given seeds, in their order.
 
     Raises:
         KeyError: a run of them is missing; the cell then has a `problem`.
     """
-    condition, code = cell.arm.condition, findings.plan.code
-    return [findings.outcomes[condition.run(code, seed).key] for seed in seeds]
+    condition, code = cell.arm.condition, results.plan.code
+    return [results.outcomes[condition.run(code, seed).key] for seed in seeds]
 
 
-def _judged(findings: Findings) -> _Judged:
+def _judged(results: StudyResults) -> _Judged:
     """Return each condition of a judged policy once, by the policy's label and by all but it."""
-    plan = findings.plan
+    plan = results.plan
     # An ablation's second policy may bear the label of a judged one: its place tells them apart.
     second = {
         (comparison.policy, comparison.table, comparison.changed)
         for comparison in plan.comparisons
-        if comparison.indicator == "change"
+        if comparison.definition.compares == "policy"
     }
     found: _Judged = {}
-    for cell in findings.cells:
+    for cell in results.cells:
         if (cell.policy, cell.table, cell.arm) in second:
             continue
         condition = cell.arm.condition
@@ -128,7 +128,7 @@ def _judged(findings: Findings) -> _Judged:
 
 
 def _name(policy: str, cell: Cell) -> str:
-    return f"{policy}: change, {cell.arm.level} ({cell.table})"
+    return f"{policy}: change, {cell.arm.setting} ({cell.table})"
 
 
 def _without_partner(
@@ -149,14 +149,14 @@ def _only_in(
 ) -> Iterator[str]:
     lacking = [cell for content, cell in own.items() if content not in others]
     if lacking:
-        levels = "; ".join(f"{cell.arm.level} ({cell.table})" for cell in lacking)
-        yield f"Only in the {study} study, and not compared: {policy}, {levels}."
+        settings = "; ".join(f"{cell.arm.setting} ({cell.table})" for cell in lacking)
+        yield f"Only in the {study} study, and not compared: {policy}, {settings}."
 
 
-def _seed_notes(seeds: Sequence[int], old: Findings, new: Findings) -> Iterator[str]:
+def _seed_notes(seeds: Sequence[int], old: StudyResults, new: StudyResults) -> Iterator[str]:
     shared = set(seeds)
-    for study, findings in (("old", old), ("new", new)):
-        extra = [seed for seed in findings.plan.seeds if seed not in shared]
+    for study, results in (("old", old), ("new", new)):
+        extra = [seed for seed in results.plan.seeds if seed not in shared]
         if extra:
             yield (
                 f"Only in the {study} study, and left out: seeds {seeds_in_words(extra)}. "

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import itertools
 
-from swarm_logistics_env.studies.comparisons import NO_FAULT, Level, Question
-from swarm_logistics_env.studies.reference import Reference
+from swarm_logistics_env.studies.comparisons import NO_FAULT, Question, Reference, Setting
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Faults,
@@ -19,19 +18,19 @@ from swarm_logistics_env.studies.specification import (
 )
 
 
-def size(n: int) -> Level:
-    """Return the level of a swarm size."""
-    return Level("size", "n_robots", n)
+def size(n: int) -> Setting:
+    """Return the setting of a swarm size."""
+    return Setting("size", "n_robots", n)
 
 
-def fault(mode: str, m: int) -> Level:
-    """Return the level of m robots that fail from the start."""
-    return Level("fault", mode, m)
+def fault(mode: str, m: int) -> Setting:
+    """Return the setting of m robots that fail from the start."""
+    return Setting("fault", mode, m)
 
 
-def parameter(name: str, value: float) -> Level:
-    """Return the level of a scenario field."""
-    return Level("parameter", name, value)
+def parameter(name: str, value: float) -> Setting:
+    """Return the setting of a scenario field."""
+    return Setting("parameter", name, value)
 
 
 # Table I: swarm size N -> P, items delivered in 500 s.
@@ -58,7 +57,7 @@ PARAMETERS = {
 # x_o of these two is the base scenario once more, with another published P: no cells of their own.
 REPEATED = (parameter("delivery_width", 2.0), parameter("n_items", 60.0))
 
-PERFORMANCE: dict[Level, float] = {
+PERFORMANCE: dict[Setting, float] = {
     **{size(n): p for n, p in SIZES.items()},
     NO_FAULT: NO_FAULT_PERFORMANCE,
     **{fault(mode, m): p for mode, row in FAULTS.items() for m, p in enumerate(row, start=1)},
@@ -98,7 +97,7 @@ def _claims() -> dict[Question, bool]:
 PAPER = Reference(
     source="Milner, Sooriyabandara and Hauert, Swarm Performance Indicators, Tables I to III",
     performance=PERFORMANCE,
-    cells=tuple(level for level in PERFORMANCE if level not in REPEATED),
+    cells=tuple(setting for setting in PERFORMANCE if setting not in REPEATED),
     claims=_claims(),
 )
 

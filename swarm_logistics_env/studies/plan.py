@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.studies.code_version import code_version
+from swarm_logistics_env.spi.definitions import DEFINITIONS, comparing
 from swarm_logistics_env.studies.comparisons import (
     NO_FAULT,
     OTHER_BEHAVIOUR,
     Arm,
     Comparison,
-    Level,
-    Twins,
+    NullPair,
+    Setting,
 )
-from swarm_logistics_env.studies.conditions import Condition, Run, StudiedPolicy
-from swarm_logistics_env.studies.policy_choice import policy_identity, policy_label
+from swarm_logistics_env.studies.runs import Condition, Run, StudiedPolicy
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Factor,
@@ -26,21 +24,24 @@ from swarm_logistics_env.studies.specification import (
     Parameter,
     Sizes,
     Specification,
-    vary,
 )
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Scenario
+
+SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study will run and what it will ask of the results.
+    """The runs and the comparisons of a study.
 
     Attributes:
         specification: what it was made from.
         comparisons: in the order of the report.
         code: version of the code that decides what a run gives.
         identities: of the policies, by the part that each plays in the specification.
-        twins: pairs without fault, one for the faults of each policy that begin during the run.
+        null_pairs: pairs without fault, one for each policy whose faults begin during the run.
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.
         imported_seeds: those that the file names; empty: it names none, or results are run here.
@@ -50,7 +51,7 @@ class Plan:
     comparisons: tuple[Comparison, ...]
     code: str
     identities: Mapping[str, str]
-    twins: tuple[Twins, ...] = ()
+    null_pairs: tuple[NullPair, ...] = ()
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
@@ -68,7 +69,9 @@ class Plan:
             for comparison in self.comparisons
             for arm in comparison.arms
         ]
-        cells += [(twins.policy, twins.table, twins.other) for twins in self.twins]
+        cells += [
+            (null_pair.policy, null_pair.table, null_pair.other) for null_pair in self.null_pairs
+        ]
         return tuple(dict.fromkeys(cells))
 
     @cached_property
@@ -99,12 +102,14 @@ def make_plan(
     *,
     code: str | None = None,
     identities: Mapping[str, str] | None = None,
+    task: Task = WAREHOUSE,
 ) -> Plan:
     """Return the plan of a study.
 
     Args:
         code: version of the code that played it; None: that of this process.
         identities: of its policies when it was played; None: they are loaded and asked.
+        task: what is played.
 
     Raises:
         StudyError: the specification varies nothing, or a step of it cannot be.
@@ -122,7 +127,7 @@ def make_plan(
         known[part] = policy.identity
         return policy
 
-    found = list(_asked(specification, policy_of))
+    found = list(_asked(specification, policy_of, task))
     comparisons = tuple(
         item
         for item in found
@@ -133,16 +138,18 @@ def make_plan(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
-    # Self-repair is told of FT's comparisons alone: without them nobody looks at the twins.
-    twins = [item for item in found if isinstance(item, Twins)]
-    if "FT" not in specification.indicators:
-        twins = []
-    return Plan(specification, comparisons, code or code_version(), known, tuple(twins))
+    # Only comparisons with the robots removed have a self-repair time, which needs the null pair.
+    null_pairs = [item for item in found if isinstance(item, NullPair)]
+    if not any(DEFINITIONS[symbol].needs_removed for symbol in specification.indicators):
+        null_pairs = []
+    return Plan(specification, comparisons, code or task.code(), known, tuple(null_pairs))
 
 
 def _asked(
-    specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
-) -> Iterator[Comparison | Twins]:
+    specification: Specification,
+    policy_of: Callable[[str, object], StudiedPolicy],
+    task: Task,
+) -> Iterator[Comparison | NullPair]:
     base = specification.scenario
     lesser = [
         (ablation, policy_of(f"ablation {number}", ablation.policy))
@@ -151,14 +158,14 @@ def _asked(
     for source in specification.policies:
         policy = policy_of(f"policy {policy_label(source)}", source)
         for sizes in specification.sizes:
-            yield from scalability(base, sizes, policy)
+            yield from scalability(base, sizes, policy, task)
         for faults in specification.faults:
-            yield from robustness(base, faults, policy)
+            yield from robustness(base, faults, policy, task)
         for parameter in specification.parameters:
-            yield from adaptability(base, parameter, policy)
+            yield from adaptability(base, parameter, policy, task)
         for ablation, part in lesser:
             if part.identity != policy.identity:
-                yield _ablation(base, ablation, policy, part)
+                yield from _ablation(base, ablation, policy, part, task)
 
 
 def studied(source: object) -> StudiedPolicy:
@@ -175,97 +182,111 @@ def _title(factor: Factor, general: str) -> str:
     return factor.title or (f"{general} ({changes})" if changes else general)
 
 
-def scalability(base: Scenario, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
+def scalability(
+    base: Scenario, sizes: Sizes, policy: StudiedPolicy, task: Task = WAREHOUSE
+) -> Iterator[Comparison]:
     """Yield the comparisons between neighbouring swarm sizes."""
-    scenario = vary(base, sizes.scenario)
+    scenario = task.vary(base, sizes.scenario)
     table = _title(sizes, "Scalability")
     arms = {
-        size: Arm(Level("size", "n_robots", size), _condition(policy, scenario, n_robots=size))
+        size: Arm(
+            Setting("size", "n_robots", size), _condition(task, policy, scenario, n_robots=size)
+        )
         for size in sizes.values
     }
     steps = list(zip(sizes.values, sizes.values[1:]))
-    for small, large in steps:
-        yield Comparison(table, "S", arms[small], arms[large])
+    for definition in comparing("size"):
+        for small, large in steps:
+            yield Comparison(table, definition.symbol, arms[small], arms[large])
     for small, large in sizes.superlinear:
         if (small, large) not in steps:
             raise StudyError(
                 f"superlinear = ({small}, {large}): should be a step between neighbouring "
                 f"sizes of {sizes.values}"
             )
-        yield Comparison(table, "S", arms[small], arms[large], threshold=1.0)
+        for definition in comparing("size"):
+            if SUPERLINEAR in definition.adjectives:
+                yield Comparison(
+                    table, definition.symbol, arms[small], arms[large], threshold=SUPERLINEAR
+                )
 
 
 def robustness(
-    base: Scenario, faults: Faults, policy: StudiedPolicy
-) -> Iterator[Comparison | Twins]:
-    """Yield FT and R of every mode, m and onset, and the twins where an onset is in mid-run."""
-    scenario = vary(base, faults.scenario)
+    base: Scenario, faults: Faults, policy: StudiedPolicy, task: Task = WAREHOUSE
+) -> Iterator[Comparison | NullPair]:
+    """Yield the indicators of every mode, m and onset; the null pair where faults start late."""
+    scenario = task.vary(base, faults.scenario)
     table = _title(faults, "Fault tolerance and robustness")
     for m in faults.robots:
-        if m >= scenario.n_robots:
+        if m >= task.size(scenario):
             raise StudyError(
-                f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, "
+                f"faults.robots = {m}: should be less than n_robots = {task.size(scenario)}, "
                 "or no working robot is left"
             )
     for onset in faults.onsets:
-        if onset >= scenario.duration:
+        if onset >= task.duration(scenario):
             raise StudyError(
                 f"faults.onsets = {onset:g} s: should be less than duration = "
-                f"{scenario.duration:g} s, or nothing fails"
+                f"{task.duration(scenario):g} s, or nothing fails"
             )
-    original = Arm(NO_FAULT, _condition(policy, scenario))
+    original = Arm(NO_FAULT, _condition(task, policy, scenario))
     if any(faults.onsets):
-        other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1))
-        yield Twins(table, original, other)
+        other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1, task=task))
+        yield NullPair(table, original, other)
 
     def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
-        fault = Fault(mode, m, onset=onset, duration=duration)
-        return Arm(Level("fault", mode, m, onset), Condition(policy, scenario, (fault,)))
+        fault = task.fault(mode, m, onset, duration)
+        condition = Condition(policy, scenario, (fault,), task=task)
+        return Arm(Setting("fault", mode, m, onset), condition)
 
     for onset in faults.onsets:
         for mode in faults.modes:
             for m in faults.robots:
                 failed = arm(mode, m, onset, faults.duration)
-                removed = arm("removed", m, onset, None)
-                yield Comparison(table, "FT", original, failed, removed)
-                yield Comparison(table, "R", original, failed)
+                removed = arm(task.removed, m, onset, None)
+                for definition in comparing("fault"):
+                    third = removed if definition.needs_removed else None
+                    yield Comparison(table, definition.symbol, original, failed, third)
 
 
 def adaptability(
-    base: Scenario, parameter: Parameter, policy: StudiedPolicy
+    base: Scenario, parameter: Parameter, policy: StudiedPolicy, task: Task = WAREHOUSE
 ) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
-    scenario = vary(base, parameter.scenario)
+    scenario = task.vary(base, parameter.scenario)
     table = _title(parameter, f"Adaptability to {parameter.name}")
     original, *changed = (
         Arm(
-            Level("parameter", parameter.name, value),
-            _condition(policy, scenario, **{parameter.name: value}),
+            Setting("parameter", parameter.name, value),
+            _condition(task, policy, scenario, **{parameter.name: value}),
         )
         for value in parameter.values
     )
-    for arm in changed:
-        yield Comparison(table, "A", original, arm)
+    for definition in comparing("parameter"):
+        for arm in changed:
+            yield Comparison(table, definition.symbol, original, arm)
 
 
 def _ablation(
-    base: Scenario, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy
-) -> Comparison:
-    scenario = vary(base, ablation.scenario)
+    base: Scenario, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy, task: Task
+) -> Iterator[Comparison]:
+    scenario = task.vary(base, ablation.scenario)
     whole, part = (
-        Arm(Level("policy", label.label, scenario.n_robots), _condition(label, scenario))
+        Arm(Setting("policy", label.label, task.size(scenario)), _condition(task, label, scenario))
         for label in (policy, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".
-    return Comparison(
-        _title(ablation, "Ablation"),
-        "change",
-        whole,
-        part,
-        threshold=-ablation.fall if ablation.fall else 0.0,
-        claim=False,
-    )
+    threshold = -ablation.fall if ablation.fall else 0.0
+    for definition in comparing("policy"):
+        yield Comparison(
+            _title(ablation, "Ablation"),
+            definition.symbol,
+            whole,
+            part,
+            threshold=threshold,
+            claim=False,
+        )
 
 
-def _condition(policy: StudiedPolicy, scenario: Scenario, **fields: float) -> Condition:
-    return Condition(policy, scenario.replace(**fields))
+def _condition(task: Task, policy: StudiedPolicy, scenario: Scenario, **fields: float) -> Condition:
+    return Condition(policy, task.vary(scenario, fields), task=task)

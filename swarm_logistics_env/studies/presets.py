@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import paper
 from swarm_logistics_env.studies.specification import (
     Ablation,
@@ -12,6 +11,7 @@ from swarm_logistics_env.studies.specification import (
     Sizes,
     Specification,
 )
+from swarm_logistics_env.tasks.warehouse import Scenario
 
 # Every indicator once, in under a minute on two cores at 4 seeds.
 QUICK = Specification(

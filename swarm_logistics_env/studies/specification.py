@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, Self
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     BeforeValidator,
@@ -18,28 +20,19 @@ from pydantic import (
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.studies.policy_choice import PolicySource, policy_label
-from swarm_logistics_env.warehouse.faults import FAILURE_MODES
+from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label, policy_name
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Scenario
 
 ScenarioFields = dict[str, Any]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
-Judged = Literal["S", "FT", "R", "A", "change"]
-
-
-def vary(base: Scenario, fields: ScenarioFields) -> Scenario:
-    """Return `base` with `fields` changed; the field "preset" starts from that preset instead."""
-    changes = dict(fields)
-    if "preset" in changes:
-        base = Scenario.preset(str(changes.pop("preset")))
-    return base.replace(**changes)
 
 
 def _scenario(value: object) -> object:
-    return vary(Scenario(), value) if isinstance(value, dict) else value
+    return WAREHOUSE.vary(Scenario(), value) if isinstance(value, dict) else value
 
 
 def _each(record: type[Record]) -> Callable[[object], object]:
@@ -63,7 +56,7 @@ def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 class Factor(_Part):
-    """What is varied, from which scenario.
+    """One thing that a study varies, and the scenario in which it does.
 
     Args:
         title: heading in the report; empty: made from the factor.
@@ -111,7 +104,7 @@ class Faults(Factor):
     @field_validator("modes")
     @classmethod
     def _known(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
-        known = set(FAILURE_MODES) - {"removed"}
+        known = set(WAREHOUSE.failure_modes) - {WAREHOUSE.removed}
         for mode in modes:
             if mode not in known:
                 raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
@@ -137,15 +130,10 @@ class Parameter(Factor):
     @field_validator("name")
     @classmethod
     def _numeric(cls, name: str) -> str:
-        known = {
-            field
-            for field, value in Scenario().model_dump().items()
-            if isinstance(value, int | float) and not isinstance(value, bool)
-        } - {"n_robots"}
         if name == "n_robots":
             raise ValueError("swarm sizes belong in `sizes`, where S judges them")
-        if name not in known:
-            raise ValueError(f"no numeric scenario field {name!r}{suggest(name, known)}")
+        if name not in WAREHOUSE.fields:
+            raise ValueError(f"no numeric scenario field {name!r}{suggest(name, WAREHOUSE.fields)}")
         return name
 
     @field_validator("values")
@@ -197,7 +185,7 @@ class Specification(_Part):
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
-    indicators: Annotated[tuple[Judged, ...], Field(min_length=1)] = ("S", "FT", "R", "A", "change")
+    indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     looks: tuple[PositiveInt, ...] = ()
     reference: str | None = None
 
@@ -208,8 +196,11 @@ class Specification(_Part):
 
     @field_validator("indicators")
     @classmethod
-    def _distinct(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _each_once(values)
+    def _defined(cls, symbols: tuple[str, ...]) -> tuple[str, ...]:
+        for symbol in symbols:
+            if symbol not in DEFINITIONS:
+                raise ValueError(f"no indicator {symbol!r}{suggest(symbol, DEFINITIONS)}")
+        return _each_once(symbols)
 
     @field_validator("looks")
     @classmethod
@@ -232,3 +223,50 @@ class Specification(_Part):
             if labels.count(label) > 1:
                 raise ValueError(f"policy {label!r} is given twice")
         return policies
+
+
+def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
+    """Return the specification in a TOML file, named after the file where it has no name.
+
+    Example of a file:
+        policies = ["swarm-dt", { name = "swarm-dt", parameters = { taxis_gain = 0.5 } }]
+        seeds = 20
+        scenario = { preset = "paper", duration = 300 }
+
+        [[faults]]
+        modes = ["FM1", "FM4"]
+        robots = [1, 2]
+
+        [[parameters]]
+        name = "delivery_width"
+        values = [2.0, 1.0]
+
+    Args:
+        trust_code: whether its policies may be classes ("package.module:Class"), whose modules run
+            when they are loaded.
+
+    Raises:
+        StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
+            it is unknown or cannot be.
+    """
+    try:
+        fields = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise StudyError(f"cannot read the study file {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = str(error).splitlines()[0]
+        raise StudyError(f"the study file {path} is not TOML: {reason}") from error
+    except RecursionError:
+        raise StudyError(f"the study file {path} is nested too deep") from None
+    try:
+        specification = Specification(**{"name": path.stem, **fields})
+    except SwarmLogisticsError as error:  # whichever record of it refuses
+        raise StudyError(f"{path}: {error}") from error
+    named = [*specification.policies, *(ablation.policy for ablation in specification.ablations)]
+    for policy in map(policy_name, named):
+        if ":" in policy and not trust_code:
+            raise StudyError(
+                f"{path}: policy {policy!r} is a class, and to load it runs code: should be a "
+                "policy's name, or be allowed by --trust-code (trust_code=True)"
+            )
+    return specification

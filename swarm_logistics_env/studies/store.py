@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import notes
-from swarm_logistics_env.studies.conditions import Run
-from swarm_logistics_env.studies.execution import Outcome
+from swarm_logistics_env.studies import metadata
+from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.tasks.task import Outcome
 
 FILE_NAME = "study.sqlite"
 SCHEMA_VERSION = 3
@@ -93,7 +93,7 @@ class Store:
         place = str(path or ":memory:")
         if path is not None and read_only:
             _refuse_unmerged(path)
-            # Without it SQLite makes two files beside one that is in WAL mode, even to read it.
+            # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
             place = f"{path.absolute().as_uri()}?immutable=1"
         with self._explained():
             # Autocommit: transactions are opened by hand, one per run.
@@ -182,6 +182,14 @@ class Store:
             (count,) = self._database.execute("SELECT count(*) FROM runs").fetchone()
             return int(count)
 
+    @property
+    def size(self) -> int:
+        """Size of the database [bytes]."""
+        with self._explained():
+            (pages,) = self._database.execute("PRAGMA page_count").fetchone()
+            (page,) = self._database.execute("PRAGMA page_size").fetchone()
+            return int(pages) * int(page)
+
     def absorb(self, path: Path) -> None:
         """Add the runs of another store, to which `add`'s rule applies.
 
@@ -260,7 +268,7 @@ class Store:
             ).fetchone()
         if row is None:
             return None
-        if not notes.reads(name, row[0]):
+        if not metadata.reads(name, row[0]):
             raise StudyError(f"the store {self.path} is damaged: its note {name!r} does not read")
         return str(row[0])
 
@@ -313,7 +321,7 @@ class Store:
             try:
                 self._database.execute("PRAGMA journal_mode = WAL")
             except sqlite3.OperationalError as error:
-                # Where two change a new file at once SQLite refuses one, without its timeout.
+                # When two processes change a new file at once, SQLite refuses one without waiting.
                 if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:
                     raise
                 time.sleep(0.01)
@@ -372,3 +380,33 @@ def _times(blob: bytes, delivered: object) -> NDArray[np.float64]:
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("delivery times that do not rise")
     return times
+
+
+def refuse_study_in(out: Path, way: str) -> None:
+    """Raise StudyError if `out` holds a study; `way`, e.g. "merge", says what was to be done."""
+    if (out / FILE_NAME).exists():
+        raise StudyError(f"{out} holds a study already: {way} into a new directory")
+
+
+@contextmanager
+def new_store(out: Path) -> Iterator[Store]:
+    """Yield an empty store; what was written into it is that of `out` once the block ends well.
+
+    Killed or failed before, it leaves nothing that looks like a store.
+
+    Raises:
+        StudyError: `out` cannot be written.
+    """
+    unfinished = out / f"{FILE_NAME}.unfinished"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        unfinished.unlink(missing_ok=True)
+    except OSError as error:
+        raise StudyError(f"cannot write to {out}: {error.strerror}") from error
+    try:
+        with Store(unfinished) as store:
+            yield store
+        unfinished.rename(out / FILE_NAME)
+    finally:
+        for left in out.glob(f"{unfinished.name}*"):
+            left.unlink()

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import notes
-from swarm_logistics_env.studies.code_version import code_version
-from swarm_logistics_env.studies.declaring import Declaration
+from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import Origin, imported_plan
-from swarm_logistics_env.studies.judgement import Findings, judge
+from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
-from swarm_logistics_env.studies.progress import Progress
+from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.run_progress import Progress
 from swarm_logistics_env.studies.shards import Shard
-from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
-from swarm_logistics_env.studies.study_file import read_study_file
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Tally:
-    """What one call of `Study.run` did.
+    """The numbers of one call of `Study.run`.
 
     Attributes:
         played: runs played now; failed: those of them that failed; kept: found in the store.
@@ -51,6 +51,7 @@ class Study:
 
     Args:
         out: directory of the store and the report; None: kept in memory.
+        task: what is played; policies, sizes, faults and parameters are its own.
         fields: those of `Specification`, e.g. `policies=["swarm-dt"]`, `seeds=20`,
             `faults=[{"modes": ["FM1"], "robots": [1, 2]}]`.
 
@@ -65,7 +66,10 @@ class Study:
         3
     """
 
-    def __init__(self, *, out: str | Path | None = None, **fields: Any) -> None:
+    def __init__(
+        self, *, out: str | Path | None = None, task: Task = WAREHOUSE, **fields: Any
+    ) -> None:
+        self.task = task
         self.specification = Specification(**fields)
         self.out = None if out is None else Path(out)
         self._plan: Plan | None = None
@@ -111,16 +115,16 @@ class Study:
         """
         out = Path(out)
         with Store.existing(out) as store:
-            noted = notes.planned(store, out)
-            imported = store.note(notes.IMPORTED)
-        study = cls._of(Specification.from_json(noted[notes.SPECIFICATION]), out)
+            noted = metadata.planned(store, out)
+            imported = store.note(metadata.IMPORTED)
+        study = cls._of(Specification.from_json(noted[metadata.SPECIFICATION]), out)
         if imported is not None:
             study._plan = imported_plan(study.specification, Origin(**json.loads(imported)))
             return study
         study._plan = make_plan(
             study.specification,
-            code=noted[notes.CODE],
-            identities=json.loads(noted[notes.IDENTITIES]),
+            code=noted[metadata.CODE],
+            identities=json.loads(noted[metadata.IDENTITIES]),
         )
         return study
 
@@ -133,7 +137,7 @@ class Study:
     def plan(self) -> Plan:
         """Return the conditions and comparisons, shared conditions once; nothing is run."""
         if self._plan is None:
-            self._plan = make_plan(self.specification)
+            self._plan = make_plan(self.specification, task=self.task)
         return self._plan
 
     def run(
@@ -158,10 +162,10 @@ class Study:
             StudyError: the store or the engine cannot be used, or the store is another study's.
         """
         plan = self.plan()
-        if plan.code != code_version():
+        if plan.code != (code := self.task.code()):
             raise StudyError(
                 f"this study was played under code version {plan.code}, this is "
-                f"{code_version()}: plan it anew, and all of it runs again"
+                f"{code}: plan it anew, and all of it runs again"
             )
         if engine is None:
             engine = "process" if processes is not None and processes > 1 else "local"
@@ -172,9 +176,9 @@ class Study:
             self._refuse_another(store)
             if Declaration.noted(store) is None:
                 Declaration(self.specification.seed_numbers, self.specification.looks).note(store)
-            store.set_note(notes.SPECIFICATION, self.specification.to_json())
-            store.set_note(notes.CODE, plan.code)
-            store.set_note(notes.IDENTITIES, json.dumps(dict(plan.identities)))
+            store.set_note(metadata.SPECIFICATION, self.specification.to_json())
+            store.set_note(metadata.CODE, plan.code)
+            store.set_note(metadata.IDENTITIES, json.dumps(dict(plan.identities)))
             done = store.succeeded()
             runs = [run for run in whole if run.key not in done]
             kept = len(whole) - len(runs)
@@ -219,7 +223,7 @@ class Study:
             declared = Declaration.noted(store)
         return None if declared is None or declared.covers(plan) else declared.warning(plan)
 
-    def findings(self) -> Findings:
+    def findings(self) -> StudyResults:
         """Return every cell and every verdict, from the runs that are there.
 
         Raises:
@@ -250,9 +254,7 @@ class Study:
         _need_pandas()
         import pandas as pd
 
-        from swarm_logistics_env.studies.reporting.files import judgement_record
-
-        return pd.DataFrame(judgement_record(j) for j in self.findings().judgements)
+        return pd.DataFrame(self.findings().indicator_table())
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
         """Write report.md, cells.csv and claims.csv into a directory; return their paths.
@@ -263,7 +265,7 @@ class Study:
         Raises:
             StudyError: nothing has been run, there is no directory, or it cannot be written.
         """
-        from swarm_logistics_env.studies.reporting.files import write_report
+        from swarm_logistics_env.report.report_files import write_report
 
         directory = self.out if path is None else Path(path)
         if directory is None:
@@ -271,10 +273,10 @@ class Study:
         return write_report(self.findings(), directory)
 
     def _refuse_another(self, store: Store) -> None:
-        if store.note(notes.IMPORTED) is not None:
+        if store.note(metadata.IMPORTED) is not None:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         # The report and the declared seeds are one study's.
-        noted = store.note(notes.SPECIFICATION)
+        noted = store.note(metadata.SPECIFICATION)
         name = self.specification.name
         if noted is not None and (there := Specification.from_json(noted).name) != name:
             raise StudyError(

@@ -24,17 +24,17 @@ def performances_of_study(directory: str | Path, own: Scenario) -> dict[Conditio
         TrainingError: there is no such study, or it is of several policies.
     """
     try:
-        findings = Study.stored(directory).findings()
+        results = Study.stored(directory).findings()
     except StudyError as error:
         raise TrainingError(f"indicators.references: {error}") from error
-    labels = {cell.policy for cell in findings.cells}
+    labels = {cell.policy for cell in results.cells}
     if len(labels) != 1:
         raise TrainingError(
             f"indicators.references: the study in {directory} is of {', '.join(sorted(labels))}: "
             "should be of one policy"
         )
     performances: dict[Condition, float] = {}
-    for cell in findings.cells:
+    for cell in results.cells:
         condition = cell.arm.condition
         if cell.performance.size and not condition.behaviour:
             met = _met(condition.scenario, condition.faults, own)

@@ -11,7 +11,7 @@ from typing import Any
 
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.studies.code_version import code_version
+from swarm_logistics_env.tasks.code_version import code_version
 
 FILE_NAME = "training.json"
 # Fields that may change when a training goes on, because they change nothing of what was done.

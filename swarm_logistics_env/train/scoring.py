@@ -10,7 +10,7 @@ from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Arm
-from swarm_logistics_env.studies.judgement import Findings
+from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.train.specification import Training
 
 
@@ -37,20 +37,20 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
         **factors,
     )
     study.run(processes=training.threads)
-    findings = study.findings()
-    errors = [outcome.error for outcome in findings.outcomes.values() if outcome.error]
+    results = study.findings()
+    errors = [outcome.error for outcome in results.outcomes.values() if outcome.error]
     if errors:
         raise TrainingError(
             f"{len(errors)} runs of the scores failed ({errors[0].strip().splitlines()[-1]}); the "
             "policy file is written, without scores: the same command plays them again"
         )
-    return scores_of(findings)
+    return scores_of(results)
 
 
-def scores_of(findings: Findings) -> tuple[Score, ...]:
+def scores_of(results: StudyResults) -> tuple[Score, ...]:
     """Return every P and every indicator of a study with its interval."""
     scores = []
-    for cell in findings.cells:
+    for cell in results.cells:
         mean = cell.mean
         if mean is None:
             continue
@@ -64,8 +64,8 @@ def scores_of(findings: Findings) -> tuple[Score, ...]:
                 seeds=cell.performance.size,
             )
         )
-    for judgement in findings.judgements:
-        estimate, comparison = judgement.estimate, judgement.comparison
+    for test in results.tests:
+        estimate, comparison = test.estimate, test.comparison
         if estimate is None:
             continue
         scores.append(
@@ -82,5 +82,7 @@ def scores_of(findings: Findings) -> tuple[Score, ...]:
 
 
 def _in_words(arm: Arm) -> str:
-    level = str(arm.level)
-    return level if arm.level.kind == "size" else f"N = {arm.condition.scenario.n_robots}, {level}"
+    setting = str(arm.setting)
+    if arm.setting.kind == "size":
+        return setting
+    return f"N = {arm.condition.scenario.n_robots}, {setting}"

@@ -9,11 +9,12 @@ from typing import Any
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.wrappers.conditions import Condition
 from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
 
 # The performances that each indicator is relative to.
-PERFORMANCES = {"S": ("P_N",), "FT": ("P_o", "P_S"), "R": ("P_o",), "A": ("P_o",)}
+PERFORMANCES = {d.symbol: d.references for d in DEFINITIONS.values() if d.compares != "policy"}
 INDICATORS = tuple(PERFORMANCES)
 
 

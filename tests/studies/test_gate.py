@@ -1,9 +1,19 @@
+"""None"""
+
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.gate import Gate
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.gate import Gate, answers
+from swarm_logistics_env.studies.matching import match
+from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.results import StudyResults, judge, same_runs
+from swarm_logistics_env.tasks.task import Outcome
 
 
 @pytest.mark.parametrize(
@@ -34,3 +44,211 @@ def test_parts_are_read() -> None:
 def test_what_is_no_gate_is_refused(text: str) -> None:
     with pytest.raises(StudyError, match="should be"):
         Gate.parse(text)
+
+
+SPREAD = (0, 2, -1, 1, 3, -2)
+
+
+def results(performance: dict[tuple[int, int], int], **fields: Any) -> StudyResults:
+    """StudyResults of a study of sizes 10 and 20 and one faulty robot of 10.
+
+    Args:
+        performance: mean P by (N, m); every seed adds its own share.
+        fields: of the study that differ.
+    """
+    plan = Study(
+        **{
+            "seeds": len(SPREAD),
+            "scenario": {"n_robots": 10},
+            "sizes": [{"values": [10, 20]}],
+            "faults": [{"modes": ["FM1"], "robots": [1]}],
+            **fields,
+        }
+    ).plan()
+    return judge(plan, dict(outcomes(plan, performance)), len(SPREAD))
+
+
+def outcomes(plan: Plan, performance: dict[tuple[int, int], int]) -> Any:
+    for number, run in enumerate(plan.runs()):
+        condition = run.condition
+        removed = any(fault.mode == "removed" for fault in condition.faults)
+        key = (condition.scenario.n_robots, -1 if removed else len(condition.faults))
+        # In proportion, so that differences scatter too.
+        spread = SPREAD[run.seed % len(SPREAD)] * performance[key] // 20
+        delivered = float(performance[key] + spread + number % 3 % 2)
+        yield run.key, Outcome(run.key, np.arange(delivered), digest=f"{run.key} {delivered}")
+
+
+WELL = {(10, 0): 40, (20, 0): 70, (10, 1): 39, (10, -1): 36}
+WORSE = {**WELL, (10, 1): 20}
+
+
+def fails(text: str, old: StudyResults, new: StudyResults) -> bool:
+    return any(answer.fails for answer in answers(Gate.parse(text), old, new))
+
+
+def test_regression_is_found_and_nothing_else() -> None:
+    well, worse = results(WELL), results(WORSE)
+    assert fails("R < 0", well, worse)
+    assert not fails("R < 0", worse, well)
+    assert not fails("S < 0", well, worse)
+    assert fails("change < -0.1", well, worse)
+    assert fails("change < -0.1 at FM1", well, worse)
+    assert not fails("change < -0.1 at N = 20", well, worse)
+    assert not fails("possibly change < -0.1", well, well)
+
+
+def test_every_shared_condition_is_compared_once() -> None:
+    names = [a.name for a in answers(Gate.parse("change < 0"), results(WELL), results(WELL))]
+    assert len(names) == 4
+
+
+def test_comparisons_of_one_label_in_two_tables_are_all_judged() -> None:
+    faults = [
+        {"title": title, "modes": ["FM1"], "robots": [1], "scenario": {"n_robots": n}}
+        for title, n in (("few", 10), ("many", 20))
+    ]
+    performance = {**WORSE, (20, 1): 69, (20, -1): 68}
+    new = results(performance, faults=faults)
+    names = [answer.name for answer in answers(Gate.parse("R < 0"), new, new)]
+    assert names == [f"swarm-dt: R, FM1, m = 1 ({table})" for table in ("few", "many")]
+    assert fails("R < 0", new, new)
+    assert not fails("R < 0 at many", new, new)
+
+
+def test_an_indicator_asked_against_two_thresholds_is_judged_once() -> None:
+    asked = results(WELL, sizes=[{"values": [10, 20], "superlinear": [[10, 20]]}])
+    (answer,) = answers(Gate.parse("S < 0.5"), asked, asked)
+    assert answer.name == "swarm-dt: S, N 10 -> 20"
+
+
+def test_other_seeds_and_another_policy_are_compared_where_they_can_be() -> None:
+    old = results(WELL, seeds=4)
+    new = results(WORSE, policies=["random-walk"])
+    (answer,) = answers(Gate.parse("change < -0.1 at FM1"), old, new)
+    assert answer.name.startswith("swarm-dt -> random-walk")
+    assert answer.estimate is not None
+    assert answer.estimate.n_seeds == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "failing"),
+    [
+        ("change < 0", False),
+        ("possibly change < 0", False),
+        ("possibly change > 0", False),
+        ("possibly change < -0.1", False),
+        ("change < 0.1", True),
+        ("possibly change < 0.1", True),
+        ("change > -0.1", True),
+    ],
+)
+def test_the_same_runs_answer_a_gate_exactly(text: str, failing: bool) -> None:
+    plan = results(WELL).plan
+    # Where nothing is delivered no change could be estimated.
+    nothing = judge(plan, {run.key: Outcome(run.key, digest=run.key) for run in plan.runs()}, 6)
+    for same in (results(WELL), results(WORSE, seeds=2), nothing):
+        said = answers(Gate.parse(text), same, same)
+        assert {(answer.fails, answer.exact) for answer in said} == {(failing, 0.0)}
+
+
+def test_runs_are_the_same_where_their_digests_are() -> None:
+    assert same_runs(["a", "b"], ["a", "b"])
+    assert not same_runs(["a", "b"], ["a", "c"])
+    assert not same_runs(["a"], ["a", "b"])
+    # Of results that come from elsewhere nothing tells it, however equal they are.
+    assert not same_runs(["a", None], ["a", None])
+
+
+def test_runs_are_paired_by_their_seeds_and_not_by_their_place() -> None:
+    old = results(WELL, seeds=6, first_seed=0)
+    new = results({key: p - 4 for key, p in WELL.items()}, seeds=6, first_seed=2)
+    said = answers(Gate.parse("change < 0"), old, new)
+    for answer in said:
+        assert answer.estimate is not None
+        assert answer.estimate.n_seeds == 4
+        assert answer.estimate.pairing_correlation is not None
+        assert answer.estimate.pairing_correlation > 0.9
+        assert answer.fails
+    paired = "Runs are paired over the shared seeds, 2 to 5."
+    assert match(old, new).notes == (
+        f"Only in the old study, and left out: seeds 0 to 1. {paired}",
+        f"Only in the new study, and left out: seeds 6 to 7. {paired}",
+    )
+
+
+def test_studies_that_share_no_seed_cannot_be_judged() -> None:
+    old, new = results(WELL, seeds=3), results(WELL, seeds=3, first_seed=1000)
+    for answer in answers(Gate.parse("change < 0"), old, new):
+        assert answer.fails
+        assert answer.problem == (
+            "the studies share no seed: the old one has 0 to 2, the new one 1000 to 1002; play "
+            "one of them on the other's seeds"
+        )
+
+
+ABLATION: dict[str, Any] = {"ablations": [{"policy": "random-walk"}]}
+
+
+def test_an_ablation_s_policy_is_not_compared() -> None:
+    # The random walk of both studies is the same, and judged in neither.
+    old = results(WELL, **ABLATION)
+    new = results(WORSE, policies=["swarm-dt-follow"], **ABLATION)
+    said = answers(Gate.parse("change < 0"), old, new)
+    assert len(said) == 4
+    assert all(answer.name.startswith("swarm-dt -> swarm-dt-follow: ") for answer in said)
+    assert any(answer.fails for answer in said)
+    # Judged, it is compared with what was judged, and not with the old ablation.
+    judged = results(WORSE, policies=["random-walk"], **ABLATION)
+    names = [answer.name for answer in answers(Gate.parse("change < 0"), old, judged)]
+    assert len(names) == 4
+    assert all(name.startswith("swarm-dt -> random-walk: ") for name in names)
+
+
+def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
+    one = results(WELL)
+    two = results(WELL, policies=["swarm-dt", "random-walk"])
+    for old, new, study, other in ((one, two, "new", "old"), (two, one, "old", "new")):
+        said = answers(Gate.parse("change < 0"), old, new)
+        (failing,) = (answer for answer in said if answer.fails)
+        assert failing.problem == (
+            f"policy 'random-walk' of the {study} study has no match: the {other} study judges "
+            "'swarm-dt'"
+        )
+        # Whoever asks about the other policy alone gets an answer.
+        assert not fails("change < 0 at swarm-dt", old, new)
+        assert fails("change < 0 at random-walk", old, new)
+        assert fails("change < 0 at FM1", old, new)
+
+
+def test_conditions_of_one_study_alone_are_listed() -> None:
+    old = results(WELL)
+    new = results({**WELL, (30, 0): 90}, sizes=[{"values": [10, 30]}])
+    assert len(answers(Gate.parse("change < 0"), old, new)) == 3
+    assert match(old, new).notes == (
+        "Only in the old study, and not compared: swarm-dt, N = 20 (Scalability).",
+        "Only in the new study, and not compared: swarm-dt, N = 30 (Scalability).",
+    )
+
+
+def test_a_policy_under_no_common_condition_cannot_be_judged() -> None:
+    old = results(WELL, scenario={"n_robots": 10, "n_items": 70})
+    (answer,) = answers(Gate.parse("change < 0"), old, results(WELL))
+    assert answer.fails
+    assert answer.problem == (
+        "policy 'swarm-dt' is judged in both studies, but under no common condition"
+    )
+
+
+def test_what_cannot_be_judged_fails() -> None:
+    plan = results(WELL).plan
+    failed = judge(plan, {run.key: Outcome(run.key, error="x") for run in plan.runs()}, 6)
+    (answer,) = answers(Gate.parse("R < 0"), results(WELL), failed)
+    assert answer.fails
+    assert "6 of 6 runs failed" in str(answer.problem)
+
+
+@pytest.mark.parametrize("text", ["A < 0", "R < 0 at FM4", "change < 0 at N = 99"])
+def test_gate_that_tests_nothing_is_refused(text: str) -> None:
+    with pytest.raises(StudyError, match="tests nothing"):
+        answers(Gate.parse(text), results(WELL), results(WELL))

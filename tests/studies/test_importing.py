@@ -64,11 +64,11 @@ size,n_robots,10,22
 
 
 def test_unequally_many_runs_are_judged_unpaired(tmp_path: Path) -> None:
-    (judgement,) = imported(tmp_path, MANY).findings().judgements
-    assert judgement.estimate is not None
-    assert not judgement.estimate.paired
-    assert judgement.estimate.value == pytest.approx(1.0)
-    assert judgement.estimate.low is not None
+    (test,) = imported(tmp_path, MANY).findings().tests
+    assert test.estimate is not None
+    assert not test.estimate.paired
+    assert test.estimate.value == pytest.approx(1.0)
+    assert test.estimate.low is not None
 
 
 def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
@@ -81,11 +81,11 @@ def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
         ]
     )
     study = imported(tmp_path, text)
-    (judgement,) = study.findings().judgements
-    assert judgement.comparison.policy == "theirs"
-    assert judgement.estimate is not None
-    assert judgement.estimate.paired
-    cells = {cell.arm.level.value: cell.performance.tolist() for cell in study.findings().cells}
+    (test,) = study.findings().tests
+    assert test.comparison.policy == "theirs"
+    assert test.estimate is not None
+    assert test.estimate.paired
+    cells = {cell.arm.setting.value: cell.performance.tolist() for cell in study.findings().cells}
     assert cells == {5: [20, 10], 10: [40, 21]}
     # The file's own seeds, so that it can be compared with another file by them.
     assert list(study.plan().seeds) == [3, 7]

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.markup import markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.reporting.document import document
-from swarm_logistics_env.studies.reporting.markdown import markdown
 
 FIELDS: dict[str, Any] = {
     "scenario": {
@@ -29,34 +29,34 @@ def test_each_declared_look_is_taken_at_its_level(tmp_path: Path) -> None:
     for seeds, alpha in zip(looks, spi.look_levels(looks), strict=True):
         study = Study(out=tmp_path, seeds=seeds, looks=looks, **FIELDS)
         study.run()
-        findings = study.findings()
-        assert not findings.exploratory
-        assert findings.level == pytest.approx(1 - alpha)
-        (judgement,) = findings.judgements
-        assert judgement.estimate is not None
-        assert judgement.estimate.level == findings.level
-        assert judgement.estimate.verdict == (
+        results = study.findings()
+        assert not results.exploratory
+        assert results.level == pytest.approx(1 - alpha)
+        (test,) = results.tests
+        assert test.estimate is not None
+        assert test.estimate.level == results.level
+        assert test.estimate.verdict == (
             spi.verdict_at_look(
                 spi.scalability(
-                    *(cell.performance for cell in findings.cells), n=2, m=4, level=0.95
+                    *(cell.performance for cell in results.cells), n=2, m=4, level=0.95
                 ),
                 looks,
             ).verdict
         )
-    assert findings.level < 0.96
+    assert results.level < 0.96
 
 
 def test_first_look_of_very_many_has_a_level_below_1() -> None:
     # Its own share of the error is about 1e-56.
     study = Study(seeds=2, looks=(2, 100), **FIELDS)
     study.run()
-    findings = study.findings()
-    assert not findings.exploratory
-    assert 0.9999 < findings.level < 1.0
-    (judgement,) = findings.judgements
-    assert judgement.estimate is not None
-    assert judgement.estimate.verdict == "inconclusive"
-    assert "> 99.99 % interval" in markdown(document(findings))
+    results = study.findings()
+    assert not results.exploratory
+    assert 0.9999 < results.level < 1.0
+    (test,) = results.tests
+    assert test.estimate is not None
+    assert test.estimate.verdict == "inconclusive"
+    assert "> 99.99 % interval" in markdown(document(results))
 
 
 def test_look_that_was_not_declared_is_exploratory(tmp_path: Path) -> None:

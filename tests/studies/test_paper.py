@@ -46,7 +46,7 @@ def test_every_claim_follows_from_the_published_tables() -> None:
 
 def test_33_cells() -> None:
     assert len(PAPER.cells) == 9 + 4 + 12 + 4 + 3 + 1
-    planned = {arm.level for comparison in COMPARISONS for arm in comparison.arms}
+    planned = {arm.setting for comparison in COMPARISONS for arm in comparison.arms}
     assert set(PAPER.cells) <= planned
 
 
@@ -57,7 +57,7 @@ def test_one_set_of_defaults_for_all_tables() -> None:
     for _, table, arm in plan.cells:
         ours, theirs = arm.condition.scenario.model_dump(), base.model_dump()
         varied = {name for name in ours if ours[name] != theirs[name]}
-        allowed = {arm.level.name} if arm.level.kind in {"size", "parameter"} else set()
-        if table.startswith("Table I:") or arm.level.value == 100:
+        allowed = {arm.setting.name} if arm.setting.kind in {"size", "parameter"} else set()
+        if table.startswith("Table I:") or arm.setting.value == 100:
             allowed |= {"n_items", "n_robots"}
         assert varied <= allowed

@@ -8,7 +8,7 @@ from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.conditions import Condition, StudiedPolicy
+from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.warehouse import Fault
 
 

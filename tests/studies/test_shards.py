@@ -1,12 +1,18 @@
+"""None"""
+
 from __future__ import annotations
 
+import sqlite3
 from collections import Counter
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.shards import Shard
+from swarm_logistics_env.studies.shards import Shard, merge
+from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 1000])
@@ -21,3 +27,113 @@ def test_every_run_is_in_one_shard(count: int) -> None:
 def test_no_such_shard(text: str) -> None:
     with pytest.raises(StudyError, match="should be i/n"):
         Shard.parse(text)
+
+
+SCENARIO = {"n_robots": 3, "n_items": 4, "warehouse_width": 3, "warehouse_height": 3, "duration": 2}
+
+
+def played(directory: Path, **fields: Any) -> Path:
+    Study(
+        out=directory,
+        **{"scenario": SCENARIO, "sizes": [{"values": [2, 3]}], "seeds": 2, **fields},
+    ).run()
+    return directory
+
+
+def altered(directory: Path, statement: str) -> Path:
+    with sqlite3.connect(directory / FILE_NAME) as database:
+        database.execute(statement)
+    database.close()
+    return directory
+
+
+def rows(directory: Path) -> list[dict[str, Any]]:
+    with Store.existing(directory) as store:
+        return list(store.rows())
+
+
+def test_seeds_and_policies_of_two_machines_become_one_study(tmp_path: Path) -> None:
+    one = played(tmp_path / "one")
+    other = played(tmp_path / "other", seeds=3, policies=["swarm-dt", "random-walk"])
+    assert merge([one, other], tmp_path / "both") == 12
+    assert rows(tmp_path / "both") == rows(other)
+    merged = Study.stored(tmp_path / "both")
+    assert merged.specification.seeds == 3
+    assert merged.specification.policies == ("swarm-dt", "random-walk")
+    # Two seeds were declared where the first runs were looked at.
+    assert merged.findings().exploratory
+    assert not [path for path in (tmp_path / "both").iterdir() if path.name != FILE_NAME]
+
+
+def test_seeds_of_three_machines_are_joined_whatever_their_order(tmp_path: Path) -> None:
+    parts = {first: played(tmp_path / str(first), first_seed=first) for first in (1000, 1002, 1004)}
+    with pytest.raises(StudyError, match="from 1004 on, the studies before it end with seed 1001"):
+        merge([parts[1004], parts[1000]], tmp_path / "gap")
+    merge([parts[1004], parts[1000], parts[1002]], tmp_path / "whole")
+    merged = Study.stored(tmp_path / "whole")
+    assert merged.plan().seeds == range(1000, 1006)
+    results = merged.findings()
+    assert not any(cell.problem for cell in results.cells)
+    # Each machine declared its own seeds, nobody the whole.
+    assert results.exploratory
+
+
+def test_shards_of_one_declared_study_stay_as_declared(tmp_path: Path) -> None:
+    parts = [played(tmp_path / name, first_seed=1000) for name in ("one", "other")]
+    merge(parts, tmp_path / "both")
+    assert not Study.stored(tmp_path / "both").findings().exploratory
+
+
+def test_success_wins_over_failure_whichever_comes_first(tmp_path: Path) -> None:
+    whole = played(tmp_path / "whole")
+    failed = altered(
+        played(tmp_path / "failed"), "UPDATE runs SET error = 'Traceback', delivered = NULL"
+    )
+    for number, order in enumerate([(whole, failed), (failed, whole)]):
+        merge(order, tmp_path / str(number))
+        assert rows(tmp_path / str(number)) == rows(whole)
+
+
+def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
+    one, other = played(tmp_path / "one"), played(tmp_path / "other")
+    assert merge([one, other], tmp_path / "both") == 4
+    assert rows(tmp_path / "both") == rows(one)
+
+
+@pytest.mark.parametrize(
+    ("fields", "statement", "words"),
+    [
+        ({}, "UPDATE runs SET ended_at = 1.5", "has another result"),
+        ({}, "UPDATE notes SET value = 'old' WHERE name = 'code'", "never mixes two versions"),
+        ({}, "DELETE FROM notes WHERE name = 'identities'", "does not note its identities"),
+        (
+            {},
+            """INSERT INTO notes VALUES
+            ('imported', '{"file": "x.csv", "digest": "d", "paired": true}')""",
+            "was imported",
+        ),
+        (
+            {},
+            """UPDATE notes SET value = '{"policy swarm-dt": "x"}' WHERE name = 'identities'""",
+            "its code differs",
+        ),
+        ({"sizes": [{"values": [2, 4]}]}, "SELECT 1", "differ in sizes"),
+        ({"looks": [2, 4]}, "SELECT 1", "different looks"),
+    ],
+)
+def test_what_is_not_one_study_is_not_merged(
+    tmp_path: Path, fields: dict[str, Any], statement: str, words: str
+) -> None:
+    one = played(tmp_path / "one")
+    other = altered(played(tmp_path / "other", **fields), statement)
+    before = rows(one), rows(other)
+    with pytest.raises(StudyError, match=words):
+        merge([one, other], tmp_path / "both")
+    assert (rows(one), rows(other)) == before
+    assert not (tmp_path / "both").exists() or not list((tmp_path / "both").iterdir())
+
+
+def test_study_is_not_overwritten(tmp_path: Path) -> None:
+    one, other = played(tmp_path / "one"), played(tmp_path / "other")
+    with pytest.raises(StudyError, match="holds a study already"):
+        merge([one, other], other)

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.markup import markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.conditions import Run
-from swarm_logistics_env.studies.execution import Outcome
-from swarm_logistics_env.studies.reporting.document import document
-from swarm_logistics_env.studies.reporting.files import export_rows
-from swarm_logistics_env.studies.reporting.markdown import markdown
+from swarm_logistics_env.studies.export import export
+from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.studies.shards import Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.tasks.task import Outcome
 
 DYING = """
 import os, pathlib, signal
@@ -125,10 +125,10 @@ SMALL: dict[str, Any] = {
 }
 
 
-def export(directory: Path) -> bytes:
+def exported(directory: Path) -> bytes:
     path = directory / "export.csv"
     with Store.existing(directory) as store:
-        export_rows(store, path)
+        export(store, path)
     return path.read_bytes()
 
 
@@ -187,7 +187,7 @@ def test_study_killed_at_ten_random_moments_goes_on(undisturbed: Path, tmp_path:
                 killed(int(warm.stdout.readline()))
             counted()
     Study(out=out, **SMALL).run()
-    assert export(out) == export(undisturbed)
+    assert exported(out) == exported(undisturbed)
     assert told(out) == told(undisturbed)
 
 
@@ -307,10 +307,10 @@ def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:
     errors = study.results()["error"]
     assert errors.str.contains("RuntimeError: a wheel came off").all()
     assert errors.str.contains("Traceback").all()
-    for judgement in study.findings().judgements:
-        assert judgement.estimate is None
-        assert judgement.adjusted_verdict is None
-        assert "3 of 3 runs failed" in str(judgement.problem)
+    for test in study.findings().tests:
+        assert test.estimate is None
+        assert test.adjusted_verdict is None
+        assert "3 of 3 runs failed" in str(test.problem)
     study.report()
     assert "blocked" in (tmp_path / "report.md").read_text()
     Failing.broken = False
@@ -319,7 +319,7 @@ def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:
     finally:
         Failing.broken = True
     assert study.results()["error"].isna().all()
-    assert all(judgement.estimate for judgement in study.findings().judgements)
+    assert all(test.estimate for test in study.findings().tests)
 
 
 def test_one_failed_run_blocks_its_family_under_holm(tmp_path: Path) -> None:
@@ -333,7 +333,7 @@ def test_one_failed_run_blocks_its_family_under_holm(tmp_path: Path) -> None:
             (largest.run(study.plan().code, 1).key,),
         )
     database.close()
-    first, second = study.findings().judgements
+    first, second = study.findings().tests
     assert first.estimate is not None
     assert first.adjusted_verdict is None
     assert second.problem == "N = 6: 1 of 3 runs failed"
@@ -368,7 +368,7 @@ def test_disk_that_fills_up_stops_the_study_in_words_and_keeps_what_is_finished(
     assert before >= 5
     study = Study(out=tmp_path, **SMALL)
     assert study.run().kept == before
-    assert export(tmp_path) == export(undisturbed)
+    assert exported(tmp_path) == exported(undisturbed)
 
 
 @pytest.mark.parametrize("always", ["no", "yes"])

@@ -28,7 +28,7 @@ def study(out: Path, *policies: str) -> Study:
 
 
 def test_a_study_tells_the_performance_under_each_condition(tmp_path: Path) -> None:
-    findings = study(tmp_path, "swarm-dt-follow").findings()
+    results = study(tmp_path, "swarm-dt-follow").findings()
     told = performances_of_study(tmp_path, OWN)
     plain = Condition(3)
     expected = {
@@ -40,7 +40,7 @@ def test_a_study_tells_the_performance_under_each_condition(tmp_path: Path) -> N
     assert set(told) == expected
     (no_fault,) = {
         float(np.mean(cell.performance))
-        for cell in findings.cells
+        for cell in results.cells
         if cell.arm.condition.scenario == OWN
         and not cell.arm.condition.faults
         and not cell.arm.condition.behaviour

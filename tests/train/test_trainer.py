@@ -19,7 +19,7 @@ from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.policies.homing import homing_commands
-from swarm_logistics_env.studies.code_version import code_version
+from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
 from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
 from swarm_logistics_env.train.request import train_as_asked
@@ -58,12 +58,16 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
 def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_call(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from swarm_logistics_env.studies import execution
+    from swarm_logistics_env.tasks.warehouse import WarehouseTask
 
     training = small(scores=Scores(seeds=1, sizes=(2, 3), n_robots=3))
+
+    def broken(*_: object) -> None:
+        raise RuntimeError("a wheel came off")
+
     with monkeypatch.context() as changed:
-        changed.setattr(execution, "code_version", lambda: "another")
-        with pytest.raises(TrainingError, match=r"runs of the scores failed .*the package changed"):
+        changed.setattr(WarehouseTask, "play", broken)
+        with pytest.raises(TrainingError, match=r"runs of the scores failed .*a wheel came off"):
             train(training, tmp_path)
     card = policies.read_card(tmp_path / "small.safetensors")
     assert (card.scores, card.scored_with) == ((), {})

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import time
+import traceback
 from collections.abc import Callable, Generator, Iterable
+from dataclasses import replace
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies.conditions import Run
-from swarm_logistics_env.studies.execution import Outcome, execute
+from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.tasks.task import Outcome
 
 Engine = Callable[[Iterable[Run]], Generator[tuple[Run, Outcome], None, None]]
 
@@ -41,11 +44,28 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
             raise StudyError(f"engine local: is one process, not {processes}")
         return serial
     if name == "process":
-        from swarm_logistics_env.studies.engines.processes import Processes
+        from swarm_logistics_env.studies.engines.process_pool import ProcessPool
 
-        return Processes(processes or os.cpu_count() or 1)
-    from swarm_logistics_env.studies.engines.cluster import Cluster
+        return ProcessPool(processes or os.cpu_count() or 1)
+    from swarm_logistics_env.studies.engines.ray_cluster import Cluster
 
     if address is not None and processes is not None:
         raise StudyError("engine ray: a cluster that runs already has its own number of cores")
     return Cluster(address, processes)
+
+
+def execute(run: Run) -> Outcome:
+    """Play a run; whatever goes wrong in it is its outcome."""
+    start = time.perf_counter()
+    condition = run.condition
+    try:
+        code = condition.task.code()
+        if run.code != code:
+            raise StudyError(
+                f"this process runs code version {code}, the study {run.code}: "
+                "the package changed while the study ran"
+            )
+        outcome = condition.task.play(condition.policy.source, condition, run.seed, run.policy_seed)
+    except Exception:  # noqa: BLE001 - kept as the run's row, and blocks the verdict
+        outcome = Outcome("", error=traceback.format_exc())
+    return replace(outcome, run=run.key, wall_seconds=time.perf_counter() - start)

@@ -12,8 +12,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.engines import engine_named
 from swarm_logistics_env.studies.export import export
-from swarm_logistics_env.studies.merging import merge
-from swarm_logistics_env.studies.shards import Shard
+from swarm_logistics_env.studies.shards import Shard, merge
 from swarm_logistics_env.studies.store import Store
 
 needs_ray = pytest.mark.skipif(

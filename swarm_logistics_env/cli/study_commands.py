@@ -1,0 +1,264 @@
+"""`swarm-logistics study ...`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.engines import Engine
+    from swarm_logistics_env.studies.plan import Plan
+    from swarm_logistics_env.studies.shards import Shard
+    from swarm_logistics_env.studies.study import Tally
+
+StudyArgument = Annotated[
+    str, typer.Argument(metavar="FILE|PRESET", help="TOML file of a study, or a preset's name.")
+]
+SeedsOption = Annotated[
+    int | None,
+    typer.Option(min=1, help="Number of seeds of every condition; the study's if not given."),
+]
+FirstSeedOption = Annotated[
+    int | None,
+    typer.Option(min=0, help="Smallest seed, the others follow it; the study's if not given."),
+]
+PolicyOption = Annotated[
+    list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
+]
+TrustCodeOption = Annotated[
+    bool, typer.Option("--trust-code", help="Let a study file name policies as package.mod:Class.")
+]
+ProcessesOption = Annotated[
+    int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
+]
+
+study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
+
+
+@study.callback()
+def group() -> None:
+    """Judge a swarm by its indicators."""
+
+
+@study.command("plan")
+def plan_command(
+    asked: StudyArgument,
+    seeds: SeedsOption = None,
+    first_seed: FirstSeedOption = None,
+    policies: PolicyOption = None,
+    trust_code: TrustCodeOption = False,
+) -> None:
+    """Print the conditions, shared ones once, and what they will take; nothing is run."""
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.studies.pilot import expect
+
+    plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
+    expected = expect(plan)
+    show(_conditions(plan))
+    typer.echo(plan)
+    typer.echo(
+        f"On one process of this machine at most {duration(expected.seconds)}, with a store of "
+        f"{expected.size / 1e6:.1f} MB"
+    )
+
+
+@study.command("run")
+def run_command(
+    asked: StudyArgument,
+    out: Annotated[Path, typer.Option(help="Directory of its store and report.")],
+    seeds: SeedsOption = None,
+    first_seed: FirstSeedOption = None,
+    policies: PolicyOption = None,
+    processes: ProcessesOption = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(help="local (this process), process, or ray; process if not given."),
+    ] = None,
+    address: Annotated[
+        str | None,
+        typer.Option(help="Of a Ray cluster, e.g. auto; one is started here if not given."),
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N."),
+    ] = None,
+    trust_code: TrustCodeOption = False,
+) -> None:
+    """Play the runs that are missing, then print and write the report."""
+    import os
+
+    from swarm_logistics_env.studies.engines import engine_named
+    from swarm_logistics_env.studies.shards import Shard
+
+    part = Shard.parse(shard) if shard else None
+    place = out / part.directory if part else out
+    chosen = study_of(asked, place, seeds, policies, trust_code, first_seed=first_seed)
+    engine = engine or ("ray" if address else "local" if processes == 1 else "process")
+    player = engine_named(engine, processes, address)
+    typer.echo(f"{chosen.plan()}\n")
+    if warning := chosen.exploratory_because():
+        typer.echo(f"{warning}\n")
+    tally = _run(chosen, player, part)
+    if part is None:
+        _show(chosen)
+    else:
+        typer.echo(
+            f"When all {part.count} shards are done: swarm-logistics study merge "
+            f"{out}/shard-*-of-{part.count} --out {out}"
+        )
+    players = {"local": "1 process", "ray": "Ray"}.get(
+        engine, f"{processes or os.cpu_count() or 1} processes"
+    )
+    # The last line: where it is looked for after a report of many pages.
+    typer.echo(_told(tally, players))
+    raise typer.Exit(1 if tally.failed else 0)
+
+
+@study.command("report")
+def report_command(
+    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+) -> None:
+    """Print and write the report of a study again, from its store alone."""
+    from swarm_logistics_env.studies import Study
+
+    stored = Study.stored(directory)
+    typer.echo(f"{stored.plan()}\n")
+    _show(stored)
+
+
+@study.command("export")
+def export_command(
+    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+    to: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
+) -> None:
+    """Write every stored run as one row, sorted by key, without wall times."""
+    from swarm_logistics_env.studies.export import export
+    from swarm_logistics_env.studies.store import Store
+
+    with Store.existing(directory) as store:
+        count, digest = export(store, to)
+    typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
+
+
+@study.command("import")
+def import_command(
+    file: Annotated[Path, typer.Argument(help="CSV file, one run a row.")],
+    out: Annotated[Path, typer.Option(help="Directory of the study made of it.")],
+) -> None:
+    """Judge results from elsewhere, e.g. a paper's tables.
+
+    Columns: kind (size, fault, parameter), name, value, delivered; n_robots for faults; policy and
+    seed where known. Without seeds the study is unpaired.
+    """
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.importing import import_results
+
+    typer.echo(f"{import_results(file, out)} runs in {out}\n")
+    _show(Study.stored(out))
+
+
+@study.command("merge")
+def merge_command(
+    directories: Annotated[list[Path], typer.Argument(help="Directories of shards of a study.")],
+    out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
+) -> None:
+    """Make one store of those that shards or machines have filled."""
+    from swarm_logistics_env.studies.shards import merge
+
+    typer.echo(f"{merge(directories, out)} runs in {out}")
+
+
+def study_of(
+    asked: str,
+    out: Path | None,
+    seeds: int | None,
+    policies: list[str] | None,
+    trust_code: bool = False,
+    *,
+    first_seed: int | None = None,
+    **fields: object,
+) -> Study:
+    """Return the study of a file or a preset with the options and fields that are given.
+
+    Raises:
+        StudyError: there is no such file or preset, or it cannot be.
+    """
+    from swarm_logistics_env.studies import Study
+
+    if seeds is not None:
+        fields["seeds"] = seeds
+    if first_seed is not None:
+        fields["first_seed"] = first_seed
+    if policies:
+        fields["policies"] = tuple(policies)
+    if asked.endswith(".toml") or Path(asked).is_file():
+        return Study.from_file(asked, out=out, trust_code=trust_code, **fields)
+    return Study.preset(asked, out=out, **fields)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words, e.g. "2 h 10 min"."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    hours, minutes = divmod(round(seconds / 60), 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
+def _conditions(plan: Plan) -> Section:
+    from swarm_logistics_env.report.result_tables import Section
+
+    uses: dict[str, list[str]] = {}
+    for _, table, arm in plan.cells:
+        uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.setting})")
+    rows = (
+        (condition.policy.label, str(condition.scenario.n_robots), "; ".join(uses[condition.key]))
+        for condition in plan.conditions
+    )
+    return Section("Conditions", ("policy", "N", "stands in"), tuple(rows))
+
+
+def _run(asked: Study, engine: Engine, shard: Shard | None) -> Tally:
+    """Run a study; Ctrl-C ends the command and says how to go on."""
+    try:
+        return asked.run(engine, shard=shard)
+    except KeyboardInterrupt:
+        done, total = asked.finished(shard)
+        typer.echo(
+            f"\nStopped. {done} of {total} runs are finished and kept in {asked.out}; the same "
+            f"command goes on with the other {total - done}.",
+            err=True,
+        )
+        raise typer.Exit(130) from None
+
+
+def _told(tally: Tally, players: str) -> str:
+    rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
+    why = f", the first with {tally.error}; study export has each traceback" if tally.error else ""
+    return (
+        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
+        f"were kept from before; {tally.failed} failed{why}"
+    )
+
+
+def _show(asked: Study) -> None:
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.document import document
+    from swarm_logistics_env.report.report_files import (
+        how_to_get_figures,
+        missing_packages,
+        write_report,
+    )
+
+    results = asked.findings()
+    whole = document(results)
+    for section in whole.summary:
+        show(section)
+    assert asked.out is not None
+    written = write_report(results, asked.out, whole)
+    typer.echo(f"Written: {', '.join(str(path) for path in written)}")
+    if missing := missing_packages():
+        typer.echo(how_to_get_figures(missing))

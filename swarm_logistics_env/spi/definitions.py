@@ -1,0 +1,152 @@
+"""The indicators that a study tests: one row each.
+
+Plan, tests, gates, wording, figures, rewards and help texts read this table. A new indicator is a
+function in `indicators` and a row here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from .indicators import (
+    adaptability,
+    fault_tolerance,
+    relative_change,
+    robustness,
+    scalability,
+)
+
+if TYPE_CHECKING:
+    from .estimate import Estimate
+
+Factor = Literal["size", "fault", "parameter", "policy"]
+
+
+class Change(NamedTuple):
+    """What differs between the two conditions that an indicator compares.
+
+    Attributes:
+        before, after: the factor's values: robots, faulty robots, or the parameter in its unit.
+        n_robots: swarm size N of the original condition.
+    """
+
+    before: float
+    after: float
+    n_robots: int
+
+
+@dataclass(frozen=True)
+class Definition:
+    """One indicator.
+
+    Attributes:
+        symbol: as in the paper, e.g. "FT".
+        name: in words, e.g. "fault tolerance"; empty: `heading` says it all.
+        compares: the factor that differs between the conditions compared.
+        performances: argument of `function` to the paper's symbol: P of the original condition, of
+            the changed one and, where there is a third, of the one with the robots removed.
+        function: from performances over seeds to an `Estimate`.
+        arguments: the function's further arguments, from what differs.
+        adjectives: threshold to what a swarm above it is called.
+        axis: label of a figure's axis.
+    """
+
+    symbol: str
+    name: str
+    compares: Factor
+    performances: Mapping[str, str]
+    function: Callable[..., Estimate]
+    arguments: Callable[[Change], dict[str, Any]]
+    adjectives: Mapping[float, str]
+    axis: str
+
+    @property
+    def needs_removed(self) -> bool:
+        """Whether it compares with the robots removed as well."""
+        return len(self.performances) == 3
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The paper's symbols of all performances but the changed condition's."""
+        original, _, *removed = self.performances.values()
+        return (original, *removed)
+
+    @property
+    def heading(self) -> str:
+        """Name and symbol, e.g. "fault tolerance FT"."""
+        return f"{self.name} {self.symbol}" if self.name else self.axis
+
+    def property_name(self, threshold: float, *, claimed_below: bool = False) -> str:
+        """Return what a verdict is about, e.g. "scalable", "S > 0.5" or "P falls".
+
+        Args:
+            threshold: that the indicator is tested against.
+            claimed_below: whether the study claims that it lies below the threshold.
+        """
+        if self.compares == "policy" and claimed_below:
+            return f"P falls by more than {-100 * threshold:.0f} %" if threshold else "P falls"
+        return self.adjectives.get(threshold) or f"{self.symbol} > {threshold:.3g}"
+
+
+DEFINITIONS: dict[str, Definition] = {
+    definition.symbol: definition
+    for definition in (
+        Definition(
+            symbol="S",
+            name="scalability",
+            compares="size",
+            performances={"p_n": "P_N", "p_nm": "P_N+m"},
+            function=scalability,
+            arguments=lambda c: {"n": int(c.before), "m": int(c.after - c.before)},
+            adjectives={0.0: "scalable", 1.0: "superlinear"},
+            axis="scalability S",
+        ),
+        Definition(
+            symbol="FT",
+            name="fault tolerance",
+            compares="fault",
+            performances={"p_o": "P_o", "p_f": "P_F", "p_s": "P_S"},
+            function=fault_tolerance,
+            arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
+            adjectives={0.0: "tolerant"},
+            axis="fault tolerance FT",
+        ),
+        Definition(
+            symbol="R",
+            name="robustness",
+            compares="fault",
+            performances={"p_o": "P_o", "p_f": "P_F"},
+            function=robustness,
+            arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
+            adjectives={0.0: "robust"},
+            axis="robustness R",
+        ),
+        Definition(
+            symbol="A",
+            name="adaptability",
+            compares="parameter",
+            performances={"p_o": "P_o", "p_new": "P_new"},
+            function=adaptability,
+            arguments=lambda c: {"x_o": c.before, "x_new": c.after},
+            adjectives={0.0: "adaptable", 1.0: "P has grown"},
+            axis="A",
+        ),
+        Definition(
+            symbol="change",
+            name="",
+            compares="policy",
+            performances={"p_o": "P_o", "p_new": "P_new"},
+            function=relative_change,
+            arguments=lambda _: {},
+            adjectives={},
+            axis="change of P",
+        ),
+    )
+}
+
+
+def comparing(factor: Factor) -> tuple[Definition, ...]:
+    """Return the indicators whose conditions differ in that factor, in the order of the table."""
+    return tuple(d for d in DEFINITIONS.values() if d.compares == factor)

@@ -1,1 +1,0 @@
-"""What the runs of a study say beyond the verdicts on its comparisons."""

@@ -1,0 +1,168 @@
+"""Worker processes on this machine: they play runs, only the parent writes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import traceback
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.studies.engines import execute
+from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.tasks.task import Outcome
+
+# One thread per worker: n workers with n threads each would wait for each other.
+_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class ProcessPool:
+    """An engine of `count` worker processes.
+
+    When a worker dies, each run that was being played is played once more, alone in a new worker; a
+    run that ends this worker as well is an outcome with an error.
+
+    Raises:
+        StudyError: a run cannot be sent to another process, or no worker comes up.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+    def __call__(self, runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        """Yield each run with its outcome, as they finish."""
+        waiting = deque(runs)
+        while waiting:
+            interrupted: list[Run] = []
+            with _workers(min(self.count, len(waiting))) as pool:
+                for run, outcome in _played(pool, waiting, self.count):
+                    if outcome is None:
+                        interrupted.append(run)
+                    else:
+                        yield run, outcome
+            for run in interrupted:
+                yield run, _played_alone(run)
+
+
+def _played(
+    pool: ProcessPoolExecutor, waiting: deque[Run], at_once: int
+) -> Iterator[tuple[Run, Outcome | None]]:
+    """Yield runs with their outcomes until none waits, or with None once a worker has died."""
+    playing: dict[Future[Outcome], Run] = {}
+    broken = False
+    while playing or (waiting and not broken):
+        while waiting and not broken and len(playing) < at_once:
+            message = _pickled(waiting[0])
+            try:
+                playing[pool.submit(_play, waiting[0].key, message)] = waiting[0]
+            except BrokenProcessPool:  # a worker died between two runs
+                broken = True
+            else:
+                waiting.popleft()
+        for future in wait(playing, return_when=FIRST_COMPLETED).done:
+            try:
+                outcome = future.result()
+            except BrokenProcessPool:
+                broken, outcome = True, None
+            yield playing.pop(future), outcome
+
+
+def _played_alone(run: Run) -> Outcome:
+    others = set(multiprocessing.active_children())
+    with _workers(1) as pool:
+        (worker,) = set(multiprocessing.active_children()) - others
+        try:
+            return pool.submit(_play, run.key, _pickled(run)).result()
+        except BrokenProcessPool:
+            worker.join()
+    code = worker.exitcode or 0
+    cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+    error = f"WorkerDied: two worker processes ended in this run, the second by {cause}\n"
+    return Outcome(run.key, error=error)
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Start worker processes, and end them at once with the block, or when this process dies."""
+    context = multiprocessing.get_context("spawn")
+    theirs, ours = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
+    try:
+        with _one_thread_each(), _interrupts_ignored():
+            started = [pool.submit(os.getpid) for _ in range(count)]
+        try:
+            started[0].result()
+        except BrokenProcessPool:
+            raise StudyError(
+                "a worker process ended before its first run; in a script, run the study "
+                'under `if __name__ == "__main__":`, or use one process'
+            ) from None
+        yield pool
+    finally:
+        ours.close()
+        pool.shutdown(cancel_futures=True)
+        theirs.close()
+
+
+def _end_with_parent(connection: Connection) -> None:
+    """End this worker when the parent closes its end of the pipe, which its death does as well."""
+
+    def watch() -> None:
+        try:
+            connection.recv()
+        except (EOFError, OSError):
+            os._exit(0)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _pickled(run: Run) -> bytes:
+    try:
+        return pickle.dumps(run)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise StudyError(
+            f"policy {run.condition.policy.label!r} cannot be sent to another process "
+            f"({error}): use one process"
+        ) from error
+
+
+def _play(key: str, message: bytes) -> Outcome:
+    try:
+        return execute(pickle.loads(message))
+    except Exception:  # noqa: BLE001 - a policy that only the parent can import
+        return Outcome(key, error=traceback.format_exc())
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    """Start workers that ignore SIGINT: the parent alone decides how the study stops."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,118 @@
+"""Conditions, known by their content, and the runs that one condition needs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+from swarm_logistics_env import streams
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Fault, Scenario
+
+
+@dataclass(frozen=True)
+class StudiedPolicy:
+    """A policy as a study knows it.
+
+    Attributes:
+        label: how the report calls it.
+        identity: stable text of its class, parameters and weights; two of one identity are one.
+        source: what makes it, for `policy_choice.policy_of`.
+    """
+
+    label: str
+    identity: str
+    source: object = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """All of a run but its seed. Conditions of equal content have equal keys and share runs.
+
+    Attributes:
+        policy, scenario, faults: what is played, under which conditions.
+        behaviour: 0: the policy's randomness follows from the run's seed; another number: from
+            that number as well, so that the same worlds are met by another behaviour.
+        task: that plays it.
+    """
+
+    policy: StudiedPolicy
+    scenario: Scenario
+    faults: tuple[Fault, ...] = ()
+    behaviour: int = 0
+    task: Task = field(default=WAREHOUSE, compare=False, repr=False)
+
+    @property
+    def size(self) -> int:
+        """Swarm size N."""
+        return self.task.size(self.scenario)
+
+    @property
+    def duration(self) -> float:
+        """Time at which a run ends at the latest [s]."""
+        return self.task.duration(self.scenario)
+
+    @cached_property
+    def scenario_json(self) -> str:
+        """The scenario as canonical JSON."""
+        return _canonical(self.scenario.model_dump(mode="json"))
+
+    @cached_property
+    def faults_json(self) -> str:
+        """The faults as canonical JSON, in the order in which they were given."""
+        return _canonical([fault.model_dump(mode="json") for fault in self.faults])
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of scenario, faults, policy identity and behaviour, 64 hexadecimal digits."""
+        return _digest(*self._content)
+
+    @property
+    def _content(self) -> tuple[str, ...]:
+        # Behaviour 0 and the warehouse add nothing: the keys are those of stores without them.
+        other = (str(self.behaviour),) if self.behaviour else ()
+        if self.task.name != WAREHOUSE.name:
+            other = (*other, f"task {self.task.name}")
+        return (self.scenario_json, self.faults_json, self.policy.identity, *other)
+
+    def run(self, code: str, seed: int) -> Run:
+        """Return the run of this condition at one seed, under one version of the code."""
+        return Run(_digest(*self._content, code, str(seed)), self, code, seed)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One episode to play. `key` is the digest of everything that decides its outcome."""
+
+    key: str
+    condition: Condition
+    code: str
+    seed: int
+
+    @property
+    def policy_seed(self) -> int:
+        """Seed of the policy's own randomness."""
+        behaviour = self.condition.behaviour
+        if not behaviour:
+            return self.seed
+        # 31 bits: policies hand it to generators of all kinds.
+        return streams.key(self.seed, "other behaviour", behaviour) & 0x7FFFFFFF
+
+
+def _canonical(value: object) -> str:
+    return json.dumps(value, sort_keys=True, separators=(",", ":"))
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256(_canonical(parts).encode()).hexdigest()
+
+
+def seeds_in_words(seeds: Sequence[int]) -> str:
+    """Return ascending seeds as ranges, e.g. "0 to 3, 8"; at least one."""
+    breaks = [place for place, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
+    parts = [seeds[a:b] for a, b in pairwise([0, *breaks, len(seeds)])]
+    return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)

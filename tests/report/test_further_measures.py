@@ -1,0 +1,352 @@
+"""Measures beyond the paper, from outcomes that are made up, so that the answer is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.report.document import document, figures_of
+from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparisons import NO_FAULT, OTHER_BEHAVIOUR, Setting
+from swarm_logistics_env.studies.fault_runs import anchoring_loads, fault_budgets
+from swarm_logistics_env.studies.mid_run_faults import Resilience, rate_curves, resiliences
+from swarm_logistics_env.studies.policy_comparison import (
+    cell_contests,
+    indicator_contests,
+    jackknife_interval,
+)
+from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.size_series import steps
+from swarm_logistics_env.tasks.task import Outcome
+
+ONSET, END = 600.0, 2000.0
+SEEDS = 8
+
+
+def judged(study: Study, play: Callable[[str, Setting, int], Outcome]) -> StudyResults:
+    plan = study.plan()
+    levels = {arm.condition.key: (policy, arm.setting) for policy, _, arm in reversed(plan.cells)}
+    outcomes: dict[str, Outcome] = {}
+    for run in plan.runs():
+        outcome = play(*levels[run.condition.key], run.seed)
+        outcomes[run.key] = Outcome(
+            run.key,
+            outcome.delivery_times,
+            outcome.ended_at,
+            anchoring_seconds=outcome.anchoring_seconds,
+        )
+    return judge(plan, outcomes, declared_seeds=len(plan.seeds))
+
+
+def after_a_fault(share: float, back: float) -> StudyResults:
+    """A fault that leaves a share of the deliveries until `back` [s]; references go on as before.
+
+    About one delivery in 2 s, in every kind of run other ones, but for those before the onset.
+    """
+    study = Study(
+        seeds=SEEDS,
+        scenario={"duration": END, "restock": True},
+        faults=[{"modes": ["dead"], "robots": [3], "onsets": [ONSET]}],
+    )
+    kinds = {NO_FAULT: 1, OTHER_BEHAVIOUR: 2, Setting("fault", "removed", 3, ONSET): 3}
+
+    def play(_: str, level: Setting, seed: int) -> Outcome:
+        draw = np.random.default_rng([seed, kinds.get(level, 4)])
+        times = np.sort(draw.uniform(0.0, END, 1000))
+        if level.name == "dead":
+            lost = (times > ONSET) & (times < back) & (draw.uniform(size=times.size) > share)
+            times = times[~lost]
+        return Outcome("", times, END, anchoring_seconds=21.0 if level.name == "dead" else 0.0)
+
+    return judged(study, play)
+
+
+def only(results: StudyResults) -> Resilience:
+    (one,) = resiliences(results)
+    return one
+
+
+def table(results: StudyResults, title: str) -> list[tuple[str, ...]]:
+    return [
+        row
+        for chapter in document(results).chapters
+        for section in chapter.sections
+        if section.title == title
+        for row in section.rows
+    ]
+
+
+@pytest.fixture(scope="module")
+def repaired() -> StudyResults:
+    return after_a_fault(0.4, back=1200.0)
+
+
+def test_swarm_that_comes_back_has_a_self_repair_time(repaired: StudyResults) -> None:
+    one = only(repaired)
+    assert one.repair is not None
+    assert one.repair.distinguishable
+    assert one.repair.seconds == pytest.approx(600, abs=30)
+    assert one.repair.low <= 600 <= one.repair.high < 660
+    ((*_, reading),) = table(repaired, "Self-repair time")
+    assert reading == "a loss, and back"
+    assert one.single is not None
+    fault, null = one.single
+    assert (fault.runs, null.runs) == (SEEDS, SEEDS)
+    medians = fault.curve.median(), null.curve.median()
+    assert None not in medians
+    assert medians[0] > 550 > medians[1]  # type: ignore[operator]
+    names = [figure.name for figure in figures_of(document(repaired))]
+    assert "self-repair-swarm-dt-Fault-tolerance-and-robustness-dead-600s" in names
+
+
+def test_swarm_that_never_comes_back_is_censored() -> None:
+    found = after_a_fault(0.3, back=END)
+    one = only(found)
+    assert one.repair is not None
+    assert one.repair.censored
+    assert one.against_removed is not None
+    assert one.against_removed.value == pytest.approx(0.3, abs=0.03)
+    assert one.against_removed.verdict == "refuted"
+    ((*_, repair, p, followed, _, reading),) = table(found, "Self-repair time")
+    assert repair.startswith("∞ [13")
+    assert repair.endswith(", ∞]")
+    assert float(p) < 0.01
+    assert followed == "1400"
+    assert reading == "censored: a loss to the end is not excluded"
+    ((_, _, median, censored, *_),) = table(found, "Self-repair run by run")
+    assert (median, censored) == ("not reached", f"{SEEDS} of {SEEDS} runs")
+
+
+def test_no_loss_is_not_distinguishable_from_no_fault() -> None:
+    found = after_a_fault(1.0, back=END)
+    one = only(found)
+    assert one.repair is not None
+    assert not one.repair.distinguishable
+    assert one.against_whole is not None
+    assert one.against_whole.threshold == pytest.approx(1 - 3 / 25)
+    assert one.against_whole.verdict == "supported"
+
+
+def test_self_repair_without_its_null_says_so(repaired: StudyResults) -> None:
+    (null_pair,) = repaired.plan.null_pairs
+    null = {null_pair.other.condition.run(repaired.plan.code, seed).key for seed in range(SEEDS)}
+    outcomes = {key: o for key, o in repaired.outcomes.items() if key not in null}
+    found = judge(repaired.plan, outcomes, declared_seeds=SEEDS)
+    assert only(found).repair is None
+    assert "the runs of the no-fault null are missing" in markdown(document(found))
+
+
+def test_null_that_ran_out_of_items_is_none(repaired: StudyResults) -> None:
+    (null_pair,) = repaired.plan.null_pairs
+    key = null_pair.other.condition.run(repaired.plan.code, 0).key
+    emptied = replace(repaired.outcomes[key], all_delivered=True)
+    outcomes = {**repaired.outcomes, key: emptied}
+    one = only(judge(repaired.plan, outcomes, declared_seeds=SEEDS))
+    assert one.repair is None
+    assert "the items ran out" in str(one.problem)
+
+
+def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) -> None:
+    (comparison,) = (c for c in repaired.plan.comparisons if c.indicator == "FT")
+    whole, removed, fault = rate_curves(repaired, comparison)
+    assert (whole.label, removed.label, fault.label) == ("no fault", "removed", "fault")
+    at = {second: index for index, second in enumerate(fault.seconds)}
+    assert fault.seconds[0] == 100.0
+    assert fault.seconds[-1] == END
+    # 0.5 deliveries a second, in 100 s.
+    assert whole.rates[at[900.0]].value == pytest.approx(50, abs=6)
+    assert fault.rates[at[900.0]].value == pytest.approx(20, abs=6)
+    assert fault.rates[at[1800.0]].value == pytest.approx(50, abs=6)
+    names = [figure.name for figure in figures_of(document(repaired))]
+    assert "deliveries-swarm-dt-Fault-tolerance-and-robustness-dead-600s" in names
+
+
+def test_anchoring_load_per_failed_robot(repaired: StudyResults) -> None:
+    (load,) = anchoring_loads(repaired)
+    assert load.load.value == 21.0
+    assert load.neighbours.value == pytest.approx(21.0 / (3 * (END - ONSET)))
+
+
+def test_fault_budget_stops_at_what_was_not_tested(repaired: StudyResults) -> None:
+    (budget,) = fault_budgets(repaired)
+    assert budget.tested == (3,)
+    assert budget.budget == spi.FaultBudget(0, 1)
+    ((*_, answer),) = table(repaired, "Fault budget")
+    assert answer == "0 shown; m = 1 was not tested"
+
+
+@pytest.mark.parametrize(
+    ("delivered", "answer"),
+    [
+        # One robot of ten may be lost, and R = 0 lies at a tenth of the deliveries.
+        ([10, 11, 10, 11], "at least 2"),
+        ([5, 6, 5, 6], "0; m = 1 refuted"),
+        ([2, 14, 2, 14], "0; m = 1 inconclusive"),
+        ([9], "0; m = 1 inconclusive"),
+    ],
+)
+def test_fault_budget_says_whether_more_is_refuted_or_unknown(
+    delivered: list[int], answer: str
+) -> None:
+    study = Study(
+        seeds=len(delivered),
+        scenario={"n_robots": 10, "duration": END},
+        faults=[{"modes": ["FM4"], "robots": [1, 2]}],
+    )
+
+    def play(_: str, level: Setting, seed: int) -> Outcome:
+        number = delivered[seed] if level.name == "FM4" else 10
+        return Outcome("", np.arange(1.0, number + 1.0), END)
+
+    ((*_, said),) = table(judged(study, play), "Fault budget")
+    assert said == answer
+
+
+def two_policies(seeds: int, factor: float) -> StudyResults:
+    """Random walk delivers `factor` times what Swarm D-T does, in every run."""
+    study = Study(
+        policies=["swarm-dt", "random-walk"],
+        seeds=seeds,
+        sizes=[{"values": [5, 10, 20, 40]}],
+        faults=[{"modes": ["FM1"], "robots": [1]}],
+    )
+    base: Mapping[object, float] = {5: 10, 10: 20, 20: 30, 40: 36}
+
+    def play(policy: str, level: Setting, seed: int) -> Outcome:
+        # In another order at 40 robots, so that not every difference is the same.
+        noise = 2 * ((3 * seed + 1) % 4 if level.value == 40 else seed % 4)
+        p = base.get(level.value if level.kind == "size" else None, 32.0) + noise
+        return Outcome("", np.arange(p * (factor if policy == "random-walk" else 1.0)), 500.0)
+
+    return judged(study, play)
+
+
+def test_policies_are_set_against_the_first() -> None:
+    found = two_policies(8, 2.0)
+    contests = {
+        (c.cell.policy, str(c.cell.arm.setting)): c for c in cell_contests(found)["Scalability"]
+    }
+    first, second = contests["swarm-dt", "N = 10"], contests["random-walk", "N = 10"]
+    assert first.difference is None
+    assert first.cell.performance.tolist() == [20, 22, 24, 26] * 2
+    assert (first.interquartile_mean, first.worst_decile) == (23.0, 20.0)
+    assert second.difference == spi.mean_interval([20, 22, 24, 26] * 2)
+    assert first.ratio is None
+    assert second.ratio == pytest.approx((2.0, 2.0, 2.0))
+    assert second.improvement is not None
+    assert second.improvement.value == 1.0
+    # Twice the deliveries everywhere leaves every ratio as it was.
+    contest, *_ = indicator_contests(found)
+    assert contest.differences[0] is None
+    assert contest.differences[1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    titles = {chapter.title for chapter in document(found).chapters}
+    assert "Policies compared" in titles
+    alone = judge(Study(sizes=[{"values": [5, 10]}]).plan(), {}, declared_seeds=20)
+    assert "Policies compared" not in {chapter.title for chapter in document(alone).chapters}
+
+
+def test_nothing_is_a_multiple_of_no_deliveries() -> None:
+    study = Study(policies=["swarm-dt", "random-walk"], seeds=3, sizes=[{"values": [5, 10]}])
+
+    def play(policy: str, level: Setting, seed: int) -> Outcome:
+        return Outcome("", np.arange(0.0 if policy == "swarm-dt" else 2.0 + seed), 500.0)
+
+    *_, last = cell_contests(judged(study, play))["Scalability"]
+    assert (last.cell.policy, last.ratio) == ("random-walk", None)
+    assert last.difference is not None
+
+
+def test_several_policies_over_one_seed_give_values_alone() -> None:
+    text = markdown(document(two_policies(1, 2.0)))
+    assert "## Policies compared" in text
+    contest, *_ = indicator_contests(two_policies(1, 2.0))
+    assert contest.differences[1] == (0.0, None, None)
+
+
+def test_what_robots_are_worth() -> None:
+    found = two_policies(4, 1.0)
+    first, second, third = steps(found, "swarm-dt", "Scalability")
+    # Means 13, 23, 33, 39 at N = 5, 10, 20, 40.
+    assert first.efficiency.value == pytest.approx(2.3)
+    assert second.marginal_gain.value == pytest.approx(33 - 2 * 23)
+    assert third.karp_flatt is not None
+    value, low, high = third.karp_flatt
+    assert value == pytest.approx((33 / 39 - 0.5) / 0.5)
+    assert low is not None
+    assert high is not None
+    assert low < value < high
+
+
+def test_serial_fraction_is_unbounded_where_growth_may_be_nil() -> None:
+    study = Study(seeds=3, sizes=[{"values": [5, 10]}])
+    p = {5: (4, 30, 2), 10: (9, 3, 40)}
+    found = judged(
+        study, lambda _, level, seed: Outcome("", np.arange(float(p[int(level.value)][seed])))
+    )
+    (step,) = steps(found, "swarm-dt", "Scalability")
+    assert step.karp_flatt is not None
+    assert step.karp_flatt.high == math.inf
+
+
+def test_jackknife_of_a_mean_is_its_t_interval() -> None:
+    sample = np.array([3.0, 5.0, 4.0, 9.0])
+
+    def mean(seeds: NDArray[np.intp]) -> float:
+        return float(sample[seeds].mean())
+
+    assert jackknife_interval(4, mean) == pytest.approx(spi.mean_interval(sample))
+
+
+def test_differences_of_policies_are_drawn_table_by_table() -> None:
+    figures = {f.name: f for f in figures_of(document(two_policies(8, 2.0)))}
+    sizes = figures["differences-Scalability"]
+    assert {row[:3] for row in sizes.rows} == {
+        ("P", "random-walk", "swarm-dt"),
+        ("S", "random-walk", "swarm-dt"),
+    }
+    at_10 = next(row for row in sizes.rows if row[0] == "P" and row[3] == "10")
+    assert at_10[4:] == pytest.approx(spi.mean_interval([20, 22, 24, 26] * 2))
+    faults = figures["differences-Fault-tolerance-and-robustness"]
+    assert {row[0] for row in faults.rows} == {"P", "FT", "R"}
+    assert {row[3] for row in faults.rows} == {"no fault", "removed 1", "FM1 1"}
+
+
+def test_ablation_is_drawn_with_its_threshold() -> None:
+    study = Study(seeds=4, ablations=[{"policy": "random-walk", "fall": 0.25}])
+    found = judged(
+        study,
+        lambda _, level, seed: Outcome(
+            "", np.arange(float((20 if level.name == "random-walk" else 40) + seed))
+        ),
+    )
+    (figure,) = figures_of(document(found))
+    assert figure.name == "change-Ablation"
+    ((_, _, indicator, label, value, *_),) = figure.rows
+    assert (indicator, label) == ("change", "random-walk, N = 25")
+    assert value == pytest.approx(21.5 / 41.5 - 1)
+
+
+def test_policies_that_differ_in_punctuation_have_files_of_their_own() -> None:
+    chosen = [{"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}, "label": "Swarm.DT"}]
+    study = Study(
+        policies=["swarm-dt", *chosen], seeds=1, faults=[{"modes": ["FM1"], "robots": [1]}]
+    )
+    found = judged(study, lambda *_: Outcome("", np.arange(30.0)))
+    names = [figure.name for figure in figures_of(document(found))]
+    assert len({name.lower() for name in names}) == len(names)
+    assert "FT-R-swarm-dt-Fault-tolerance-and-robustness" in names
+    assert "FT-R-Swarm-DT-Fault-tolerance-and-robustness-2" in names
+
+
+def test_no_law_is_fitted_to_a_flat_series() -> None:
+    study = Study(seeds=2, sizes=[{"values": [5, 10, 20, 40]}])
+    found = judged(study, lambda *_: Outcome("", np.arange(60.0)))
+    assert table(found, "Scaling laws") == []
+    assert "no law is fitted: P is 60.0 at every size" in markdown(document(found))

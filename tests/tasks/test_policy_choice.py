@@ -1,0 +1,130 @@
+"""Policies with parameters of their own, as a specification names them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import policies
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.shards import merge
+from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_of
+
+FILE = """
+seeds = 1
+scenario = { n_robots = 3, n_items = 4, warehouse_width = 3, warehouse_height = 3, duration = 2 }
+
+[[policies]]
+name = "swarm-dt"
+
+[[policies]]
+name = "swarm-dt"
+parameters = { taxis_gain = 0.5, diffusion = 0.7 }
+
+[[policies]]
+name = "swarm-dt"
+parameters = { taxis_gain = 0.25 }
+label = "half-hearted"
+
+[[sizes]]
+values = [2, 3]
+"""
+LABELS = ["swarm-dt", "swarm-dt (taxis_gain = 0.5, diffusion = 0.7)", "half-hearted"]
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE)
+    return Study.from_file(path, out=tmp_path / "out")
+
+
+def test_parameters_are_part_of_what_a_run_is_and_are_told(study: Study) -> None:
+    plan = study.plan()
+    played = {c.policy.label: c.policy for c in plan.conditions}
+    assert list(played) == LABELS
+    assert len({policy.identity for policy in played.values()}) == 3
+    assert len({run.key for run in plan.runs()}) == 3 * 2
+    assert study.run().failed == 0
+    study.report()
+    assert study.out is not None
+    text = (study.out / "report.md").read_text()
+    (row,) = (line for line in text.splitlines() if line.startswith("| half-hearted | swarm_log"))
+    assert "given: taxis_gain = 0.25" in row
+    # A store knows them again.
+    again = Study.stored(study.out)
+    assert again.specification == study.specification
+    assert [c.key for c in again.plan().conditions] == [c.key for c in plan.conditions]
+
+
+def test_parameters_reach_the_policy() -> None:
+    chosen = PolicyChoice(name="swarm-dt", parameters={"taxis_gain": 0.0})
+    # Swarm D-T without its taxis is the random walk.
+    assert policies.identity(policy_of(chosen)) == policies.identity(policies.load("random-walk"))
+
+
+class Silent:
+    """A policy that tells nobody its parameters."""
+
+    def __init__(self, speed: float = 0.0) -> None:
+        self.speed = speed
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        self.n_robots = n_robots
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        return np.full((self.n_robots, 4), self.speed)
+
+
+def test_parameters_count_where_the_policy_does_not_tell_them() -> None:
+    name = f"{__name__}:Silent"
+    chosen = [{"name": name, "parameters": {"speed": speed}} for speed in (0.1, 0.2)]
+    plan = Study(policies=chosen, sizes=[{"values": [2, 3]}]).plan()
+    assert len(plan.conditions) == 4
+
+
+def test_file_may_not_name_code_by_way_of_parameters(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    policy = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
+    path.write_text(f"policies = [{policy}]\n[[sizes]]\nvalues = [2, 3]\n")
+    with pytest.raises(StudyError, match="is a class, and to load it runs code"):
+        Study.from_file(path)
+    assert Study.from_file(path, trust_code=True).plan().conditions
+
+
+def test_specification_survives_json_and_merging_has_each_policy_once(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE)
+    parts = [tmp_path / "one", tmp_path / "two"]
+    for part, chosen in zip(parts, (slice(0, 2), slice(1, 3))):
+        whole = Study.from_file(path).specification
+        assert Specification.from_json(whole.to_json()) == whole
+        Study.from_file(path, out=part, policies=whole.policies[chosen]).run()
+    merge(parts, tmp_path / "both")
+    assert [c.policy for c in Study.stored(tmp_path / "both").plan().comparisons] == LABELS
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        ({"nam": "swarm-dt"}, "PolicyChoice has no field 'nam'; did you mean 'name'?"),
+        ({"parameters": {"taxis_gain": 1}}, "PolicyChoice.name"),
+        ({"name": "swarm-dt", "parameters": {"taxis_gian": 1.0}}, "did you mean 'taxis_gain'?"),
+        ({"name": "swarm-dt", "parameters": {"taxis_gain": "x"}}, "taxis_gain = 'x'"),
+        ({"name": "swarm-dt", "parameters": {"trust_code": True}}, "'trust_code' is no parameter"),
+        ({"name": "swarm-dt", "parameters": {"name": "x"}}, "'name' is no parameter"),
+        ({"name": "swarm-dt", "parameters": 3}, "PolicyChoice.parameters = 3"),
+        ({"name": "swarm-td", "parameters": {"taxis_gain": 1.0}}, "did you mean 'swarm-dt'?"),
+        (3, "a table of name and parameters"),
+    ],
+)
+def test_what_is_no_policy_is_refused_in_one_sentence(policy: object, words: str) -> None:
+    with pytest.raises(SwarmLogisticsError) as caught:
+        Study(policies=[policy], sizes=[{"values": [2, 3]}]).plan()
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
