@@ -6,6 +6,8 @@ differs in lightness or shape as well: grey levels of the three robot states are
 
 from __future__ import annotations
 
+from swarm_logistics_env.warehouse import FAILURE_MODES
+
 RGB = tuple[int, int, int]
 
 INK: RGB = (30, 30, 30)
@@ -37,19 +39,7 @@ RUNS: tuple[tuple[RGB, float], ...] = (
 )
 
 # What a robot that fails in a mode wears. A removed robot is not there to wear anything.
-MARKS = {
-    "FM1": "1",
-    "FM2": "2",
-    "FM3": "3",
-    "FM3_send": "3s",
-    "FM3_hear": "3h",
-    "FM4": "4",
-    "motor_slow": "S",
-    "motor_dead": "M",
-    "view_reduced": "V",
-    "rangers_blind": "R",
-    "dead": "X",
-}
+MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
 
 # Where edges of one colour on another are smooth, and in how many steps.
 _EDGES = (
