@@ -39,8 +39,10 @@ def main(seeds=10, n_robots=25, m=2, duration=300.0):
         spi.fault_tolerance(p_o, p_f, p_s, n=n_robots, m=m),
     ]
     for estimate in estimates:
-        limits = f"[{estimate.low:.2f}, {estimate.high:.2f}]"
-        print(f"{estimate.indicator} = {estimate.value:.2f} {limits}: {estimate.verdict}")
+        limits = ""
+        if estimate.low is not None:  # seeds that do not differ give no interval
+            limits = f" [{estimate.low:.2f}, {estimate.high:.2f}]"
+        print(f"{estimate.indicator} = {estimate.value:.2f}{limits}: {estimate.verdict}")
     return estimates
 
 

@@ -6,6 +6,8 @@ differs in lightness or shape as well: grey levels of the three robot states are
 
 from __future__ import annotations
 
+from swarm_logistics_env.warehouse import FAILURE_MODES
+
 RGB = tuple[int, int, int]
 
 INK: RGB = (30, 30, 30)
@@ -37,24 +39,7 @@ RUNS: tuple[tuple[RGB, float], ...] = (
 )
 
 # The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.
-MARKS = {
-    "FM1": "1",
-    "FM2": "2",
-    "FM3": "3",
-    "FM3_send": "3s",
-    "FM3_hear": "3h",
-    "FM4": "4",
-    "FM4_jam": "4j",
-    "motor_slow": "S",
-    "motor_wear": "W",
-    "motor_dead": "M",
-    "view_reduced": "V",
-    "rangers_blind": "R",
-    "rangers_frozen": "F",
-    "rangers_biased": "B",
-    "radio_delayed": "D",
-    "dead": "X",
-}
+MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
 
 # Pairs of colours with smooth edges between them, and the number of steps in between.
 _EDGES = (

@@ -37,6 +37,7 @@ class FailureMode:
 
     Attributes:
         description: in a sentence.
+        mark: what its robots wear in pictures, one or two letters; none: the mode's name.
         speed: factor in [0, 1] on its top speed and turn rate.
         view: factor in [0, 1] on its cameras' range.
         factor: "speed" or "view": which of the two a fault's own factor replaces; or None.
@@ -54,6 +55,7 @@ class FailureMode:
     """
 
     description: str
+    mark: str = ""
     speed: float = 1.0
     view: float = 1.0
     factor: str | None = None
@@ -80,40 +82,47 @@ class FailureMode:
 
 
 FAILURE_MODES: dict[str, FailureMode] = {
-    "FM1": FailureMode("always tells timer 0, as if in the delivery area", honest=False),
-    "FM2": FailureMode("never picks up", lifts=False),
-    "FM3": FailureMode("neither sends nor hears", sends=False, hears=False),
-    "FM3_send": FailureMode("does not send", sends=False),
-    "FM3_hear": FailureMode("does not hear", hears=False),
-    "FM4": FailureMode("its entering the delivery area delivers nothing", delivers=False),
+    "FM1": FailureMode("always tells timer 0, as if in the delivery area", mark="1", honest=False),
+    "FM2": FailureMode("never picks up", mark="2", lifts=False),
+    "FM3": FailureMode("neither sends nor hears", mark="3", sends=False, hears=False),
+    "FM3_send": FailureMode("does not send", mark="3s", sends=False),
+    "FM3_hear": FailureMode("does not hear", mark="3h", hears=False),
+    "FM4": FailureMode("its entering the delivery area delivers nothing", mark="4", delivers=False),
     "FM4_jam": FailureMode(
         "as FM4, and what it holds inside the delivery area it cannot let go",
+        mark="4j",
         delivers=False,
         releases_inside=False,
     ),
     "motor_slow": FailureMode(
         "drives and turns at half its speed, or at the fault's factor of it",
+        mark="S",
         speed=0.5,
         factor="speed",
     ),
     "motor_wear": FailureMode(
         "drives and turns ever slower, at half its speed or the fault's factor of it in the end",
+        mark="W",
         speed=0.5,
         factor="speed",
         wears=True,
     ),
-    "motor_dead": FailureMode("stands still", speed=0.0),
+    "motor_dead": FailureMode("stands still", mark="M", speed=0.0),
     "view_reduced": FailureMode(
-        "sees half as far with its cameras, or the fault's factor of it", view=0.5, factor="view"
+        "sees half as far with its cameras, or the fault's factor of it",
+        mark="V",
+        view=0.5,
+        factor="view",
     ),
-    "rangers_blind": FailureMode("its rangers report nothing near", rangers=False),
+    "rangers_blind": FailureMode("its rangers report nothing near", mark="R", rangers=False),
     "rangers_frozen": FailureMode(
-        "its rangers repeat what they read when they failed", rangers_refresh=False
+        "its rangers repeat what they read when they failed", mark="F", rangers_refresh=False
     ),
-    "rangers_biased": FailureMode("its rangers read 0.2 m too far", ranger_bias=0.2),
-    "radio_delayed": FailureMode("what it broadcasts comes 2 s late", radio_delay=2.0),
+    "rangers_biased": FailureMode("its rangers read 0.2 m too far", mark="B", ranger_bias=0.2),
+    "radio_delayed": FailureMode("what it broadcasts comes 2 s late", mark="D", radio_delay=2.0),
     "dead": FailureMode(
         "stands still, senses, sends and lifts nothing, keeps what it carries",
+        mark="X",
         speed=0.0,
         view=0.0,
         rangers=False,
