@@ -51,7 +51,7 @@ test: check
 
 # What reaches every line of the kernels in seconds, without the compiler.
 KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py kinematics.py layout.py grid.py) \
-	$(addprefix tests/policies/test_,swarm_dt.py routes.py)
+	$(addprefix tests/policies/test_,swarm_dt.py routes.py) tests/motion
 
 check: $(DEV)/installed
 	$(DEV)/bin/ruff check .

@@ -15,7 +15,7 @@ import matplotlib
 from swarm_logistics_env import policies
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
 from swarm_logistics_env.train.evaluation import evaluate
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 
 SCRIPTED = ("swarm-dt-follow", "swarm-dt", "random-walk")
 MILLION = 1e6

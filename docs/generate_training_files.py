@@ -18,7 +18,7 @@ from swarm_logistics_env.train.settings import (
     PPOSettings,
     Scores,
 )
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 
 PAGE = Path(__file__).parent / "training_files.md"
 TABLES = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.adapters.central import CentralEnv
+from swarm_logistics_env.adapters.central_env import CentralEnv
 
 if TYPE_CHECKING:
     from swarm_logistics_env.adapters.sb3 import SwarmVecEnv

@@ -12,7 +12,7 @@ PETTINGZOO_ID = "swarm_logistics_v0"
 def register() -> None:
     """Register the names; the modules are imported when somebody makes an environment."""
     if GYMNASIUM_ID not in gymnasium.registry:
-        gymnasium.register(GYMNASIUM_ID, "swarm_logistics_env.adapters.central:CentralEnv")
+        gymnasium.register(GYMNASIUM_ID, "swarm_logistics_env.adapters.central_env:CentralEnv")
     if not hasattr(pettingzoo, "register"):
         return  # PettingZoo has a registry since 1.27
     module = "swarm_logistics_env.swarm_logistics_v0"

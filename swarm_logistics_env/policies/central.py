@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, ahead, costs, ways
+from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, cost_to_go, costmap, lookahead
 from swarm_logistics_env.policies.waiting import WaitingPlaces
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
@@ -146,7 +146,7 @@ class Central:
             return self._towards(state.robot_position[worker], state.item_position[item])
         if state.time >= self._planned_at + REPLAN - 1e-6:
             self._plan(state, worker)
-        waypoint = ahead(self._cost, self._far, CELL, x, y, LOOKAHEAD)
+        waypoint = lookahead(self._cost, self._far, CELL, x, y, LOOKAHEAD)
         if carries and waypoint[0] >= scenario.storage_width - CELL:
             waypoint = (waypoint[0] + 1.0, waypoint[1])  # no braking at the edge
         return self._towards(state.robot_position[worker], np.array(waypoint))
@@ -162,7 +162,7 @@ class Central:
             discs += [_discs(stored, scenario.item_radius, BLOCKED)]
         around = np.vstack(discs)
         around[:, 2] += scenario.robot_radius + MARGIN
-        self._cost = costs(
+        self._cost = costmap(
             scenario.warehouse_width,
             scenario.warehouse_height,
             CELL,
@@ -177,7 +177,7 @@ class Central:
             goal[min(int(y / CELL), goal.shape[0] - 1), min(int(x / CELL), goal.shape[1] - 1)] = (
                 True
             )
-        self._far = ways(self._cost, goal)
+        self._far = cost_to_go(self._cost, goal)
         self._planned_at = state.time
 
     # -- how -----------------------------------------------------------------------------------

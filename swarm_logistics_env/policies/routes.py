@@ -14,13 +14,13 @@ CROWDED = 4.0
 
 
 @kernel
-def costs(
+def costmap(
     width: float, height: float, cell: float, radius: float, discs: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return what it costs a robot of `radius` to have its centre in each cell, (rows, columns).
+    """Return the cost of each cell (rows, columns) for the centre of a robot of `radius` [m].
 
-    1 in the open, `BLOCKED` along the walls, and what they say within `discs` (S, 4): x, y and
-    radius [m], cost.
+    The cost is 1 in the open and `BLOCKED` along the walls. `discs` (S, 4) are x, y and radius
+    [m] and the cost within.
     """
     rows, columns = math.ceil(height / cell), math.ceil(width / cell)
     cost = np.ones((rows, columns))
@@ -43,10 +43,10 @@ def costs(
 
 
 @kernel
-def ways(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np.float64]:
+def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the cost of the cheapest way from each cell to a `goal` cell, in cells.
 
-    Sweeps over the grid in four orders until nothing gets cheaper, which in the open takes few.
+    It sweeps over the grid in four orders until no cell gets cheaper; in the open few are enough.
     """
     rows, columns = cost.shape
     far = np.where(goal, 0.0, np.inf)
@@ -74,7 +74,7 @@ def ways(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np.float
 
 
 @kernel
-def ahead(
+def lookahead(
     cost: NDArray[np.float64],
     far: NDArray[np.float64],
     cell: float,
@@ -82,7 +82,7 @@ def ahead(
     y: float,
     n_cells: int,
 ) -> tuple[float, float]:
-    """Return where to head for from (x, y) [m]: the farthest of the next cells in a straight line.
+    """Return the point [m] to head for from (x, y) [m]: the farthest cell ahead in a straight line.
 
     A line counts as straight as long as no cell on it costs more than those the way leads through.
     """

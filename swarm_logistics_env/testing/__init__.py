@@ -10,8 +10,7 @@ Example:
     >>> testing.check_spaces(make, steps=20)
 """
 
-from swarm_logistics_env.testing.determinism import check_determinism
-from swarm_logistics_env.testing.errors import (
+from swarm_logistics_env.testing.conformance_errors import (
     ConformanceError,
     ConservationError,
     DeterminismError,
@@ -19,10 +18,11 @@ from swarm_logistics_env.testing.errors import (
     OverlapError,
     SpaceError,
 )
-from swarm_logistics_env.testing.faults import check_faults
+from swarm_logistics_env.testing.determinism import check_determinism
+from swarm_logistics_env.testing.fault_check import check_faults
 from swarm_logistics_env.testing.items import check_conservation
 from swarm_logistics_env.testing.overlap import check_overlap
-from swarm_logistics_env.testing.spaces import check_spaces
+from swarm_logistics_env.testing.space_check import check_spaces
 
 __all__ = [
     "ConformanceError",

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.testing.errors import ConservationError
+from swarm_logistics_env.testing.conformance_errors import ConservationError
 from swarm_logistics_env.testing.playing import Make, played
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.testing.errors import OverlapError
+from swarm_logistics_env.testing.conformance_errors import OverlapError
 from swarm_logistics_env.testing.playing import Make, played
 from swarm_logistics_env.warehouse import Warehouse
 

@@ -21,8 +21,8 @@ from swarm_logistics_env.train.learner import actor_parameters, outputs_of
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.settings import Imitation
-from swarm_logistics_env.train.specification import Training
-from swarm_logistics_env.train.worlds import make_worlds
+from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.train.training_worlds import make_worlds
 
 # Inputs (K, len(INPUTS)) and the outputs (K, len(OUTPUTS)) that the expert asks for.
 Demonstrations = tuple[NDArray[np.float32], NDArray[np.float32]]

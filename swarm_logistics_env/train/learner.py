@@ -11,7 +11,7 @@ from stable_baselines3 import PPO
 
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 
 ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 
 PRESETS = Path(__file__).parent / "presets"
 

@@ -10,7 +10,7 @@ from swarm_logistics_env.errors import StudyError, TrainingError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.wrappers.conditions import Condition, changes_of
+from swarm_logistics_env.wrappers.condition import Condition, changes_of
 
 
 def performances_of_study(directory: str | Path, own: Scenario) -> dict[Condition, float]:

@@ -11,7 +11,7 @@ from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Arm
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 
 
 def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:

@@ -31,9 +31,9 @@ from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, simulation, versions
 from swarm_logistics_env.train.scoring import score
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.train.training_callback import TrainingCallback, TrainingLog
-from swarm_logistics_env.train.worlds import make_worlds
+from swarm_logistics_env.train.training_worlds import make_worlds
 
 
 def train(

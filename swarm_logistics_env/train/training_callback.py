@@ -20,7 +20,7 @@ from swarm_logistics_env.train.evaluation import Evaluated, evaluate
 from swarm_logistics_env.train.learner import actor_parameters, tensors_of
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.progress_bar import ProgressBar
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 
 CHECKPOINT_EVERY = 20.0  # seconds
 CURVE = "curve.csv"

@@ -22,7 +22,7 @@ from swarm_logistics_env.train.evaluation import Evaluated, evaluate, performanc
 from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, versions
 from swarm_logistics_env.train.settings import Evaluation
-from swarm_logistics_env.train.specification import Seed, as_scenario
+from swarm_logistics_env.train.training import Seed, as_scenario
 from swarm_logistics_env.warehouse.faults import Fault
 
 if TYPE_CHECKING:

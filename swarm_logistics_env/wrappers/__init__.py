@@ -6,7 +6,7 @@ follows from the episode's seed. What a reset's options ask for comes before wha
 draws, and an outer wrapper before an inner one; faults add up.
 """
 
-from swarm_logistics_env.wrappers.conditions import Condition
+from swarm_logistics_env.wrappers.condition import Condition
 from swarm_logistics_env.wrappers.fault_injection import FaultInjection
 from swarm_logistics_env.wrappers.fixed_agents import FixedAgents
 from swarm_logistics_env.wrappers.indicator_reward import IndicatorReward

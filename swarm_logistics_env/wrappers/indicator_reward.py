@@ -12,7 +12,7 @@ from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.warehouse.state import NOBODY
-from swarm_logistics_env.wrappers.conditions import Condition, changes_of, condition_of
+from swarm_logistics_env.wrappers.condition import Condition, changes_of, condition_of
 from swarm_logistics_env.wrappers.indicator_payments import (
     INDICATORS,
     PERFORMANCES,

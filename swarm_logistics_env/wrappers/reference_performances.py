@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.wrappers.conditions import Condition
+from swarm_logistics_env.wrappers.condition import Condition
 
 
 class GivenPerformances:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, ahead, costs, ways
+from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, cost_to_go, costmap, lookahead
 
 CELL = 0.1
 NOTHING = np.zeros((0, 2))
@@ -17,17 +17,17 @@ NOTHING = np.zeros((0, 2))
 def grid(solid: NDArray[np.float64], crowd: NDArray[np.float64] = NOTHING) -> NDArray[np.float64]:
     discs = [[*place, 0.25, BLOCKED] for place in solid.tolist()]
     discs += [[*place, 0.25, CROWDED] for place in crowd.tolist()]
-    return costs(4.0, 2.0, CELL, 0.1, np.array(discs).reshape(-1, 4))
+    return costmap(4.0, 2.0, CELL, 0.1, np.array(discs).reshape(-1, 4))
 
 
 def travelled(cost: NDArray[np.float64], x: float, y: float) -> list[tuple[float, float]]:
     """Follow the way to the right-hand edge."""
     goal = np.zeros(cost.shape, np.bool_)
     goal[:, -3:] = True
-    far = ways(cost, goal)
+    far = cost_to_go(cost, goal)
     places = [(x, y)]
     while x < 3.7 and len(places) < 400:
-        to_x, to_y = ahead(cost, far, CELL, x, y, 10)
+        to_x, to_y = lookahead(cost, far, CELL, x, y, 10)
         length = math.dist((x, y), (to_x, to_y))
         stride = min(0.05, length)
         x, y = x + stride * (to_x - x) / length, y + stride * (to_y - y) / length
@@ -51,7 +51,7 @@ def test_costs_mark_what_is_in_the_way() -> None:
 def test_a_way_in_the_open_is_as_long_as_it_looks() -> None:
     goal = np.zeros((20, 40), np.bool_)
     goal[10, 30] = True
-    far = ways(np.ones((20, 40)), goal)
+    far = cost_to_go(np.ones((20, 40)), goal)
     assert far[10, 10] == 20.0
     assert far[15, 30] == 5.0
     np.testing.assert_allclose(far[0, 30 - 12], 2 + 10 * math.sqrt(2))

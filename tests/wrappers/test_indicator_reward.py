@@ -23,9 +23,11 @@ from swarm_logistics_env.wrappers import (
     ParameterChange,
     RunningMeans,
     SwarmSize,
-    conditions,
     indicator_reward,
     reference_performances,
+)
+from swarm_logistics_env.wrappers import (
+    condition as condition_module,
 )
 
 N = 4
@@ -399,7 +401,7 @@ def test_pettingzoos_own_tests_pass(conformance: ModuleType, make: Callable[...,
     conformance.api_test(parallel_to_aec(rewarded()), num_cycles=25)
 
 
-@pytest.mark.parametrize("module", [conditions, indicator_reward, reference_performances])
+@pytest.mark.parametrize("module", [condition_module, indicator_reward, reference_performances])
 def test_the_examples_run(module: ModuleType) -> None:
     ran = doctest.testmod(module)
     assert ran.attempted

@@ -9,7 +9,7 @@ from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.train.mix import EpisodeMix
 from swarm_logistics_env.train.references import performances_of_study
-from swarm_logistics_env.train.specification import Training
+from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.wrappers import Condition, IndicatorReward, RunningMeans, Wrapper
 
 References = RunningMeans | dict[Condition, float] | float

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.testing.errors import FaultsError
+from swarm_logistics_env.testing.conformance_errors import FaultsError
 from swarm_logistics_env.testing.playing import Make, Moment, played, robot_of
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY
