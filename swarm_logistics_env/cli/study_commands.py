@@ -114,7 +114,7 @@ def run_command(
         engine, f"{processes or os.cpu_count() or 1} processes"
     )
     # The last line: where it is looked for after a report of many pages.
-    typer.echo(_told(tally, players))
+    typer.echo(_in_one_line(tally, players))
     raise typer.Exit(1 if tally.failed else 0)
 
 
@@ -235,7 +235,7 @@ def _run(asked: Study, engine: Engine, shard: Shard | None) -> Tally:
         raise typer.Exit(130) from None
 
 
-def _told(tally: Tally, players: str) -> str:
+def _in_one_line(tally: Tally, players: str) -> str:
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     why = f", the first with {tally.error}; study export has each traceback" if tally.error else ""
     return (

@@ -13,10 +13,10 @@ from swarm_logistics_env.report.wording import listed, seeds_text
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Setting
 from swarm_logistics_env.studies.policy_comparison import (
-    CellContest,
-    IndicatorContest,
-    cell_contests,
-    indicator_contests,
+    CellAgainstBaseline,
+    IndicatorAgainstBaseline,
+    cells_against_baseline,
+    indicators_against_baseline,
     judged_policies,
 )
 from swarm_logistics_env.studies.results import StudyResults, Value
@@ -42,13 +42,13 @@ def compared(results: StudyResults) -> Iterator[Section]:
     if len(policies) < 2:
         return
     yield _matrix(results, policies)
-    contests = tuple(indicator_contests(results))
-    cells_by_table = cell_contests(results)
-    for figure in difference_figures(results, cells_by_table, contests):
+    entries = tuple(indicators_against_baseline(results))
+    cells_by_table = cells_against_baseline(results)
+    for figure in difference_figures(results, cells_by_table, entries):
         yield Section("", figures=(figure,))
     level = wording.percent(results.level)
-    for table in dict.fromkeys(contest.table for contest in contests):
-        here = [contest for contest in contests if contest.table == table]
+    for table in dict.fromkeys(one.table for one in entries):
+        here = [one for one in entries if one.table == table]
         yield _indicators(table, here, policies, level)
     for table, cells in cells_by_table.items():
         yield _cells(table, cells, policies[0])
@@ -81,19 +81,19 @@ def _matrix(results: StudyResults, policies: tuple[str, ...]) -> Section:
 
 
 def _indicators(
-    table: str, contests: list[IndicatorContest], policies: tuple[str, ...], level: str
+    table: str, entries: list[IndicatorAgainstBaseline], policies: tuple[str, ...], level: str
 ) -> Section:
     columns = ["question", *(f"{policy} [{level}]" for policy in policies)]
     columns += [f"{policy} - {policies[0]} [95 %]" for policy in policies[1:]]
     rows = []
-    for contest in contests:
-        test = next(j for j in contest.tests if j is not None)
+    for one in entries:
+        test = next(j for j in one.tests if j is not None)
         label = f"{test.property_name}, {test.comparison.label}"
         values = [
             wording.NOTHING if j is None else f"{wording.ratio(j)} {wording.verdict(j)}"
-            for j in contest.tests
+            for j in one.tests
         ]
-        differences = [wording.bracketed(d, 3) for d in contest.differences[1:]]
+        differences = [wording.bracketed(d, 3) for d in one.differences[1:]]
         rows.append((label, *values, *differences))
     return Section(
         f"Indicators side by side: {table}",
@@ -102,20 +102,19 @@ def _indicators(
     )
 
 
-def _cells(table: str, contests: list[CellContest], baseline: str) -> Section:
+def _cells(table: str, entries: list[CellAgainstBaseline], baseline: str) -> Section:
     rows = tuple(
         (
-            str(contest.cell.arm.setting),
-            contest.cell.policy,
-            wording.items(contest.cell.mean)
-            + (wording.SATURATED if contest.cell.saturated else ""),
-            f"{contest.interquartile_mean:.1f}",
-            f"{contest.worst_decile:.1f}",
-            wording.bracketed(contest.difference, 1),
-            wording.bracketed(contest.ratio, 2),
-            wording.bracketed(contest.improvement, 2),
+            str(one.cell.arm.setting),
+            one.cell.policy,
+            wording.items(one.cell.mean) + (wording.SATURATED if one.cell.saturated else ""),
+            f"{one.interquartile_mean:.1f}",
+            f"{one.worst_decile:.1f}",
+            wording.bracketed(one.difference, 1),
+            wording.bracketed(one.ratio, 2),
+            wording.bracketed(one.improvement, 2),
         )
-        for contest in contests
+        for one in entries
     )
     return Section(
         f"P side by side: {table}",
@@ -133,24 +132,24 @@ Differences = list[tuple[str, str, Interval]]  # policy, category, difference
 
 def difference_figures(
     results: StudyResults,
-    cells: dict[str, list[CellContest]],
-    indicators: tuple[IndicatorContest, ...],
+    cells: dict[str, list[CellAgainstBaseline]],
+    indicators: tuple[IndicatorAgainstBaseline, ...],
 ) -> Iterator[Figure]:
     """Yield one figure a table: differences of P, then of every indicator."""
     baseline, *others = judged_policies(results)
-    for table, contests in cells.items():
-        names = list(dict.fromkeys(contest.cell.arm.setting.name for contest in contests))
+    for table, entries in cells.items():
+        names = list(dict.fromkeys(one.cell.arm.setting.name for one in entries))
         found: dict[str, Differences] = {
             "P": [
-                (contest.cell.policy, _cell(contest.cell.arm.setting), contest.difference)
+                (one.cell.policy, _cell(one.cell.arm.setting), one.difference)
                 # One failure mode after the other, as in the tables.
-                for contest in sorted(contests, key=lambda c: names.index(c.cell.arm.setting.name))
-                if contest.difference is not None
+                for one in sorted(entries, key=lambda c: names.index(c.cell.arm.setting.name))
+                if one.difference is not None
             ]
         }
-        for indicator_contest in indicators:
-            if indicator_contest.table == table:
-                label, differences = _of_indicator(indicator_contest)
+        for indicator in indicators:
+            if indicator.table == table:
+                label, differences = _of_indicator(indicator)
                 found.setdefault(label, []).extend(differences)
         panels = tuple(
             Panel(
@@ -158,7 +157,7 @@ def difference_figures(
                 f"difference of {label}" + (" [items]" if label == "P" else ""),
                 tuple(_series(differences, others)),
                 (0.0,),
-                _x_label(contests[0].cell.arm.setting, stepwise=label != "P"),
+                _x_label(entries[0].cell.arm.setting, stepwise=label != "P"),
             )
             for label, differences in found.items()
             if differences
@@ -167,14 +166,14 @@ def difference_figures(
             yield _figure(results, table, baseline, others, found, panels)
 
 
-def _of_indicator(contest: IndicatorContest) -> tuple[str, Differences]:
-    (first, *_) = (test for test in contest.tests if test is not None)
+def _of_indicator(one: IndicatorAgainstBaseline) -> tuple[str, Differences]:
+    (first, *_) = (test for test in one.tests if test is not None)
     comparison = first.comparison
     before, after = comparison.original.setting, comparison.changed.setting
     category = _cell(after) if after.kind == "fault" else f"{before.value:g}→{after.value:g}"
     differences = [
         (test.policy, category, difference)
-        for test, difference in zip(contest.tests, contest.differences)
+        for test, difference in zip(one.tests, one.differences)
         if test is not None and difference is not None
     ]
     # Asked against two thresholds, its value is one.

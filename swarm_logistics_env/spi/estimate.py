@@ -149,17 +149,7 @@ def judge(
         indicator=indicator, threshold=threshold, level=level, n_seeds=n_seeds, paired=paired
     )
     if identical or n_seeds == 1:
-        mean_den = float(reference.mean())
-        mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
-        value = mean_num / mean_den + offset
-        return Estimate(
-            **asked,
-            value=value,
-            low=value if identical else None,
-            high=value if identical else None,
-            mean_denominator=mean_den,
-            flags=("identical",) if identical else ("single_seed",),
-        )
+        return _untested(asked, weighted, offset, identical=identical)
 
     flags = []
     correlation = None
@@ -204,6 +194,24 @@ class _Asked(TypedDict):
     level: float
     n_seeds: int
     paired: bool
+
+
+def _untested(
+    asked: _Asked, weighted: Mapping[str, Term], offset: float, *, identical: bool
+) -> Estimate:
+    """Return the value alone: one seed has no spread, and identical runs leave nothing to test."""
+    *_, reference = (term.sample for term in weighted.values())
+    mean_den = float(reference.mean())
+    mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
+    value = mean_num / mean_den + offset
+    return Estimate(
+        **asked,
+        value=value,
+        low=value if identical else None,
+        high=value if identical else None,
+        mean_denominator=mean_den,
+        flags=("identical",) if identical else ("single_seed",),
+    )
 
 
 def _checked(

@@ -141,7 +141,10 @@ def robustness(
         raise IndicatorError(f"m = {faulty}: should be at most n = {robots} robots")
     return judge(
         "R",
-        {"p_f": (p_f, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)},
+        {
+            "p_f": (p_f, 1.0, 0.0),
+            "p_o": (p_o, -1.0, 1.0),
+        },
         offset=faulty / robots,
         threshold=threshold,
         level=level,

@@ -15,7 +15,7 @@ from swarm_logistics_env.studies.results import Cell, IndicatorTest, StudyResult
 
 
 @dataclass(frozen=True)
-class CellContest:
+class CellAgainstBaseline:
     """P of one policy in one cell, beside that of the baseline, the study's first policy.
 
     Attributes:
@@ -37,7 +37,7 @@ class CellContest:
 
 
 @dataclass(frozen=True)
-class IndicatorContest:
+class IndicatorAgainstBaseline:
     """One question asked of every policy.
 
     Attributes:
@@ -56,7 +56,7 @@ def judged_policies(results: StudyResults) -> tuple[str, ...]:
     return tuple(dict.fromkeys(c.policy for c in results.plan.comparisons))
 
 
-def cell_contests(results: StudyResults) -> dict[str, list[CellContest]]:
+def cells_against_baseline(results: StudyResults) -> dict[str, list[CellAgainstBaseline]]:
     """Return, table by table, every cell of every policy; cells side by side."""
     policies = judged_policies(results)
     found: dict[str, dict[Setting, dict[str, Cell]]] = {}
@@ -66,7 +66,7 @@ def cell_contests(results: StudyResults) -> dict[str, list[CellContest]]:
             cells[cell.policy] = cell
     return {
         table: [
-            _cell_contest(results, cells[policy], cells.get(policies[0]))
+            _cell_against_baseline(results, cells[policy], cells.get(policies[0]))
             for cells in by_setting.values()
             for policy in policies
             if policy in cells
@@ -75,14 +75,16 @@ def cell_contests(results: StudyResults) -> dict[str, list[CellContest]]:
     }
 
 
-def _cell_contest(results: StudyResults, cell: Cell, baseline: Cell | None) -> CellContest:
+def _cell_against_baseline(
+    results: StudyResults, cell: Cell, baseline: Cell | None
+) -> CellAgainstBaseline:
     difference = ratio = improvement = None
     comparable = baseline is not None and not (cell.problem or baseline.problem)
     if baseline is not None and baseline is not cell and comparable and results.plan.paired:
         difference = difference_interval(baseline.performance, cell.performance)
         ratio = _ratio(baseline.performance, cell.performance)
         improvement = spi.probability_of_improvement(baseline.performance, cell.performance)
-    return CellContest(
+    return CellAgainstBaseline(
         cell,
         spi.interquartile_mean(cell.performance),
         spi.worst_decile(cell.performance),
@@ -101,7 +103,7 @@ def _ratio(baseline: NDArray[np.float64], performance: NDArray[np.float64]) -> I
     return Interval(1.0 + change.value, low, high)
 
 
-def indicator_contests(results: StudyResults) -> Iterator[IndicatorContest]:
+def indicators_against_baseline(results: StudyResults) -> Iterator[IndicatorAgainstBaseline]:
     """Yield every question that more than one policy was asked, with the differences."""
     policies = judged_policies(results)
     asked: dict[object, dict[str, IndicatorTest]] = {}
@@ -114,7 +116,7 @@ def indicator_contests(results: StudyResults) -> Iterator[IndicatorContest]:
             continue
         tests = tuple(by_policy.get(policy) for policy in policies)
         baseline = tests[0]
-        yield IndicatorContest(
+        yield IndicatorAgainstBaseline(
             next(iter(by_policy.values())).comparison.table,
             tests,
             tuple(

@@ -200,14 +200,14 @@ class IndicatorTest:
             "saturated": self.saturated,
             "claim": self.claim_text,
             "published": self.published,
-            "claim_verdict": self._told_of_claim(estimate.verdict if estimate else None),
-            "claim_verdict_holm": self._told_of_claim(self.adjusted_verdict),
+            "claim_verdict": self._claim_verdict(estimate.verdict if estimate else None),
+            "claim_verdict_holm": self._claim_verdict(self.adjusted_verdict),
             "seeds_for_power_80": self.seeds_needed,
             "no_plan": self.no_plan,
             "problem": self.problem,
         }
 
-    def _told_of_claim(self, verdict: Verdict | None) -> str | None:
+    def _claim_verdict(self, verdict: Verdict | None) -> str | None:
         if self.claim is not None and self.unaffected:
             return "unaffected"
         return self.on_claim(verdict)

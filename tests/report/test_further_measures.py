@@ -18,8 +18,8 @@ from swarm_logistics_env.studies.comparisons import NO_FAULT, OTHER_BEHAVIOUR, S
 from swarm_logistics_env.studies.fault_runs import anchoring_loads, fault_budgets
 from swarm_logistics_env.studies.mid_run_faults import Resilience, rate_curves, resiliences
 from swarm_logistics_env.studies.policy_comparison import (
-    cell_contests,
-    indicator_contests,
+    cells_against_baseline,
+    indicators_against_baseline,
     jackknife_interval,
 )
 from swarm_logistics_env.studies.results import StudyResults, judge
@@ -230,10 +230,11 @@ def two_policies(seeds: int, factor: float) -> StudyResults:
 
 def test_policies_are_set_against_the_first() -> None:
     found = two_policies(8, 2.0)
-    contests = {
-        (c.cell.policy, str(c.cell.arm.setting)): c for c in cell_contests(found)["Scalability"]
+    entries = {
+        (c.cell.policy, str(c.cell.arm.setting)): c
+        for c in cells_against_baseline(found)["Scalability"]
     }
-    first, second = contests["swarm-dt", "N = 10"], contests["random-walk", "N = 10"]
+    first, second = entries["swarm-dt", "N = 10"], entries["random-walk", "N = 10"]
     assert first.difference is None
     assert first.cell.performance.tolist() == [20, 22, 24, 26] * 2
     assert (first.interquartile_mean, first.worst_decile) == (23.0, 20.0)
@@ -243,9 +244,9 @@ def test_policies_are_set_against_the_first() -> None:
     assert second.improvement is not None
     assert second.improvement.value == 1.0
     # Twice the deliveries everywhere leaves every ratio as it was.
-    contest, *_ = indicator_contests(found)
-    assert contest.differences[0] is None
-    assert contest.differences[1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    one, *_ = indicators_against_baseline(found)
+    assert one.differences[0] is None
+    assert one.differences[1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     titles = {chapter.title for chapter in document(found).chapters}
     assert "Policies compared" in titles
     alone = judge(Study(sizes=[{"values": [5, 10]}]).plan(), {}, declared_seeds=20)
@@ -258,7 +259,7 @@ def test_nothing_is_a_multiple_of_no_deliveries() -> None:
     def play(policy: str, level: Setting, seed: int) -> Outcome:
         return Outcome("", np.arange(0.0 if policy == "swarm-dt" else 2.0 + seed), 500.0)
 
-    *_, last = cell_contests(judged(study, play))["Scalability"]
+    *_, last = cells_against_baseline(judged(study, play))["Scalability"]
     assert (last.cell.policy, last.ratio) == ("random-walk", None)
     assert last.difference is not None
 
@@ -266,8 +267,8 @@ def test_nothing_is_a_multiple_of_no_deliveries() -> None:
 def test_several_policies_over_one_seed_give_values_alone() -> None:
     text = markdown(document(two_policies(1, 2.0)))
     assert "## Policies compared" in text
-    contest, *_ = indicator_contests(two_policies(1, 2.0))
-    assert contest.differences[1] == (0.0, None, None)
+    one, *_ = indicators_against_baseline(two_policies(1, 2.0))
+    assert one.differences[1] == (0.0, None, None)
 
 
 def test_what_robots_are_worth() -> None:
