@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 from swarm_logistics_env.report.result_tables import NOTHING, Section
 from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.tasks.warehouse import Scenario
+from swarm_logistics_env.tasks.warehouse_task import Scenario
 
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:

@@ -27,7 +27,7 @@ from swarm_logistics_env.studies.specification import (
 )
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Scenario
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 

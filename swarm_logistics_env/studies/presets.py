@@ -11,7 +11,7 @@ from swarm_logistics_env.studies.specification import (
     Sizes,
     Specification,
 )
-from swarm_logistics_env.tasks.warehouse import Scenario
+from swarm_logistics_env.tasks.warehouse_task import Scenario
 
 # Every indicator once, in under a minute on two cores at 4 seeds.
 QUICK = Specification(

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Fault, Scenario
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Fault, Scenario
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label, policy_name
-from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Scenario
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario
 
 ScenarioFields = dict[str, Any]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.

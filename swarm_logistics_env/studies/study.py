@@ -23,7 +23,7 @@ from swarm_logistics_env.studies.shards import Shard
 from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.warehouse import WAREHOUSE
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 
 if TYPE_CHECKING:
     import pandas as pd

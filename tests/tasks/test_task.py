@@ -11,7 +11,7 @@ from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.tasks.task import Outcome, Playable
-from swarm_logistics_env.tasks.warehouse import WAREHOUSE, Scenario, WarehouseTask
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario, WarehouseTask
 
 
 class Foraging(WarehouseTask):

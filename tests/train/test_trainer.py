@@ -58,7 +58,7 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
 def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_call(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from swarm_logistics_env.tasks.warehouse import WarehouseTask
+    from swarm_logistics_env.tasks.warehouse_task import WarehouseTask
 
     training = small(scores=Scores(seeds=1, sizes=(2, 3), n_robots=3))
 
