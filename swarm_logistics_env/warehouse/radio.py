@@ -75,6 +75,8 @@ def run_timers(robots: Robots, able: Capabilities, parameters: Parameters, step:
         if is_present and able.radio_delay[robot] > 0:
             then = step - able.radio_delay[robot]
             told = robots.told_before[then % n_kept, robot] if then >= 0 else math.nan
+            # The limit may have fallen since it was told.
+            told = told if told < limit else math.nan
         robots.told[robot] = 0.0 if is_present and not able.honest[robot] else told
 
 

@@ -265,6 +265,16 @@ def test_a_delayed_radio_tells_and_sends_what_was_so_two_seconds_ago(build: Buil
     assert all(other == 0.5 for _, other in sent)
 
 
+def test_a_late_timer_that_a_lower_limit_silences_is_not_told(build: Build) -> None:
+    world = build([(7.9, 5.0), (6.0, 5.0)], [FAR], [Fault("radio_delayed", (0,))])
+    for step in range(40):
+        world.step([(1.0 if step < 3 else -1.0 if step < 10 else 0.0, 0.0, 0.0, 0.0), STAY])
+    assert world.state.robot_told[0] > 0.5
+    world.change(timer_limit=0.5)
+    world.step([STAY, STAY])
+    assert np.isnan(world.state.robot_told[0])
+
+
 def test_a_mode_may_delay_no_longer_than_is_kept() -> None:
     with pytest.raises(FaultError, match=r"radio_delay = 3\.0: should be 0 to 2\.0 s"):
         FailureMode("later still", radio_delay=3.0)
