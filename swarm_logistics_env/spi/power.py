@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 MAX_SEEDS = 1_000_000
 # A pilot's own spread is as often too small as too large, and power falls faster on the one side
 # than it rises on the other: planned with it, a promised 0.80 is 0.56 to 0.74 on average for pilots
-# of 3 to 10 seeds. With this upper confidence limit of the spread it is 0.79 to 0.82.
+# of 3 to 10 seeds. With this upper confidence limit it is 0.76 for 3 and 0.80 to 0.82 for 5 to 20.
 PLANNED_LIMIT = 0.6
 UNLUCKY_LIMIT = 0.9  # confidence limit of the spread that one pilot in ten exceeds
 # Beyond this critical t, as of two seeds at an early look, the statistic's normal part is lost
