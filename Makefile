@@ -45,7 +45,7 @@ tables: $(STUDY)/installed
 
 test: check
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
-	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p trust.interpreted --numprocesses=2 --cov --cov-append --cov-report= \
+	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --numprocesses=2 --cov --cov-append --cov-report= \
 		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends)"
 	$(DEV)/bin/python -m coverage report --fail-under=92
 
@@ -59,10 +59,10 @@ check: $(DEV)/installed
 	$(DEV)/bin/mypy
 
 soak: $(DEV)/installed
-	$(DEV)/bin/python -m trust.soak --minutes $(MINUTES)
+	$(DEV)/bin/python -m verification.soak --minutes $(MINUTES)
 
 mutants: $(DEV)/installed
-	$(DEV)/bin/python -m trust.mutants
+	$(DEV)/bin/python -m verification.mutants
 
 # Tests from a copy of the tree without the package, so that the one that is installed is tested.
 test-lowest test-newest: test-%: .venvs/%/wheel
@@ -111,9 +111,9 @@ $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
-.venvs/lowest.txt: pyproject.toml trust/lowest.py
+.venvs/lowest.txt: pyproject.toml verification/lowest.py
 	@mkdir -p $(@D)
-	$(PYTHON) trust/lowest.py study render > $@
+	$(PYTHON) verification/lowest.py study render > $@
 
 .venvs/lowest/wheel: BOUNDS := --constraint .venvs/lowest.txt
 .venvs/newest/wheel: BOUNDS := --upgrade --upgrade-strategy eager

@@ -1,6 +1,6 @@
 """A pytest plugin: kernels run by the interpreter, so that coverage sees their lines.
 
-    NUMBA_DISABLE_JIT=1 python -m pytest -p trust.interpreted tests/warehouse
+    NUMBA_DISABLE_JIT=1 python -m pytest -p verification.interpreted tests/warehouse
 
 What only compiled code can do, calling C by address and changing integers that threads share, is
 done by ctypes meanwhile.
@@ -105,7 +105,7 @@ def _replace(address: int, old: int, new: int) -> bool:
 def pytest_configure(config: pytest.Config) -> None:
     """Put the interpreter's own in the place of what is compiled."""
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
-        raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
+        raise pytest.UsageError("verification.interpreted needs NUMBA_DISABLE_JIT=1")
     for module in (building, engine):
         vars(module).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
     for module in (building, stepping):

@@ -1,10 +1,10 @@
-"""Recorded trajectories: a digest of every bit that a seed decides, one story per rule.
+"""Golden trajectories: recorded digests of every bit that a seed decides, one world per rule.
 
-    python -m trust.trajectories            # compare with the record
-    python -m trust.trajectories --record   # write the record anew: a change of behaviour
+    python -m verification.trajectories            # compare with the record
+    python -m verification.trajectories --record   # write the record anew: a change of behaviour
 
-The record holds the digests of the machine that first wrote it and, per other platform, those
-stories that differ there.
+The record holds the digests of the machine that first wrote it and, for each other platform, the
+trajectories that differ there. Its key "stories" is the former name of golden trajectories.
 """
 
 from __future__ import annotations
@@ -52,16 +52,16 @@ Digests = dict[str, str]  # step -> digests, one per group
 
 
 @dataclass(frozen=True)
-class Story:
-    """One world from its reset on.
+class GoldenTrajectory:
+    """The inputs that decide a trajectory whose digests are recorded.
 
     Attributes:
-        scenario: of the reset.
-        faults: of the reset.
-        steps: how many are played.
-        policy: who steers; every fifth command is replaced by a random one.
-        events: what is done to the world before a step.
-        seed: of layout, requests, robots that fail and commands.
+        scenario: the world is reset to it.
+        faults: they are scheduled at the reset.
+        steps: the number of steps to play.
+        policy: the name of the policy; every fifth of its commands is replaced by a random one.
+        events: step -> what is done to the world before that step.
+        seed: it decides layout, requests, the robots that fail, and the random commands.
     """
 
     scenario: Scenario
@@ -78,53 +78,57 @@ def small(**fields: Any) -> Scenario:
     return Scenario(**{**size, "delivery_width": 1.0, **fields})
 
 
-def _stories() -> dict[str, Story]:
-    stories = {
-        "preset paper": Story(Scenario.preset("paper"), steps=100),
-        "preset paper_scalability": Story(Scenario.preset("paper_scalability"), steps=50),
-        "preset dots": Story(Scenario.preset("dots"), steps=100),
-        "preset realistic": Story(Scenario.preset("realistic"), steps=100),
-        "seed 1": Story(small(), seed=1),
-        "long, past the rebuilding of bodies": Story(small(restock=True), steps=650),
-        "until all is delivered": Story(small(n_items=2, n_robots=8), steps=300),
-        "obstacles": Story(small(n_obstacles=4, obstacle_radius=0.2)),
-        "restock": Story(small(restock=True, n_items=3), steps=300),
-        "gossip": Story(small(relay="gossip", radio_range=1.0)),
-        "ranger noise": Story(small(ranger_noise=0.05)),
-        "position noise": Story(small(position_noise=0.05)),
-        "sensor dropout": Story(small(sensor_dropout=0.3)),
-        "radio loss": Story(small(radio_loss=0.5)),
-        "all noise": Story(
+def _golden() -> dict[str, GoldenTrajectory]:
+    golden = {
+        "preset paper": GoldenTrajectory(Scenario.preset("paper"), steps=100),
+        "preset paper_scalability": GoldenTrajectory(
+            Scenario.preset("paper_scalability"), steps=50
+        ),
+        "preset dots": GoldenTrajectory(Scenario.preset("dots"), steps=100),
+        "preset realistic": GoldenTrajectory(Scenario.preset("realistic"), steps=100),
+        "seed 1": GoldenTrajectory(small(), seed=1),
+        "long, past the rebuilding of bodies": GoldenTrajectory(small(restock=True), steps=650),
+        "until all is delivered": GoldenTrajectory(small(n_items=2, n_robots=8), steps=300),
+        "obstacles": GoldenTrajectory(small(n_obstacles=4, obstacle_radius=0.2)),
+        "restock": GoldenTrajectory(small(restock=True, n_items=3), steps=300),
+        "gossip": GoldenTrajectory(small(relay="gossip", radio_range=1.0)),
+        "ranger noise": GoldenTrajectory(small(ranger_noise=0.05)),
+        "position noise": GoldenTrajectory(small(position_noise=0.05)),
+        "sensor dropout": GoldenTrajectory(small(sensor_dropout=0.3)),
+        "radio loss": GoldenTrajectory(small(radio_loss=0.5)),
+        "all noise": GoldenTrajectory(
             small(ranger_noise=0.1, position_noise=0.1, sensor_dropout=0.1, radio_loss=0.1)
         ),
-        "messages": Story(small(message_size=3)),
-        "differential drive": Story(small(drive="differential")),
-        "mixed swarm": Story(small(speed_mix=(1.0, 0.5), sensing_mix=(1.0, 0.6, 0.3))),
-        "no memory": Story(small(memory_size=0)),
-        "long memory": Story(small(memory_size=5)),
-        "other periods": Story(small(control_period=0.2, physics_period=0.01, max_speed=1.0)),
-        "jam": Story(small(n_robots=30, n_items=1), steps=100),
-        "swarm-dt-follow": Story(small(), policy="swarm-dt-follow"),
-        "random-walk": Story(small(), policy="random-walk"),
-        "central": Story(small(), policy="central"),
+        "messages": GoldenTrajectory(small(message_size=3)),
+        "differential drive": GoldenTrajectory(small(drive="differential")),
+        "mixed swarm": GoldenTrajectory(small(speed_mix=(1.0, 0.5), sensing_mix=(1.0, 0.6, 0.3))),
+        "no memory": GoldenTrajectory(small(memory_size=0)),
+        "long memory": GoldenTrajectory(small(memory_size=5)),
+        "other periods": GoldenTrajectory(
+            small(control_period=0.2, physics_period=0.01, max_speed=1.0)
+        ),
+        "jam": GoldenTrajectory(small(n_robots=30, n_items=1), steps=100),
+        "swarm-dt-follow": GoldenTrajectory(small(), policy="swarm-dt-follow"),
+        "random-walk": GoldenTrajectory(small(), policy="random-walk"),
+        "central": GoldenTrajectory(small(), policy="central"),
     }
     for mode in FAILURE_MODES:
-        stories[f"{mode} from the start"] = Story(small(), (Fault(mode, 2),))
+        golden[f"{mode} from the start"] = GoldenTrajectory(small(), (Fault(mode, 2),))
         passing = None if mode == "removed" else 6.0
-        stories[f"{mode} for a while"] = Story(small(), (Fault(mode, 3, 5.0, passing),))
-    stories["several faults at once"] = Story(
+        golden[f"{mode} for a while"] = GoldenTrajectory(small(), (Fault(mode, 3, 5.0, passing),))
+    golden["several faults at once"] = GoldenTrajectory(
         small(),
         (Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)),
     )
-    stories["faults that come and go"] = Story(
+    golden["faults that come and go"] = GoldenTrajectory(
         small(),
         (
             Fault("motor_wear", 2, intermittent=(2.0, 1.0)),
             Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
         ),
     )
-    stories["without drift"] = Story(small(heading_drift=0.0))
-    stories["changes during the run"] = Story(
+    golden["without drift"] = GoldenTrajectory(small(heading_drift=0.0))
+    golden["changes during the run"] = GoldenTrajectory(
         small(delivery_width=0.5),
         events={
             50: lambda world: world.change(delivery_width=1.5, max_speed=1.0),
@@ -132,7 +136,7 @@ def _stories() -> dict[str, Story]:
             150: lambda world: world.change(drive="differential", view_range=0.4, restock=True),
         },
     )
-    stories["faults set during the run"] = Story(
+    golden["faults set during the run"] = GoldenTrajectory(
         small(),
         events={
             40: lambda world: world.set_faults([Fault("dead", 2)]),
@@ -140,26 +144,27 @@ def _stories() -> dict[str, Story]:
             120: lambda world: world.set_faults([]),
         },
     )
-    return stories
+    return golden
 
 
-STORIES = _stories()
+GOLDEN = _golden()
 
 
-def moments(story: Story, *, copied_at: int | None = None) -> Iterator[Warehouse]:
+def moments(golden: GoldenTrajectory, *, copied_at: int | None = None) -> Iterator[Warehouse]:
     """Yield the world after the reset and after every step.
 
     Args:
         copied_at: before this step world and policy are replaced by copies.
     """
-    world, policy = Warehouse(story.scenario), policies.load(story.policy)
-    observations = world.reset(story.seed, story.faults)
-    start(policy, story.scenario, story.seed)
-    numbers = np.random.Philox(key=key(story.seed, "commands of a story"))
+    world, policy = Warehouse(golden.scenario), policies.load(golden.policy)
+    observations = world.reset(golden.seed, golden.faults)
+    start(policy, golden.scenario, golden.seed)
+    # The former name of golden trajectories decides what is drawn.
+    numbers = np.random.Philox(key=key(golden.seed, "commands of a story"))
     yield world
-    for step in range(story.steps):
-        if step in story.events:
-            story.events[step](world)
+    for step in range(golden.steps):
+        if step in golden.events:
+            golden.events[step](world)
         if step == copied_at:
             world, policy = copy.deepcopy((world, policy))
         commands = np.array(decide(policy, observations, world.state))
@@ -172,16 +177,16 @@ def moments(story: Story, *, copied_at: int | None = None) -> Iterator[Warehouse
         yield world
 
 
-def digests(story: Story, *, copied_at: int | None = None) -> Digests:
+def digests(golden: GoldenTrajectory, *, copied_at: int | None = None) -> Digests:
     """Return the digests of all that was up to each noted step: observations, then `GROUPS`."""
     running = {name: hashlib.blake2b(digest_size=5) for name in ("observations", *GROUPS)}
     noted: Digests = {}
-    for step, world in enumerate(moments(story, copied_at=copied_at)):
+    for step, world in enumerate(moments(golden, copied_at=copied_at)):
         running["observations"].update(_bytes(world.observe()))
         for group, names in GROUPS.items():
             for name in names:
                 running[group].update(_bytes(getattr(world.state, name)))
-        if step in NOTED or step == story.steps:
+        if step in NOTED or step == golden.steps:
             noted[str(step)] = " ".join(digest.hexdigest() for digest in running.values())
     return noted
 
@@ -215,14 +220,14 @@ def read_record() -> dict[str, Any]:
 
 
 def expected(record: dict[str, Any], name: str) -> Digests:
-    """Return the recorded digests of a story on this platform."""
+    """Return the recorded digests of a golden trajectory on this platform."""
     differs = record["differs"].get(platform_name(), {})
     found: Digests = differs.get(name, record["stories"][name])
     return found
 
 
 def parting(recorded: Digests, played: Digests) -> str | None:
-    """Return in words where two trajectories part; None: nowhere."""
+    """Return in words where two trajectories part, or None if they are equal."""
     if list(recorded) != list(played):
         return f"noted after the steps {', '.join(recorded)} then, {', '.join(played)} now"
     before = "before the reset was over"
@@ -235,11 +240,11 @@ def parting(recorded: Digests, played: Digests) -> str | None:
 
 
 def differences(names: Iterable[str] | None = None) -> dict[str, str]:
-    """Return the stories that this machine does not play as recorded, and where they part."""
+    """Return the golden trajectories that this machine plays differently, and where they part."""
     record = read_record()
     found = {}
-    for name in names or STORIES:
-        words = parting(expected(record, name), digests(STORIES[name]))
+    for name in names or GOLDEN:
+        words = parting(expected(record, name), digests(GOLDEN[name]))
         if words:
             found[name] = words
     return found
@@ -252,12 +257,12 @@ def explained(found: dict[str, str]) -> str:
              for what in now if recorded.get(what) != now[what]]  # fmt: skip
     why = "; ".join(other) or "the same platform and versions, so the code has changed it"
     lines = [f"{name}: {words}" for name, words in found.items()]
-    return "\n".join([f"{len(found)} stories are not as recorded ({why})", *lines])
+    return "\n".join([f"{len(found)} golden trajectories are not as recorded ({why})", *lines])
 
 
 def record() -> None:
     """Write the record: all of it on its own platform, elsewhere what differs there."""
-    played = {name: digests(story) for name, story in STORIES.items()}
+    played = {name: digests(golden) for name, golden in GOLDEN.items()}
     stored: dict[str, Any] = {"recorded_on": here(), "stories": {}, "differs": {}}
     if RECORD.exists():
         stored = read_record()
@@ -275,10 +280,10 @@ def main() -> int:
     parser.add_argument("--record", action="store_true", help="write the record anew")
     if parser.parse_args().record:
         record()
-        print(f"{len(STORIES)} stories written to {RECORD.name}")
+        print(f"{len(GOLDEN)} golden trajectories written to {RECORD.name}")
         return 0
     found = differences()
-    print(explained(found) if found else f"all {len(STORIES)} stories are as recorded")
+    print(explained(found) if found else f"all {len(GOLDEN)} golden trajectories are as recorded")
     return 1 if found else 0
 
 

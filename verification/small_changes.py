@@ -1,7 +1,7 @@
 """Small changes at random, made by cosmic-ray in a scratch copy, and those that no test catches.
 
     python -m pip install cosmic-ray
-    python -m trust.small_changes logistics --sample 90 --seed 0
+    python -m verification.small_changes logistics --sample 90 --seed 0
 
 Every change stands alone; how many there are, how many are caught, and each survivor are printed.
 """
@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from trust.mutants import scratch_copy
+from verification.mutants import scratch_copy
 
 CPU_SECONDS = 120  # a change that never ends is caught
 
@@ -69,7 +69,7 @@ def changes(copy: Path, target: Target) -> list[tuple[Path, str, int]]:
 
 def is_caught(copy: Path, target: Target) -> bool:
     """Return whether a test fails on the copy as it stands."""
-    plugin = ["-p", "trust.interpreted"] if target.is_interpreted else []
+    plugin = ["-p", "verification.interpreted"] if target.is_interpreted else []
     paths = [str(copy), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
     if target.is_interpreted:

@@ -1,6 +1,6 @@
 """Swarms driven to one point, to a wall and into a corner for 40 s: how deep bodies overlap.
 
-python -m trust.jams 5      # with the seeds 0 to 4
+python -m verification.jams 5      # with the seeds 0 to 4
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario, Warehouse
-from trust.invariants import JAM, SUSTAINED
+from verification.invariants import JAM, SUSTAINED
 
 SIZES = (25, 150)
 SECONDS = 40.0

@@ -1,6 +1,6 @@
 """The oldest versions that pyproject.toml allows, as constraints for pip.
 
-    python trust/lowest.py study render > constraints.txt
+    python verification/lowest.py study render > constraints.txt
 
 Of the dependencies of the package and of the extras that are named.
 """

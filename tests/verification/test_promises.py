@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-import trust
+import verification
 
-ROOT = Path(trust.__file__).parents[1]
+ROOT = Path(verification.__file__).parents[1]
 PAGE = ROOT / "docs" / "promises.md"
 NAMED = sorted(set(re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", PAGE.read_text(encoding="utf-8"))))
 

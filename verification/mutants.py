@@ -1,7 +1,7 @@
 """Ten faults made on purpose, one at a time in a scratch copy, and the tests that catch each.
 
-python -m trust.mutants             # all of them; ends with 1 if one survives
-python -m trust.mutants "FM2"       # those whose name holds this
+python -m verification.mutants             # all of them; ends with 1 if one survives
+python -m verification.mutants "FM2"       # those whose name holds this
 """
 
 from __future__ import annotations
@@ -57,14 +57,14 @@ MUTANTS = (
         LOGISTICS,
         " and able.lifts[robot]",
         "",
-        (WAREHOUSE, "tests/trust/test_invariants.py", "tests/testing"),
+        (WAREHOUSE, "tests/verification/test_invariants.py", "tests/testing"),
     ),
     Mutant(
         "timers never expire",
         "swarm_logistics_env/warehouse/radio.py",
         "timer = elapsed if elapsed < limit else timer",
         "timer = elapsed",
-        (WAREHOUSE, "tests/trust/test_invariants.py"),
+        (WAREHOUSE, "tests/verification/test_invariants.py"),
     ),
     Mutant(
         "drop inside the delivery area",
@@ -85,14 +85,14 @@ MUTANTS = (
         LOGISTICS,
         "if np.all(items.status == DELIVERED):",
         "if np.sum(items.status == DELIVERED) >= len(items.status) - 1:",
-        (WAREHOUSE, "tests/trust/test_invariants.py"),
+        (WAREHOUSE, "tests/verification/test_invariants.py"),
     ),
     Mutant(
         "item duplicated on drop",
         LOGISTICS,
         "        robots.item[robot] = NOBODY\n        items.status[item] = STORED",
         "        items.status[item] = STORED",
-        (WAREHOUSE, "tests/trust/test_invariants.py", "tests/testing"),
+        (WAREHOUSE, "tests/verification/test_invariants.py", "tests/testing"),
     ),
     Mutant(
         "wrong robot removed in P_S",
@@ -107,7 +107,7 @@ MUTANTS = (
         "swarm_logistics_env/warehouse/engine.py",
         "(_ROBOT | _SOLID | _ITEM) << _MASK",
         "(_ROBOT | _SOLID) << _MASK",
-        (WAREHOUSE, "tests/trust/test_invariants.py"),
+        (WAREHOUSE, "tests/verification/test_invariants.py"),
     ),
 )
 

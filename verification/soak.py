@@ -1,7 +1,7 @@
 """Random worlds for as long as one likes, every invariant checked at every step.
 
-    python -m trust.soak --minutes 10
-    python -m trust.soak --first 4711 --worlds 1    # that world again
+    python -m verification.soak --minutes 10
+    python -m verification.soak --first 4711 --worlds 1    # that world again
 
 Ends with 1 at the first broken promise, naming the world that shows it.
 """
@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.policies.policy import decide, start
-from trust.invariants import BrokenPromiseError, Watch
-from trust.jams import SIZES, TARGETS, overlaps
-from trust.scenarios import drawn_change, drawn_faults, some_scenario
+from verification.invariants import BrokenPromiseError, Watch
+from verification.jams import SIZES, TARGETS, overlaps
+from verification.scenarios import drawn_change, drawn_faults, some_scenario
 
 Steer = Callable[[Warehouse, NDArray[np.float32]], NDArray[np.float64]]
 
@@ -158,7 +158,9 @@ def main() -> int:
         try:
             play(random.Random(number), asked.steps, tally)
         except BrokenPromiseError as error:
-            print(f"world {number}: {error} (python -m trust.soak --first {number} --worlds 1)")
+            print(
+                f"world {number}: {error} (python -m verification.soak --first {number} --worlds 1)"
+            )
             return 1
         if time.monotonic() - said > 60.0:
             said = time.monotonic()

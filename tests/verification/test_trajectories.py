@@ -1,4 +1,4 @@
-"""The recorded trajectories: here, in threads, in another process, and carried on by copies."""
+"""Golden trajectories are reproduced here, in threads, in another process and by copies."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from trust import trajectories
-from trust.trajectories import STORIES, digests, expected, explained, parting, read_record
+from verification import trajectories
+from verification.trajectories import GOLDEN, digests, expected, explained, parting, read_record
 
 ROOT = Path(trajectories.__file__).parents[1]
 RECORD = read_record()
@@ -21,25 +21,27 @@ def complain(found: dict[str, str]) -> None:
         pytest.fail(explained(found), pytrace=False)
 
 
-def test_the_record_holds_every_story() -> None:
-    assert list(RECORD["stories"]) == list(STORIES), "run `python -m trust.trajectories --record`"
-    for name in STORIES:
+def test_the_record_holds_every_golden_trajectory() -> None:
+    assert list(RECORD["stories"]) == list(GOLDEN), (
+        "run `python -m verification.trajectories --record`"
+    )
+    for name in GOLDEN:
         assert expected(RECORD, name).keys() == RECORD["stories"][name].keys()
 
 
-def test_every_story_is_as_recorded_also_beside_others_in_threads() -> None:
+def test_every_golden_trajectory_is_as_recorded_also_beside_others_in_threads() -> None:
     # Four worlds at any time, in no order that anybody chose.
     with ThreadPoolExecutor(4) as pool:
-        played = dict(zip(STORIES, pool.map(digests, STORIES.values()), strict=True))
-    partings = {name: parting(expected(RECORD, name), played[name]) for name in STORIES}
+        played = dict(zip(GOLDEN, pool.map(digests, GOLDEN.values()), strict=True))
+    partings = {name: parting(expected(RECORD, name), played[name]) for name in GOLDEN}
     complain({name: words for name, words in partings.items() if words})
 
 
-def test_every_story_is_as_recorded_when_a_copy_goes_on() -> None:
+def test_every_golden_trajectory_is_as_recorded_when_a_copy_goes_on() -> None:
     found = {}
-    for name, story in STORIES.items():
-        half = max(story.steps // 2, 1)
-        words = parting(expected(RECORD, name), digests(story, copied_at=half))
+    for name, golden in GOLDEN.items():
+        half = max(golden.steps // 2, 1)
+        words = parting(expected(RECORD, name), digests(golden, copied_at=half))
         if words:
             found[name] = words
     complain(found)
@@ -47,14 +49,14 @@ def test_every_story_is_as_recorded_when_a_copy_goes_on() -> None:
 
 def test_another_process_plays_them_as_recorded() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "trust.trajectories"],
+        [sys.executable, "-m", "verification.trajectories"],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout == f"all {len(STORIES)} stories are as recorded\n"
+    assert done.stdout == f"all {len(GOLDEN)} golden trajectories are as recorded\n"
 
 
 def test_a_difference_is_told_with_its_step_and_its_platform(

@@ -13,17 +13,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import trust
+import verification
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.scenario import LONGEST_STRIDE
 from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED
-from trust.invariants import BrokenPromiseError, Watch
-from trust.soak import Tally, play
+from verification.invariants import BrokenPromiseError, Watch
+from verification.soak import Tally, play
 
-ROOT = Path(trust.__file__).parents[1]
+ROOT = Path(verification.__file__).parents[1]
 
 
-# A world is its number: `python -m trust.soak --first NUMBER --worlds 1 --steps 80` plays it again.
+# `python -m verification.soak --first NUMBER --worlds 1 --steps 80` plays a world again.
 @given(number=st.integers(0, 2**32))
 @settings(max_examples=max(40, settings().max_examples // 4))
 def test_no_random_world_breaks_a_promise(number: int) -> None:
@@ -31,7 +31,7 @@ def test_no_random_world_breaks_a_promise(number: int) -> None:
 
 
 def test_the_soak_says_how_far_it_went() -> None:
-    command = [sys.executable, "-m", "trust.soak", "--worlds", "12", "--steps", "50"]
+    command = [sys.executable, "-m", "verification.soak", "--worlds", "12", "--steps", "50"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     last = done.stdout.splitlines()[-1]  # a slow machine tells of every minute before
@@ -211,7 +211,7 @@ def test_the_watch_sees(spoil: Spoil, words: str) -> None:
 MEMORY = """
 import numpy as np
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from trust.soak import peak_memory
+from verification.soak import peak_memory
 
 world = Warehouse(Scenario(n_robots=6, n_items=8, warehouse_width=4, warehouse_height=3,
                            delivery_width=1, restock=True, message_size=2))

@@ -1,4 +1,4 @@
-"""The mutants of trust.mutants still fit the code; `make mutants` runs the tests on them."""
+"""The mutants of verification.mutants still fit the code; `make mutants` runs the tests on them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from trust.mutants import MUTANTS, ROOT, Mutant
+from verification.mutants import MUTANTS, ROOT, Mutant
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
