@@ -1,11 +1,12 @@
 """Ten faults made on purpose, one at a time in a scratch copy, and the tests that catch each.
 
 python -m verification.mutants             # all of them; ends with 1 if one survives
-python -m verification.mutants "FM2"       # those whose name holds this
+python -m verification.mutants "FM2"       # those whose names hold this
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+PACKAGE = "swarm_logistics_env"
 WORKERS = 2  # test runs at once
 LEFT_OUT = shutil.ignore_patterns(
     ".git", ".venv*", "results", "build", "dist", "*.egg-info", "__pycache__", ".*_cache",
@@ -27,87 +29,106 @@ LEFT_OUT = shutil.ignore_patterns(
 
 @dataclass(frozen=True)
 class Mutant:
-    """A fault: `old` in `file` becomes `new`; `tests` are those that stand nearest to it."""
+    """A fault: one node of a syntax tree becomes another.
+
+    Attributes:
+        name: what is wrong with the mutant.
+        file: the module, in the package.
+        where: the function, method (`Class.method`) or constant that holds the node.
+        node: the expression or statement, as Python source; its layout does not matter.
+        becomes: what replaces it, as Python source; an expression replaces an expression.
+        tests: those that stand nearest to the fault, for pytest.
+    """
 
     name: str
     file: str
-    old: str
-    new: str
+    where: str
+    node: str
+    becomes: str
     tests: tuple[str, ...]
 
 
-WAREHOUSE, LOGISTICS = "tests/warehouse", "swarm_logistics_env/warehouse/logistics.py"
+WAREHOUSE, INVARIANTS = "tests/warehouse", "tests/verification/test_invariants.py"
 MUTANTS = (
     Mutant(
         "sign of R",
-        "swarm_logistics_env/spi/indicators.py",
-        '"p_f": (p_f, 1.0, 0.0),\n            "p_o": (p_o, -1.0, 1.0),',
-        '"p_f": (p_f, -1.0, 0.0),\n            "p_o": (p_o, 1.0, 1.0),',
+        "spi/indicators.py",
+        "robustness",
+        '{"p_f": (p_f, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)}',
+        '{"p_f": (p_f, -1.0, 0.0), "p_o": (p_o, 1.0, 1.0)}',
         ("tests/spi",),
     ),
     Mutant(
         "m/N dropped from R",
-        "swarm_logistics_env/spi/indicators.py",
-        "offset=faulty / robots",
-        "offset=0.0",
+        "spi/indicators.py",
+        "robustness",
+        "faulty / robots",
+        "0.0",
         ("tests/spi",),
     ),
     Mutant(
         "FM2 ignored",
-        LOGISTICS,
-        " and able.lifts[robot]",
-        "",
-        (WAREHOUSE, "tests/verification/test_invariants.py", "tests/testing"),
+        "warehouse/logistics.py",
+        "close_grippers",
+        "robots.present[robot] and able.obeys[robot] and able.lifts[robot]",
+        "robots.present[robot] and able.obeys[robot]",
+        (WAREHOUSE, INVARIANTS, "tests/testing"),
     ),
     Mutant(
         "timers never expire",
-        "swarm_logistics_env/warehouse/radio.py",
-        "timer = elapsed if elapsed < limit else timer",
-        "timer = elapsed",
-        (WAREHOUSE, "tests/verification/test_invariants.py"),
+        "warehouse/radio.py",
+        "run_timers",
+        "elapsed if elapsed < limit else timer",
+        "elapsed",
+        (WAREHOUSE, INVARIANTS),
     ),
     Mutant(
         "drop inside the delivery area",
-        LOGISTICS,
-        "if robots.in_delivery[robot] and item != requested:",
-        "if False:",
+        "warehouse/logistics.py",
+        "open_grippers",
+        "robots.in_delivery[robot] and item != requested",
+        "False",
         (WAREHOUSE,),
     ),
     Mutant(
         "unpaired seeds",
-        "swarm_logistics_env/studies/plan.py",
-        "yield condition.run(self.code, seed)",
-        "yield condition.run(self.code, seed + 100 * self.conditions.index(condition))",
+        "studies/plan.py",
+        "Plan.runs",
+        "condition.run(self.code, seed)",
+        "condition.run(self.code, seed + 100 * self.conditions.index(condition))",
         ("tests/studies/test_plan.py", "tests/studies/test_study.py"),
     ),
     Mutant(
         "off by one in the last request",
-        LOGISTICS,
-        "if np.all(items.status == DELIVERED):",
-        "if np.sum(items.status == DELIVERED) >= len(items.status) - 1:",
-        (WAREHOUSE, "tests/verification/test_invariants.py"),
+        "warehouse/logistics.py",
+        "ask_for_next",
+        "np.all(items.status == DELIVERED)",
+        "np.sum(items.status == DELIVERED) >= len(items.status) - 1",
+        (WAREHOUSE, INVARIANTS),
     ),
     Mutant(
         "item duplicated on drop",
-        LOGISTICS,
-        "        robots.item[robot] = NOBODY\n        items.status[item] = STORED",
-        "        items.status[item] = STORED",
-        (WAREHOUSE, "tests/verification/test_invariants.py", "tests/testing"),
+        "warehouse/logistics.py",
+        "open_grippers",
+        "robots.item[robot] = NOBODY",
+        "pass",
+        (WAREHOUSE, INVARIANTS, "tests/testing"),
     ),
     Mutant(
         "wrong robot removed in P_S",
-        "swarm_logistics_env/warehouse/faults.py",
-        "return np.sort(order[: fault.robots]).astype(np.int64)",
-        'order = order[::-1] if fault.mode == "removed" else order\n'
-        "    return np.sort(order[: fault.robots]).astype(np.int64)",
+        "warehouse/faults.py",
+        "failed_robots",
+        "order[: fault.robots]",
+        '(order[::-1] if fault.mode == "removed" else order)[: fault.robots]',
         (WAREHOUSE, "tests/studies/test_plan.py"),
     ),
     Mutant(
         "laden robots drive through items",
-        "swarm_logistics_env/warehouse/engine.py",
-        "(_ROBOT | _SOLID | _ITEM) << _MASK",
-        "(_ROBOT | _SOLID) << _MASK",
-        (WAREHOUSE, "tests/verification/test_invariants.py"),
+        "warehouse/engine.py",
+        "LADEN_ROBOT",
+        "_ROBOT | _SOLID | _ITEM",
+        "_ROBOT | _SOLID",
+        (WAREHOUSE, INVARIANTS),
     ),
 )
 
@@ -121,23 +142,67 @@ def scratch_copy() -> Iterator[Path]:
         yield copy
 
 
-def apply(mutant: Mutant, copy: Path) -> None:
-    """Make the fault.
+def mutated(mutant: Mutant, source: str) -> str:
+    """Return the source of `mutant.file` with the fault in it, without comments.
 
     Raises:
-        ValueError: the code is not what the mutant was written for.
+        MutantError: the code no longer has the place that the mutant was written for.
     """
-    path = copy / mutant.file
-    source = path.read_text(encoding="utf-8")
-    if source.count(mutant.old) != 1:
-        raise ValueError(f"{mutant.name}: {mutant.file} holds {mutant.old!r} not once")
-    path.write_text(source.replace(mutant.old, mutant.new), encoding="utf-8")
+    tree = ast.parse(source)
+    place = _definition(tree, mutant)
+    wanted, new = ast.dump(_node(mutant.node)), _node(mutant.becomes)
+    found = [node for node in ast.walk(place) if ast.dump(node) == wanted]
+    if len(found) != 1:
+        raise MutantError(
+            f"{mutant.name}: {mutant.node!r} is {len(found)} times in `{mutant.where}` of "
+            f"{mutant.file}: should be there once, so adapt the mutant to the code"
+        )
+    _Replace(found[0], new).visit(place)
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+class MutantError(ValueError):
+    """A mutant whose place in the code is gone."""
+
+
+class _Replace(ast.NodeTransformer):
+    def __init__(self, old: ast.AST, new: ast.AST) -> None:
+        self._old, self._new = old, new
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        return self._new if node is self._old else super().visit(node)
+
+
+def _node(source: str) -> ast.AST:
+    (statement,) = ast.parse(source).body
+    return statement.value if isinstance(statement, ast.Expr) else statement
+
+
+def _definition(tree: ast.Module, mutant: Mutant) -> ast.AST:
+    place: ast.Module | ast.ClassDef = tree
+    for name in mutant.where.split("."):
+        found = [node for node in place.body if name in _names(node)]
+        if len(found) != 1:
+            raise MutantError(
+                f"{mutant.name}: {mutant.file} defines `{mutant.where}` {len(found)} times: "
+                "should be once, so adapt the mutant to the code"
+            )
+        place = found[0]  # type: ignore[assignment]  # a name that is no class ends the path
+    return place
+
+
+def _names(node: ast.stmt) -> list[str]:
+    """Return the names that a statement defines."""
+    if isinstance(node, ast.Assign):
+        return [target.id for target in node.targets if isinstance(target, ast.Name)]
+    return [node.name] if isinstance(node, ast.FunctionDef | ast.ClassDef) else []
 
 
 def caught_by(mutant: Mutant) -> list[str]:
     """Return the tests that fail on the mutant, as pytest names them."""
     with scratch_copy() as copy:
-        apply(mutant, copy)
+        file = copy / PACKAGE / mutant.file
+        file.write_text(mutated(mutant, file.read_text(encoding="utf-8")), encoding="utf-8")
         environment = {
             **os.environ,
             "NUMBA_CACHE_DIR": str(copy / "numba"),
@@ -156,7 +221,7 @@ def caught_by(mutant: Mutant) -> list[str]:
 
 
 def main() -> int:
-    """Make every mutant, print what caught it."""
+    """Make every mutant and print the tests that catch it."""
     wanted = sys.argv[1] if len(sys.argv) > 1 else ""
     chosen = [mutant for mutant in MUTANTS if wanted in mutant.name]
     survivors = 0

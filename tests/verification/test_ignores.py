@@ -7,7 +7,7 @@ import re
 from verification.mutants import ROOT
 
 IGNORED = re.compile(r"# (type: ignore\[[a-z, -]+\]|noqa: [A-Z0-9, ]+)(?P<reason> *(#|-) \w.*)?$")
-FOLDERS = ("swarm_logistics_env", "trust", "benchmarks", "interop", "examples")
+FOLDERS = ("swarm_logistics_env", "verification", "benchmarks", "interop", "examples")
 
 
 def test_every_ignore_in_the_package_has_a_reason() -> None:
