@@ -169,17 +169,6 @@ class Scenario(Record):
         """Physics steps in a control step."""
         return round(self.control_period / self.physics_period)
 
-    @classmethod
-    def from_json(cls, text: str | bytes) -> Self:
-        """Return the record that `to_json` wrote; before there was a `heading_drift` it was 0.
-
-        Raises:
-            ScenarioError: `text` is not JSON or is not such a record.
-        """
-        scenario = super().from_json(text)
-        is_older = cls.model_fields.keys() - scenario.model_fields_set == {"heading_drift"}
-        return scenario.replace(heading_drift=0.0) if is_older else scenario
-
     @property
     def is_gossip(self) -> bool:
         """Whether robots tell on what they heard."""

@@ -102,8 +102,12 @@ def _replace(address: int, old: int, new: int) -> bool:
     return is_there
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Put the interpreter's own in the place of what is compiled."""
+def interpret_kernels() -> None:
+    """Replace what only compiled code can do by functions of the interpreter.
+
+    Raises:
+        pytest.UsageError: kernels are compiled all the same, as NUMBA_DISABLE_JIT is not 1.
+    """
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise pytest.UsageError("verification.interpreted needs NUMBA_DISABLE_JIT=1")
     for module in (building, engine):
@@ -115,6 +119,11 @@ def pytest_configure(config: pytest.Config) -> None:
     vars(thread_pool).update(
         load=_load, exchange=_exchange, add=_add, replace=_replace, _PATIENCE=40
     )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Run kernels by the interpreter in all tests."""
+    interpret_kernels()
     # Streams count modulo 2**64, and kernels divide as IEEE 754 says.
     for what in ("overflow", "divide by zero"):
         config.addinivalue_line("filterwarnings", f"ignore:{what} encountered:RuntimeWarning")
