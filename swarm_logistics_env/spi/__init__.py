@@ -23,7 +23,7 @@ from .power import (
 from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
-from .sequential import LookVerdict, look_levels, verdict_at_look
+from .sequential import LookVerdict, look_alphas, verdict_at_look
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -56,7 +56,7 @@ __all__ = [
     "interquartile_mean",
     "kaplan_meier",
     "karp_flatt",
-    "look_levels",
+    "look_alphas",
     "lower_decile_of_power",
     "marginal_gain",
     "mean_interval",
