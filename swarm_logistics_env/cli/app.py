@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from swarm_logistics_env.cli import judging  # noqa: F401 - adds its commands to `study`
 from swarm_logistics_env.cli.application import Application
+from swarm_logistics_env.cli.judging import judge_command
 from swarm_logistics_env.cli.options import (
     FaultOption,
     PresetOption,
@@ -28,6 +28,7 @@ app = Application(
 )
 app.add_typer(study)
 app.command("train")(train_command)
+app.command("judge")(judge_command)
 
 
 def _print_version(wanted: bool) -> None:

@@ -34,6 +34,7 @@ from .summaries import (
     worst_decile,
 )
 from .survival import SurvivalCurve, kaplan_meier
+from .trials import Trial, Trials, read_trials
 
 __all__ = [
     "Estimate",
@@ -44,6 +45,8 @@ __all__ = [
     "ScalingFit",
     "SelfRepair",
     "SurvivalCurve",
+    "Trial",
+    "Trials",
     "Verdict",
     "adaptability",
     "adjust",
@@ -66,6 +69,7 @@ __all__ = [
     "per_robot_efficiency",
     "prediction_interval",
     "probability_of_improvement",
+    "read_trials",
     "relative_change",
     "repair_times",
     "resilience_index",

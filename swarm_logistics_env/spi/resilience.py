@@ -24,6 +24,7 @@ def resilience_index(
     onset: float,
     threshold: float = 1.0,
     confidence: float = 0.95,
+    paired: bool = True,
 ) -> Estimate:
     """Deliveries after the onset over the paired reference's, as a ratio of means over seeds.
 
@@ -36,6 +37,7 @@ def resilience_index(
         onset: When the faults begin [s]; later deliveries count.
         threshold: What the index is tested against.
         confidence: Of the interval, in (0, 1).
+        paired: Whether both share their seeds, run by run.
 
     Raises:
         IndicatorError: No seeds, unequal numbers of seeds, a time negative or not finite, or no
@@ -56,5 +58,5 @@ def resilience_index(
         offset=0.0,
         threshold=threshold,
         confidence=confidence,
-        paired=True,
+        paired=paired,
     )

@@ -242,12 +242,14 @@ class StudyResults:
         """Return an arm's outcomes by seed; None where one failed, is missing or has no times."""
         runs = (arm.condition.run(self.plan.code, seed) for seed in self.plan.seeds)
         found = [self.outcomes.get(run.key) for run in runs]
+        if not self.plan.paired:  # such results need not be equally many everywhere
+            found = [outcome for outcome in found if outcome is not None]
         complete = tuple(
             outcome
             for outcome in found
             if outcome is not None and outcome.error is None and outcome.untimed is None
         )
-        return complete if len(complete) == len(found) else None
+        return complete if complete and len(complete) == len(found) else None
 
     def times_of(self, arm: Arm) -> Times | None:
         """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""
