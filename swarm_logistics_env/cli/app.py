@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from swarm_logistics_env.cli import judging  # noqa: F401 - adds its commands to `study`
 from swarm_logistics_env.cli.application import Application
 from swarm_logistics_env.cli.film_command import film_command
+from swarm_logistics_env.cli.judging import judge_command
 from swarm_logistics_env.cli.options import (
     FaultOption,
     PolicyOption,
@@ -34,6 +34,7 @@ app.add_typer(study)
 app.command("train")(train_command)
 app.command("film")(film_command)
 app.command("watch")(watch_command)
+app.command("judge")(judge_command)
 
 
 def _print_version(wanted: bool) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from swarm_logistics_env.report.document import Document
     from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.engines import Engine
@@ -104,7 +105,7 @@ def run_command(
         typer.echo(f"{warning}\n")
     tally = _run(chosen, player, part)
     if part is None:
-        _show(chosen)
+        show_study(chosen)
     else:
         typer.echo(
             f"When all {part.count} shards are done: swarm-logistics study merge "
@@ -127,7 +128,7 @@ def report_command(
 
     stored = Study.stored(directory)
     typer.echo(f"{stored.plan()}\n")
-    _show(stored)
+    show_study(stored)
 
 
 @study.command("export")
@@ -142,23 +143,6 @@ def export_command(
     with Store.existing(directory) as store:
         count, digest = export(store, to)
     typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
-
-
-@study.command("import")
-def import_command(
-    file: Annotated[Path, typer.Argument(help="CSV file, one run a row.")],
-    out: Annotated[Path, typer.Option(help="Directory of the study made of it.")],
-) -> None:
-    """Judge results from elsewhere, e.g. a paper's tables.
-
-    Columns: kind (size, fault, parameter), name, value, delivered; n_robots for faults; policy and
-    seed where known. Without seeds the study is unpaired.
-    """
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.importing import import_results
-
-    typer.echo(f"{import_results(file, out)} runs in {out}\n")
-    _show(Study.stored(out))
 
 
 @study.command("merge")
@@ -244,7 +228,8 @@ def _in_one_line(tally: Tally, players: str) -> str:
     )
 
 
-def _show(asked: Study) -> None:
+def show_study(asked: Study, *, write: bool = True) -> Document:
+    """Print a study's report, and write it into the study's directory; return all of it."""
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.report_files import (
@@ -257,8 +242,10 @@ def _show(asked: Study) -> None:
     whole = document(results)
     for section in whole.summary:
         show(section)
-    assert asked.out is not None
-    written = write_report(results, asked.out, whole)
-    typer.echo(f"Written: {', '.join(str(path) for path in written)}")
-    if missing := missing_packages():
-        typer.echo(how_to_get_figures(missing))
+    if write:
+        assert asked.out is not None
+        written = write_report(results, asked.out, whole)
+        typer.echo(f"Written: {', '.join(str(path) for path in written)}")
+        if missing := missing_packages():
+            typer.echo(how_to_get_figures(missing))
+    return whole

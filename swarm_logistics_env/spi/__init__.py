@@ -23,7 +23,7 @@ from .power import (
 from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
-from .sequential import LookVerdict, look_levels, verdict_at_look
+from .sequential import LookVerdict, look_alphas, verdict_at_look
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -34,6 +34,7 @@ from .summaries import (
     worst_decile,
 )
 from .survival import SurvivalCurve, kaplan_meier
+from .trials import Trial, Trials, read_trials
 
 __all__ = [
     "Estimate",
@@ -44,6 +45,8 @@ __all__ = [
     "ScalingFit",
     "SelfRepair",
     "SurvivalCurve",
+    "Trial",
+    "Trials",
     "Verdict",
     "adaptability",
     "adjust",
@@ -56,7 +59,7 @@ __all__ = [
     "interquartile_mean",
     "kaplan_meier",
     "karp_flatt",
-    "look_levels",
+    "look_alphas",
     "lower_decile_of_power",
     "marginal_gain",
     "mean_interval",
@@ -66,6 +69,7 @@ __all__ = [
     "per_robot_efficiency",
     "prediction_interval",
     "probability_of_improvement",
+    "read_trials",
     "relative_change",
     "repair_times",
     "resilience_index",

@@ -33,14 +33,14 @@ class Estimate:
     Attributes:
         indicator: Which indicator this is.
         value: The ratio of means plus offset, dimensionless.
-        low: Lower limit of the interval at `level`; -inf where the interval is unbounded. None at
-            n = 1 and where the differences show no spread; `value` where the value is exact.
+        low: Lower limit of the interval; -inf where the interval is unbounded. None at n = 1 and
+            where the differences show no spread; `value` where the value is exact.
         high: Upper limit of the interval; inf where the interval is unbounded; None as `low`.
         probability: Confidence that theta > threshold, in [0, 1], not a posterior frequency:
             1 - p/2 where mean(D) > 0, else p/2, D = num - (threshold - offset) den.
-        verdict: On theta > threshold, one-sided (1 - level)/2 on each side, unadjusted.
+        verdict: On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted.
         threshold: The value that theta is tested against.
-        level: Confidence level of the interval, in (0, 1).
+        confidence: Of the interval, in (0, 1).
         n_seeds: Number of seeds; of the smallest sample where unpaired.
         p_value: Two-sided p of mean(D) = 0, in [0, 1]: what Holm acts on. From ten paired seeds on
             the larger of the t test's and the studentised bootstrap's.
@@ -56,7 +56,7 @@ class Estimate:
             the side that it leans to: p = 1), "unbounded" (the mean denominator is not
             distinguishable from 0), "assumes_normal" (below ten paired seeds, or unpaired: the
             verdict rests on normal differences), "skewed" (D is so skewed that the verdict errs
-            more often than its level at this n).
+            more often than it promises at this n).
     """
 
     indicator: str
@@ -66,7 +66,7 @@ class Estimate:
     probability: float | None = None
     verdict: Verdict = "inconclusive"
     threshold: float
-    level: float
+    confidence: float
     n_seeds: int
     p_value: float | None = None
     paired: bool
@@ -93,7 +93,7 @@ class Estimate:
 
 
 def verdict_at(alpha: float, p_value: float | None, probability: float | None) -> Verdict:
-    """Judge theta > threshold by a two-sided p at level `alpha`; `probability` gives the side.
+    """Judge theta > threshold by a two-sided p against `alpha`; `probability` gives the side.
 
     No p (one seed) is inconclusive.
     """
@@ -113,7 +113,7 @@ def judge(
     *,
     offset: float,
     threshold: float,
-    level: float,
+    confidence: float,
     paired: bool,
     saturated: Collection[str] = (),
     identical: bool = False,
@@ -127,7 +127,7 @@ def judge(
             divides by.
         offset: Added to the ratio of means.
         threshold: What theta is tested against, finite.
-        level: Confidence level, in (0, 1).
+        confidence: Of the interval, in (0, 1).
         paired: Whether row i of every sample is the same seed.
         saturated: Names of the terms whose P is capped (every item delivered in a run). The true P
             is then larger: a reference that is capped blocks "supported", a changed condition that
@@ -136,17 +136,21 @@ def judge(
 
     Raises:
         IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
-            reference 0, threshold or level out of range, an unknown name in `saturated`, or
+            reference 0, threshold or confidence out of range, an unknown name in `saturated`, or
             `identical` with performances that differ.
     """
     finite("threshold", threshold)
-    between_0_and_1("level", level)
+    between_0_and_1("confidence", confidence)
     weighted = _checked(terms, saturated, paired=paired, identical=identical)
     samples = {name: term.sample for name, term in weighted.items()}
     *_, reference = samples.values()
     n_seeds = min(sample.size for sample in samples.values())
     asked = _Asked(
-        indicator=indicator, threshold=threshold, level=level, n_seeds=n_seeds, paired=paired
+        indicator=indicator,
+        threshold=threshold,
+        confidence=confidence,
+        n_seeds=n_seeds,
+        paired=paired,
     )
     if identical or n_seeds == 1:
         return _untested(asked, weighted, offset, identical=identical)
@@ -155,14 +159,14 @@ def judge(
     correlation = None
     if paired:
         num, den = _numerator(weighted), reference
-        test = paired_ratio(num, den, offset=offset, threshold=threshold, level=level)
+        test = paired_ratio(num, den, offset=offset, threshold=threshold, confidence=confidence)
         correlation = pairing_correlation(*list(samples.values())[:2])
         # Without spread the skewness of D would be one of rounding errors.
         if not test.degenerate and _skewed(num - (threshold - offset) * den):
             flags.append("skewed")
     else:
         test = unpaired_ratio(
-            list(weighted.values()), offset=offset, threshold=threshold, level=level
+            list(weighted.values()), offset=offset, threshold=threshold, confidence=confidence
         )
     p_value, probability = float(test.p_value), float(test.probability)
     flags += _flags(test, n_seeds, _capped_side(weighted, saturated))
@@ -178,7 +182,7 @@ def judge(
         low=None if test.degenerate else float(test.low),
         high=None if test.degenerate else float(test.high),
         probability=probability,
-        verdict=verdict_at(1.0 - level, p_value, probability),
+        verdict=verdict_at(1.0 - confidence, p_value, probability),
         p_value=p_value,
         pairing_correlation=correlation,
         difference_sd=float(test.difference_sd),
@@ -191,7 +195,7 @@ def judge(
 class _Asked(TypedDict):
     indicator: str
     threshold: float
-    level: float
+    confidence: float
     n_seeds: int
     paired: bool
 

@@ -22,7 +22,7 @@ def scalability(
     n: SupportsIndex,
     m: SupportsIndex,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
     paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
@@ -37,7 +37,7 @@ def scalability(
         n: Swarm size N, at least 1.
         m: Robots added, at least 1; may exceed N.
         threshold: What S is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
+        confidence: Of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
         saturated: Names of the performances above that are capped, every item delivered in a run.
         identical: Whether both runs of every seed are the same run: the value is then exact.
@@ -52,7 +52,7 @@ def scalability(
         {"p_nm": (p_nm, gain, 0.0), "p_n": (p_n, -gain, 1.0)},
         offset=0.0,
         threshold=threshold,
-        level=level,
+        confidence=confidence,
         paired=paired,
         saturated=saturated,
         identical=identical,
@@ -67,7 +67,7 @@ def fault_tolerance(
     n: SupportsIndex | None = None,
     m: SupportsIndex | None = None,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
     paired: bool = True,
     saturated: Collection[str] = (),
 ) -> Estimate:
@@ -82,7 +82,7 @@ def fault_tolerance(
         n: Swarm size N; FT does not depend on it, given together with m it is checked.
         m: Faulty robots, 1 <= m < N: some robot has to be left in P_S.
         threshold: What FT is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
+        confidence: Of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
         saturated: Names of the performances above that are capped, every item delivered in a run.
 
@@ -99,7 +99,7 @@ def fault_tolerance(
         {"p_f": (p_f, 1.0, 0.0), "p_s": (p_s, -1.0, 0.0), "p_o": (p_o, 0.0, 1.0)},
         offset=0.0,
         threshold=threshold,
-        level=level,
+        confidence=confidence,
         paired=paired,
         saturated=saturated,
     )
@@ -112,7 +112,7 @@ def robustness(
     n: SupportsIndex,
     m: SupportsIndex,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
     paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
@@ -127,7 +127,7 @@ def robustness(
         n: Swarm size N, at least 1.
         m: Faulty robots, 1 <= m <= N.
         threshold: What R is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
+        confidence: Of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
         saturated: Names of the performances above that are capped, every item delivered in a run.
         identical: Whether both runs of every seed are the same run: the value is then exact.
@@ -147,7 +147,7 @@ def robustness(
         },
         offset=faulty / robots,
         threshold=threshold,
-        level=level,
+        confidence=confidence,
         paired=paired,
         saturated=saturated,
         identical=identical,
@@ -161,7 +161,7 @@ def adaptability(
     x_o: float,
     x_new: float,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
     paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
@@ -176,7 +176,7 @@ def adaptability(
         x_o: Original value of the parameter, not 0, in any unit.
         x_new: New value, not equal to x_o, in the same unit.
         threshold: What A is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
+        confidence: Of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
         saturated: Names of the performances above that are capped, every item delivered in a run.
         identical: Whether both runs of every seed are the same run: the value is then exact.
@@ -195,7 +195,7 @@ def adaptability(
         {"p_new": (p_new, gain, 0.0), "p_o": (p_o, -gain, 1.0)},
         offset=1.0,
         threshold=threshold,
-        level=level,
+        confidence=confidence,
         paired=paired,
         saturated=saturated,
         identical=identical,
@@ -207,7 +207,7 @@ def relative_change(
     p_new: ArrayLike,
     *,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
     paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
@@ -220,7 +220,7 @@ def relative_change(
         p_o: Performance P_o of the reference over seeds [items], shape (n_seeds,).
         p_new: Performance P_new over the same seeds [items].
         threshold: What the change is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
+        confidence: Of interval and verdict, in (0, 1).
         paired: Whether the samples share their seeds; False for results that come without seeds.
         saturated: Names of the performances above that are capped, every item delivered in a run.
         identical: Whether both runs of every seed are the same run: the value is then exact.
@@ -234,7 +234,7 @@ def relative_change(
         {"p_new": (p_new, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)},
         offset=0.0,
         threshold=threshold,
-        level=level,
+        confidence=confidence,
         paired=paired,
         saturated=saturated,
         identical=identical,

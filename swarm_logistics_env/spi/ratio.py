@@ -42,7 +42,7 @@ def paired_ratio(
     *,
     offset: float = 0.0,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
 ) -> RatioTest:
     """Interval and test of theta over paired seeds, for one study or many at once.
 
@@ -51,17 +51,17 @@ def paired_ratio(
         den: Denominators of the same shape, mean over the last axis > 0.
         offset: Added to the ratio of means.
         threshold: The theta that the test compares with.
-        level: Confidence level of the Fieller interval, in (0, 1).
+        confidence: Of the Fieller interval, in (0, 1).
 
     Returns:
         Arrays of shape (...). The interval inverts the test: it excludes `threshold` exactly where
-        p_value < 1 - level, but where it is unbounded (limits -inf, inf). Differences without
+        p_value < 1 - confidence, but where it is unbounded (limits -inf, inf). Differences without
         spread (`degenerate`) have p = 1 and no limits.
     """
     from scipy.special import stdtr, stdtrit
 
     n = num.shape[-1]
-    df, alpha = n - 1, 1.0 - level
+    df, alpha = n - 1, 1.0 - confidence
     value = num.mean(axis=-1) / den.mean(axis=-1)
 
     null = threshold - offset
@@ -72,7 +72,7 @@ def paired_ratio(
     degenerate = np.ptp(difference, axis=-1) <= rounding
     statistic = mean_difference / (np.where(degenerate, 1.0, sd) / np.sqrt(n))
     above, below = stdtr(df, -statistic), stdtr(df, statistic)
-    t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + level / 2)))
+    t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + confidence / 2)))
     if n >= MIN_SEEDS:
         pivots = resampled_pivots(num - value[..., np.newaxis] * den)
         mirrored = -pivots[::-1]

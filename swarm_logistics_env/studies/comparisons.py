@@ -142,7 +142,7 @@ class Comparison:
         self,
         performance: Performance,
         *,
-        level: float = 0.95,
+        confidence: float = 0.95,
         paired: bool = True,
         saturated: Collection[Arm] = (),
         identical: bool = False,
@@ -151,7 +151,7 @@ class Comparison:
 
         Args:
             performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
-            level: confidence level of interval and verdict, in (0, 1).
+            confidence: of interval and verdict, in (0, 1).
             paired: whether the arms share their seeds, row by row.
             saturated: arms whose P is capped, every item delivered in a run.
             identical: whether the runs of the original and the changed arm are the same runs.
@@ -173,7 +173,7 @@ class Comparison:
             **{name: performance(arm) for name, arm in named.items()},
             **definition.arguments(change),
             threshold=self.threshold,
-            level=level,
+            confidence=confidence,
             paired=paired,
             saturated=[name for name, arm in named.items() if arm in saturated],
             # The removed robots make the third condition another one by construction.

@@ -69,7 +69,8 @@ def fault_budgets(results: StudyResults) -> Iterator[ModeBudget]:
 def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
     """Yield the anchoring load of every fault whose runs are complete."""
     for comparison in results.plan.comparisons:
-        if comparison.removed is None:
+        # Nobody recorded how long robots stood by each other in trials from elsewhere.
+        if comparison.removed is None or results.plan.imported_from is not None:
             continue
         outcomes = results.outcomes_of(comparison.changed)
         if outcomes is None:

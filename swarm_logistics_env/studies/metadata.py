@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from pydantic import Field, TypeAdapter, ValidationError
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import Record
 from swarm_logistics_env.studies.runs import seeds_in_words
+from swarm_logistics_env.tasks.recorded_trials import Origin
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.plan import Plan
@@ -34,21 +34,13 @@ _NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
 
-
-class _Origin(Record):
-    file: str
-    digest: str
-    paired: bool
-    seeds: tuple[int, ...] = ()
-
-
 # These are read as JSON. The specification is not here: it explains its own errors.
 _FORMS: dict[str, TypeAdapter[Any]] = {
     IDENTITIES: TypeAdapter(dict[str, str]),
     DECLARED_SEEDS: TypeAdapter(_Count),
     DECLARED_FIRST_SEED: TypeAdapter(_Seed),
     DECLARED_LOOKS: TypeAdapter(tuple[_Count, ...]),
-    IMPORTED: TypeAdapter(_Origin),
+    IMPORTED: TypeAdapter(Origin),
 }
 
 

@@ -45,6 +45,7 @@ class Plan:
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.
         imported_seeds: those that the file names; empty: it names none, or results are run here.
+        setup: name and value of what is stated about the conditions of imported results.
     """
 
     specification: Specification
@@ -55,6 +56,7 @@ class Plan:
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
+    setup: tuple[tuple[str, str], ...] = ()
 
     @property
     def seeds(self) -> Sequence[int]:

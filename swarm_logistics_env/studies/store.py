@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sqlite3
 import time
@@ -40,7 +41,7 @@ CREATE TABLE runs (
     condition TEXT NOT NULL REFERENCES conditions,
     code TEXT NOT NULL,
     seed INTEGER NOT NULL,
-    delivered INTEGER,           -- NULL, like all of the result, where the run failed
+    delivered NUMERIC,           -- NULL, like all of the result, where the run failed
     delivery_times BLOB,         -- float64, little-endian [s]; NULL: only their number is known
     ended_at REAL,               -- [s]
     all_delivered INTEGER,
@@ -232,7 +233,7 @@ class Store:
                     found[run] = Outcome(run, error=str(error), wall_seconds=float(wall))
                     continue
                 if times is None:
-                    found[run] = Outcome(run, untimed=_whole(count))
+                    found[run] = Outcome(run, untimed=_amount(count))
                     continue
                 found[run] = Outcome(
                     run,
@@ -364,6 +365,12 @@ def _refuse_unmerged(path: Path) -> None:
             f"{path} may not be written, and its latest runs are still in {log.name}: copy both "
             "to where they may"
         )
+
+
+def _amount(number: object) -> float:
+    if not isinstance(number, int | float) or not 0 <= number < math.inf:
+        raise ValueError(f"delivered = {number!r}")
+    return number
 
 
 def _whole(number: object) -> int:

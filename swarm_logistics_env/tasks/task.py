@@ -24,7 +24,7 @@ class Outcome:
         digest: of the trajectory and the deliveries (`Episode.digest`); None: not known.
         error: traceback; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
-        untimed: items delivered, where only their number is known; None: the times tell it.
+        untimed: P, 0 or more, where no times are known; None: the number of times is P.
     """
 
     run: str
@@ -36,11 +36,11 @@ class Outcome:
     digest: str | None = None
     error: str | None = None
     wall_seconds: float = 0.0
-    untimed: int | None = None
+    untimed: float | None = None
 
     @property
-    def delivered(self) -> int:
-        """The paper's P [items]."""
+    def delivered(self) -> float:
+        """The paper's P, 0 or more: the number of items delivered, or a task's own measure."""
         return len(self.delivery_times) if self.untimed is None else self.untimed
 
 
