@@ -12,6 +12,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_of
 from swarm_logistics_env.tasks.task import Outcome, Playable
+from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
 
 __all__ = ["WAREHOUSE", "Fault", "Scenario", "WarehouseTask"]
@@ -22,6 +23,7 @@ class WarehouseTask:
 
     name = "warehouse"
     removed = "removed"
+    world: type[Warehouse] = Warehouse
 
     @property
     def fields(self) -> dict[str, str]:
@@ -69,7 +71,12 @@ class WarehouseTask:
         """Play one episode; see `Task.play`."""
         # A policy of its own: one that remembers must not make rows depend on the order of runs.
         episode = run_episode(
-            condition.scenario, policy_of(policy), seed, condition.faults, policy_seed
+            condition.scenario,
+            policy_of(policy),
+            seed,
+            condition.faults,
+            policy_seed,
+            self.world,
         )
         return Outcome(
             "",
