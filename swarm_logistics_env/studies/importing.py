@@ -110,19 +110,19 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     A paper's tables may give several values of P for what we would call one condition.
     """
     comparisons: list[Comparison] = []
-    base = specification.scenario
+    base, task = specification.scenario, specification.played
 
     def policy_of(label: str, title: str) -> StudiedPolicy:
         return StudiedPolicy(label, f"{origin.file} ({origin.digest}), {title}", label)
 
     for label in specification.policies:
         for sizes in specification.sizes:
-            comparisons += scalability(base, sizes, policy_of(label, sizes.title))
+            comparisons += scalability(base, sizes, policy_of(label, sizes.title), task)
         for faults in specification.faults:
-            asked = robustness(base, faults, policy_of(label, faults.title))
+            asked = robustness(base, faults, policy_of(label, faults.title), task)
             comparisons += [item for item in asked if isinstance(item, Comparison)]
         for parameter in specification.parameters:
-            comparisons += adaptability(base, parameter, policy_of(label, parameter.title))
+            comparisons += adaptability(base, parameter, policy_of(label, parameter.title), task)
     return Plan(
         specification,
         tuple(comparisons),
