@@ -50,6 +50,7 @@ def run_episode(
     seed: int,
     faults: Sequence[Fault] = (),
     policy_seed: int | None = None,
+    world_type: type[Warehouse] = Warehouse,
 ) -> Episode:
     """Play `policy` in `scenario` to the end.
 
@@ -60,6 +61,7 @@ def run_episode(
         faults: the faults that are scheduled in the episode.
         policy_seed: decides the policy's own randomness instead of `seed`; the same world with
             another behaviour.
+        world_type: what is made of the scenario, the warehouse or another world with its methods.
 
     Raises:
         FaultError: a fault names robots that are not there.
@@ -70,7 +72,7 @@ def run_episode(
         >>> run_episode(Scenario(duration=10.0), policies.load("swarm-dt"), seed=0).ended_at
         10.0
     """
-    world = Warehouse(scenario)
+    world = world_type(scenario)
     observations = world.reset(seed, faults)
     start(policy, scenario, seed if policy_seed is None else policy_seed)
     digest = hashlib.blake2b(digest_size=16)

@@ -197,6 +197,7 @@ def compare_command(
             "chance; possibly: where that is not ruled out.",
         ),
     ] = None,
+    trust_code: TrustCodeOption = False,
 ) -> None:
     """Compare two studies, condition by condition; end with 1 if a gate fails."""
     from swarm_logistics_env.studies import Study
@@ -204,7 +205,9 @@ def compare_command(
     from swarm_logistics_env.studies.matching import match
 
     gates = [Gate.parse(text) for text in fail_if or []]
-    before, after = (Study.stored(directory).findings() for directory in (old, new))
+    before, after = (
+        Study.stored(directory, trust_code=trust_code).findings() for directory in (old, new)
+    )
     left_out = match(before, after).notes
     failed = False
     # Without a gate the change is shown, and nothing fails.
@@ -233,7 +236,7 @@ def _pilot(
     if Path(asked).is_dir():
         if policies:
             raise StudyError("--policy is for a pilot: a study that was run has its own policies")
-        return Study.stored(asked).findings()
+        return Study.stored(asked, trust_code=trust_code).findings()
     pilot = study_of(asked, None, seeds, policies, trust_code, looks=())
     pilot.run(processes=processes or os.cpu_count() or 1)
     return pilot.findings()

@@ -31,7 +31,10 @@ PolicyOption = Annotated[
     list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
 ]
 TrustCodeOption = Annotated[
-    bool, typer.Option("--trust-code", help="Let a study file name policies as package.mod:Class.")
+    bool,
+    typer.Option(
+        "--trust-code", help="Let a study name its task and policies as package.mod:NAME."
+    ),
 ]
 ProcessesOption = Annotated[
     int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
@@ -122,11 +125,12 @@ def run_command(
 @study.command("report")
 def report_command(
     directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+    trust_code: TrustCodeOption = False,
 ) -> None:
     """Print and write the report of a study again, from its store alone."""
     from swarm_logistics_env.studies import Study
 
-    stored = Study.stored(directory)
+    stored = Study.stored(directory, trust_code=trust_code)
     typer.echo(f"{stored.plan()}\n")
     show_study(stored)
 
@@ -199,7 +203,7 @@ def _conditions(plan: Plan) -> Section:
     for _, table, arm in plan.cells:
         uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.setting})")
     rows = (
-        (condition.policy.label, str(condition.scenario.n_robots), "; ".join(uses[condition.key]))
+        (condition.policy.label, str(condition.size), "; ".join(uses[condition.key]))
         for condition in plan.conditions
     )
     return Section("Conditions", ("policy", "N", "stands in"), tuple(rows))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from importlib.metadata import version
+from typing import Any
 
 from swarm_logistics_env.report.recorded_setup import recorded_setup
 from swarm_logistics_env.report.result_tables import NOTHING, Section
 from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.tasks.warehouse_task import Scenario
 
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:
@@ -50,7 +50,7 @@ def _study(plan: Plan) -> tuple[str, ...]:
             f"swarm-logistics-env {version('swarm-logistics-env')}, code version {plan.code}."
         ),
         (
-            "Performance P is the number of items delivered in the order requested. Intervals of "
+            f"Performance P is {plan.specification.played.performance}. Intervals of "
             "P are t-intervals over seeds; those of indicators invert the test, paired by seed. A "
             "verdict is a paired test against the threshold, from ten seeds on the larger p of "
             "Student's t and the studentised bootstrap, below them t alone, one-sided "
@@ -110,6 +110,6 @@ def _variations(plan: Plan) -> Iterator[str]:
             yield f"{factor.title or type(factor).__name__} differs: {differing}."
 
 
-def _differing(scenario: Scenario, base: Scenario) -> str:
+def _differing(scenario: Any, base: Any) -> str:
     theirs, ours = base.model_dump(), scenario.model_dump()
     return ", ".join(f"{name} = {ours[name]}" for name in ours if ours[name] != theirs[name])

@@ -68,6 +68,7 @@ def import_results(
     _refuse_unused(file, trials.rows, cells.values())
     specification = Specification(
         name=file.stem,
+        task=RECORDED.name,
         policies=tuple(dict.fromkeys(row.policy for row in trials.rows)),
         seeds=max(map(len, cells.values())),
     )

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import Record
 from swarm_logistics_env.studies.runs import seeds_in_words
 from swarm_logistics_env.tasks.recorded_trials import Origin
+from swarm_logistics_env.tasks.task_choice import DEFAULT
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.plan import Plan
@@ -34,8 +36,21 @@ _NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
 
-# These are read as JSON. The specification is not here: it explains its own errors.
+
+class _Specified(Record):
+    # What is read of a stored specification before its task is known.
+    model_config = ConfigDict(extra="ignore")
+
+    name: str
+    seeds: _Count
+    policies: tuple[Any, ...]
+    first_seed: _Seed = 0
+    task: str = DEFAULT
+
+
+# These are read as JSON.
 _FORMS: dict[str, TypeAdapter[Any]] = {
+    SPECIFICATION: TypeAdapter(_Specified),
     IDENTITIES: TypeAdapter(dict[str, str]),
     DECLARED_SEEDS: TypeAdapter(_Count),
     DECLARED_FIRST_SEED: TypeAdapter(_Seed),

@@ -68,7 +68,7 @@ def _size(plan: Plan, n_seeds: int) -> int:
         # Ten more seeds: a file grows by whole pages.
         for seeds in (range(1), range(1, 11)):
             for run in (c.run(plan.code, seed) for c in plan.conditions for seed in seeds):
-                times = np.zeros(run.condition.scenario.n_items)
+                times = np.zeros(getattr(run.condition.scenario, "n_items", 0))
                 store.add(run, Outcome(run.key, delivery_times=times))
             sizes.append(store.size)
     return sizes[0] + (n_seeds - 1) * (sizes[1] - sizes[0]) // 10

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS, comparing
@@ -27,7 +28,6 @@ from swarm_logistics_env.studies.specification import (
 )
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -104,14 +104,12 @@ def make_plan(
     *,
     code: str | None = None,
     identities: Mapping[str, str] | None = None,
-    task: Task = WAREHOUSE,
 ) -> Plan:
     """Return the plan of a study.
 
     Args:
         code: version of the code that played it; None: that of this process.
         identities: of its policies when it was played; None: they are loaded and asked.
-        task: what is played.
 
     Raises:
         StudyError: the specification varies nothing, or a step of it cannot be.
@@ -121,7 +119,7 @@ def make_plan(
 
     def policy_of(part: str, source: object) -> StudiedPolicy:
         if identities is None:
-            policy = studied(source)
+            policy = studied(source, specification.played)
         elif part in identities:
             policy = StudiedPolicy(policy_label(source), identities[part], source)
         else:
@@ -129,7 +127,7 @@ def make_plan(
         known[part] = policy.identity
         return policy
 
-    found = list(_asked(specification, policy_of, task))
+    found = list(_asked(specification, policy_of))
     comparisons = tuple(
         item
         for item in found
@@ -144,15 +142,15 @@ def make_plan(
     null_pairs = [item for item in found if isinstance(item, NullPair)]
     if not any(DEFINITIONS[symbol].needs_removed for symbol in specification.indicators):
         null_pairs = []
-    return Plan(specification, comparisons, code or task.code(), known, tuple(null_pairs))
+    return Plan(
+        specification, comparisons, code or specification.played.code(), known, tuple(null_pairs)
+    )
 
 
 def _asked(
-    specification: Specification,
-    policy_of: Callable[[str, object], StudiedPolicy],
-    task: Task,
+    specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
 ) -> Iterator[Comparison | NullPair]:
-    base = specification.scenario
+    base, task = specification.scenario, specification.played
     lesser = [
         (ablation, policy_of(f"ablation {number}", ablation.policy))
         for number, ablation in enumerate(specification.ablations, start=1)
@@ -170,13 +168,13 @@ def _asked(
                 yield from _ablation(base, ablation, policy, part, task)
 
 
-def studied(source: object) -> StudiedPolicy:
-    """Return the policy that `source` makes, with its identity.
+def studied(source: object, task: Task) -> StudiedPolicy:
+    """Return the policy that `source` makes for a task, with its identity.
 
     Raises:
         PolicyError: it cannot be found or built.
     """
-    return StudiedPolicy(policy_label(source), policy_identity(source), source)
+    return StudiedPolicy(policy_label(source), policy_identity(source, task.policies), source)
 
 
 def _title(factor: Factor, general: str) -> str:
@@ -184,9 +182,7 @@ def _title(factor: Factor, general: str) -> str:
     return factor.title or (f"{general} ({changes})" if changes else general)
 
 
-def scalability(
-    base: Scenario, sizes: Sizes, policy: StudiedPolicy, task: Task = WAREHOUSE
-) -> Iterator[Comparison]:
+def scalability(base: Any, sizes: Sizes, policy: StudiedPolicy, task: Task) -> Iterator[Comparison]:
     """Yield the comparisons between neighbouring swarm sizes."""
     scenario = task.vary(base, sizes.scenario)
     table = _title(sizes, "Scalability")
@@ -214,7 +210,7 @@ def scalability(
 
 
 def robustness(
-    base: Scenario, faults: Faults, policy: StudiedPolicy, task: Task = WAREHOUSE
+    base: Any, faults: Faults, policy: StudiedPolicy, task: Task
 ) -> Iterator[Comparison | NullPair]:
     """Yield the indicators of every mode, m and onset; the null pair where faults start late."""
     scenario = task.vary(base, faults.scenario)
@@ -245,14 +241,17 @@ def robustness(
         for mode in faults.modes:
             for m in faults.robots:
                 failed = arm(mode, m, onset, faults.duration)
-                removed = arm(task.removed, m, onset, None)
                 for definition in comparing("fault"):
-                    third = removed if definition.needs_removed else None
+                    third = None
+                    if definition.needs_removed:
+                        if task.removed is None:
+                            continue
+                        third = arm(task.removed, m, onset, None)
                     yield Comparison(table, definition.symbol, original, failed, third)
 
 
 def adaptability(
-    base: Scenario, parameter: Parameter, policy: StudiedPolicy, task: Task = WAREHOUSE
+    base: Any, parameter: Parameter, policy: StudiedPolicy, task: Task
 ) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
     scenario = task.vary(base, parameter.scenario)
@@ -270,7 +269,7 @@ def adaptability(
 
 
 def _ablation(
-    base: Scenario, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy, task: Task
+    base: Any, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy, task: Task
 ) -> Iterator[Comparison]:
     scenario = task.vary(base, ablation.scenario)
     whole, part = (
@@ -290,5 +289,5 @@ def _ablation(
         )
 
 
-def _condition(task: Task, policy: StudiedPolicy, scenario: Scenario, **fields: float) -> Condition:
+def _condition(task: Task, policy: StudiedPolicy, scenario: Any, **fields: float) -> Condition:
     return Condition(policy, task.vary(scenario, fields), task=task)

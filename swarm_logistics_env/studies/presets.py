@@ -11,13 +11,12 @@ from swarm_logistics_env.studies.specification import (
     Sizes,
     Specification,
 )
-from swarm_logistics_env.tasks.warehouse_task import Scenario
 
 # Every indicator once, in under a minute on two cores at 4 seeds.
 QUICK = Specification(
     name="quick",
     seeds=4,
-    scenario=Scenario(duration=300.0),
+    scenario={"duration": 300.0},
     sizes=(Sizes(values=(10, 25)),),
     faults=(
         Faults(modes=("FM4",), robots=(2,)),
@@ -36,7 +35,7 @@ QUICK = Specification(
 # Restock: with a finite store the rate falls towards the end, faults or not.
 RESILIENCE = Specification(
     name="resilience",
-    scenario=Scenario(duration=2000.0, restock=True),
+    scenario={"duration": 2000.0, "restock": True},
     faults=(Faults(title="Faults in mid-run", modes=("FM1", "FM4", "dead"), onsets=(666.7,)),),
 )
 

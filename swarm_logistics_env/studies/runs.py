@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Fault, Scenario
+from swarm_logistics_env.tasks.task_choice import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -34,17 +35,18 @@ class Condition:
     """All of a run but its seed. Conditions of equal content have equal keys and share runs.
 
     Attributes:
-        policy, scenario, faults: what is played, under which conditions.
+        policy, scenario, faults: what is played, under which conditions of the task's own types.
         behaviour: 0: the policy's randomness follows from the run's seed; another number: from
             that number as well, so that the same worlds are met by another behaviour.
         task: that plays it.
     """
 
     policy: StudiedPolicy
-    scenario: Scenario
-    faults: tuple[Fault, ...] = ()
+    scenario: Any
+    faults: tuple[Any, ...] = ()
     behaviour: int = 0
-    task: Task = field(default=WAREHOUSE, compare=False, repr=False)
+    _: KW_ONLY
+    task: Task = field(compare=False, repr=False)
 
     @property
     def size(self) -> int:
@@ -73,9 +75,9 @@ class Condition:
 
     @property
     def _content(self) -> tuple[str, ...]:
-        # Behaviour 0 and the warehouse add nothing: the keys are those of stores without them.
+        # Behaviour 0 and the warehouse add nothing, so that keys of older stores stay valid.
         other = (str(self.behaviour),) if self.behaviour else ()
-        if self.task.name != WAREHOUSE.name:
+        if self.task.name != DEFAULT:
             other = (*other, f"task {self.task.name}")
         return (self.scenario_json, self.faults_json, self.policy.identity, *other)
 

@@ -13,8 +13,8 @@ from typing import Any, Self
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
+from swarm_logistics_env.tasks.task_choice import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,13 @@ def _united(planned: dict[Path, dict[str, str]]) -> dict[str, str]:
 
 
 def _seeds(planned: dict[str, str]) -> range:
-    return Specification.from_json(planned[metadata.SPECIFICATION]).seed_numbers
+    fields = _fields(planned)
+    return range(fields["first_seed"], fields["first_seed"] + fields["seeds"])
+
+
+def _fields(planned: dict[str, str]) -> dict[str, Any]:
+    # Older stores know neither of the two.
+    return {"first_seed": 0, "task": DEFAULT, **json.loads(planned[metadata.SPECIFICATION])}
 
 
 def _declared(ours: dict[str, str], theirs: dict[str, str]) -> range:
@@ -124,12 +130,10 @@ def _declared(ours: dict[str, str], theirs: dict[str, str]) -> range:
 
 
 def _specification(ours: dict[str, str], theirs: dict[str, str], first: Path, other: Path) -> str:
-    mine, yours = (
-        Specification.from_json(one[metadata.SPECIFICATION]).model_dump(mode="json")
-        for one in (ours, theirs)
-    )
+    mine, yours = _fields(ours), _fields(theirs)
     free = ("first_seed", "seeds", "policies")
-    differing = [name for name in mine if name not in free and mine[name] != yours[name]]
+    names = [name for name in {**mine, **yours} if name not in free]
+    differing = [name for name in names if mine.get(name) != yours.get(name)]
     if differing:
         raise StudyError(f"{first} and {other} differ in {', '.join(differing)}: not one study")
     seeds, further = _seeds(ours), _seeds(theirs)
@@ -141,7 +145,7 @@ def _specification(ours: dict[str, str], theirs: dict[str, str], first: Path, ot
         )
     mine["seeds"] = max(seeds.stop, further.stop) - seeds.start
     mine["policies"] += [policy for policy in yours["policies"] if policy not in mine["policies"]]
-    return Specification(**mine).to_json()
+    return json.dumps(mine)
 
 
 def _identities(ours: dict[str, str], theirs: dict[str, str], first: Path, other: Path) -> str:

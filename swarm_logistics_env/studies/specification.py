@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Callable
 from itertools import pairwise
@@ -14,6 +15,7 @@ from pydantic import (
     NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -22,17 +24,20 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label, policy_name
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.task_choice import (
+    DEFAULT,
+    NAMES,
+    TaskSource,
+    refuse_untrusted,
+    task_of,
+)
 
 ScenarioFields = dict[str, Any]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
-
-
-def _scenario(value: object) -> object:
-    return WAREHOUSE.vary(Scenario(), value) if isinstance(value, dict) else value
 
 
 def _each(record: type[Record]) -> Callable[[object], object]:
@@ -60,7 +65,7 @@ class Factor(_Part):
 
     Args:
         title: heading in the report; empty: made from the factor.
-        scenario: fields that differ from the study's base scenario; "preset" is one of them.
+        scenario: fields that differ from the study's base scenario.
     """
 
     title: str = ""
@@ -90,7 +95,7 @@ class Faults(Factor):
     """Failure modes x numbers of faulty robots x onsets: fault tolerance FT and robustness R.
 
     Args:
-        modes: keys of `FAILURE_MODES` other than "removed", which is the reference P_S.
+        modes: failure modes of the task other than "removed", which is the reference P_S.
         robots: numbers m of faulty robots, each below the swarm size.
         onsets: when they fail [s].
         duration: for how long [s]; None: for good.
@@ -100,15 +105,6 @@ class Faults(Factor):
     robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
     onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1)] = (0.0,)
     duration: PositiveFloat | None = None
-
-    @field_validator("modes")
-    @classmethod
-    def _known(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
-        known = set(WAREHOUSE.failure_modes) - {WAREHOUSE.removed}
-        for mode in modes:
-            if mode not in known:
-                raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
-        return modes
 
     @field_validator("modes", "robots", "onsets")
     @classmethod
@@ -120,21 +116,12 @@ class Parameter(Factor):
     """Values of one field of the scenario: adaptability A from the first value to each other.
 
     Args:
-        name: a numeric field of `Scenario`.
+        name: a numeric field of the task's scenario.
         values: x_o first, above 0, then every x_new, in the field's unit.
     """
 
     name: str
     values: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=2)]
-
-    @field_validator("name")
-    @classmethod
-    def _numeric(cls, name: str) -> str:
-        if name == "n_robots":
-            raise ValueError("swarm sizes belong in `sizes`, where S judges them")
-        if name not in WAREHOUSE.fields:
-            raise ValueError(f"no numeric scenario field {name!r}{suggest(name, WAREHOUSE.fields)}")
-        return name
 
     @field_validator("values")
     @classmethod
@@ -161,11 +148,14 @@ class Specification(_Part):
 
     Args:
         name: of the study.
+        task: what is played: "warehouse", another name that the package knows, or the import path
+            "package.module:OBJECT" of a `tasks.Task`; in Python the object itself as well.
         policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
             `act`.
         seeds: number of seeds, the same for every condition.
         first_seed: the smallest seed, 0 or more; the others follow it one by one.
-        scenario: the base; a dict of fields, "preset" among them, makes one.
+        scenario: the base, as a table of the fields in which it differs from the task's default;
+            "preset" is a field of the warehouse.
         sizes, faults, parameters, ablations: what is varied.
         indicators: which of them are asked; conditions that only others need are not run.
         looks: numbers of seeds, rising, at which the study is going to be judged; declared before
@@ -177,10 +167,11 @@ class Specification(_Part):
     """
 
     name: str = "study"
+    task: TaskSource = DEFAULT
     policies: Annotated[tuple[PolicySource, ...], Field(min_length=1)] = ("swarm-dt",)
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
-    scenario: Annotated[Scenario, BeforeValidator(_scenario)] = Scenario()
+    scenario: Any = Field(default_factory=dict)
     sizes: Annotated[tuple[Sizes, ...], BeforeValidator(_each(Sizes))] = ()
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
@@ -193,6 +184,48 @@ class Specification(_Part):
     def seed_numbers(self) -> range:
         """The seeds of every condition."""
         return range(self.first_seed, self.first_seed + self.seeds)
+
+    @property
+    def played(self) -> Task:
+        """The task itself."""
+        return task_of(self.task)
+
+    @field_validator("scenario", mode="before")
+    @classmethod
+    def _of_the_task(cls, value: object, info: ValidationInfo) -> object:
+        if "task" not in info.data:  # its own error is told
+            return value
+        task = task_of(info.data["task"])
+        if isinstance(value, dict):
+            return task.vary(task.default, value)
+        if not isinstance(value, type(task.default)):
+            raise ValueError(f"should be a table of fields or a {type(task.default).__name__}")
+        return value
+
+    @field_validator("faults")
+    @classmethod
+    def _known(cls, faults: tuple[Faults, ...], info: ValidationInfo) -> tuple[Faults, ...]:
+        if "task" in info.data:
+            task = task_of(info.data["task"])
+            known = set(task.failure_modes) - {task.removed}
+            for mode in (mode for factor in faults for mode in factor.modes):
+                if mode not in known:
+                    raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
+        return faults
+
+    @field_validator("parameters")
+    @classmethod
+    def _numeric(
+        cls, parameters: tuple[Parameter, ...], info: ValidationInfo
+    ) -> tuple[Parameter, ...]:
+        if "task" in info.data:
+            known = task_of(info.data["task"]).fields
+            for name in (factor.name for factor in parameters):
+                if name == "n_robots":
+                    raise ValueError("swarm sizes belong in `sizes`, where S judges them")
+                if name not in known:
+                    raise ValueError(f"no numeric scenario field {name!r}{suggest(name, known)}")
+        return parameters
 
     @field_validator("indicators")
     @classmethod
@@ -242,8 +275,8 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         values = [2.0, 1.0]
 
     Args:
-        trust_code: whether its policies may be classes ("package.module:Class"), whose modules run
-            when they are loaded.
+        trust_code: whether its task and its policies may be code ("package.module:Class", or a file
+            of stable-baselines3), which runs when it is loaded.
 
     Raises:
         StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
@@ -258,6 +291,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         raise StudyError(f"the study file {path} is not TOML: {reason}") from error
     except RecursionError:
         raise StudyError(f"the study file {path} is nested too deep") from None
+    refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
     try:
         specification = Specification(**{"name": path.stem, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
@@ -270,3 +304,29 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
                 "policy's name, or be allowed by --trust-code (trust_code=True)"
             )
     return specification
+
+
+def read_stored(
+    text: str, place: Path, *, task: Task | None = None, trust_code: bool = False
+) -> Specification:
+    """Return the specification that a store in `place` holds as JSON.
+
+    Args:
+        task: the task that it names; None: it is found by that name.
+        trust_code: whether it may be found by importing it, which runs its module.
+
+    Raises:
+        StudyError: it is damaged, or its task cannot be found.
+    """
+    fields = json.loads(text)
+    named = fields.get("task", DEFAULT)
+    if task is not None:
+        fields["task"] = task
+    elif ":" not in named and named not in NAMES:
+        raise StudyError(
+            f"{place}: was played on the task {named!r}, an object: should be handed over again, "
+            "as Study.stored(.., task=..)"
+        )
+    else:
+        refuse_untrusted(named, place, trust_code=trust_code)
+    return Specification(**fields)

@@ -20,11 +20,14 @@ from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.studies.run_progress import Progress
 from swarm_logistics_env.studies.shards import Shard
-from swarm_logistics_env.studies.specification import Specification, read_study_file
+from swarm_logistics_env.studies.specification import (
+    Specification,
+    read_stored,
+    read_study_file,
+)
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,9 +55,8 @@ class Study:
 
     Args:
         out: directory of the store and the report; None: kept in memory.
-        task: what is played; policies, sizes, faults and parameters are its own.
-        fields: those of `Specification`, e.g. `policies=["swarm-dt"]`, `seeds=20`,
-            `faults=[{"modes": ["FM1"], "robots": [1, 2]}]`.
+        fields: those of `Specification`, e.g. `task="warehouse"`, `policies=["swarm-dt"]`,
+            `seeds=20`, `faults=[{"modes": ["FM1"], "robots": [1, 2]}]`.
 
     Raises:
         StudyError: a field is unknown or cannot be.
@@ -67,10 +69,7 @@ class Study:
         3
     """
 
-    def __init__(
-        self, *, out: str | Path | None = None, task: Task = WAREHOUSE, **fields: Any
-    ) -> None:
-        self.task = task
+    def __init__(self, *, out: str | Path | None = None, **fields: Any) -> None:
         self.specification = Specification(**fields)
         self.out = None if out is None else Path(out)
         self._plan: Plan | None = None
@@ -97,7 +96,7 @@ class Study:
         """Return the study that a TOML file describes (`read_study_file`), some fields changed.
 
         Args:
-            trust_code: whether the file may name policies as classes, which runs their modules.
+            trust_code: whether the file may name a task or policies that are code, which runs it.
 
         Raises:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
@@ -106,19 +105,27 @@ class Study:
         return cls._of(found.replace(**fields), out)
 
     @classmethod
-    def stored(cls, out: str | Path) -> Self:
+    def stored(cls, out: str | Path, *, task: Task | None = None, trust_code: bool = False) -> Self:
         """Return a study that was run before, as it was run: code version and policies included.
 
         Its policies need not be importable any more.
 
+        Args:
+            task: the task that it names; None: it is found by that name.
+            trust_code: whether it may be found by importing it, which runs its module.
+
         Raises:
-            StudyError: there is none, or its store does not say how it was planned.
+            StudyError: there is none, its store does not say how it was planned, or its task is not
+                found.
         """
         out = Path(out)
         with Store.existing(out) as store:
             noted = metadata.planned(store, out)
             imported = store.note(metadata.IMPORTED)
-        study = cls._of(Specification.from_json(noted[metadata.SPECIFICATION]), out)
+        specification = read_stored(
+            noted[metadata.SPECIFICATION], out, task=task, trust_code=trust_code
+        )
+        study = cls._of(specification, out)
         if imported is not None:
             study._plan = imported_plan(study.specification, Origin.from_json(imported))
             return study
@@ -138,7 +145,7 @@ class Study:
     def plan(self) -> Plan:
         """Return the conditions and comparisons, shared conditions once; nothing is run."""
         if self._plan is None:
-            self._plan = make_plan(self.specification, task=self.task)
+            self._plan = make_plan(self.specification)
         return self._plan
 
     def run(
@@ -163,7 +170,7 @@ class Study:
             StudyError: the store or the engine cannot be used, or the store is another study's.
         """
         plan = self.plan()
-        if plan.code != (code := self.task.code()):
+        if plan.code != (code := self.specification.played.code()):
             raise StudyError(
                 f"this study was played under code version {plan.code}, this is "
                 f"{code}: plan it anew, and all of it runs again"
@@ -279,7 +286,7 @@ class Study:
         # The report and the declared seeds are one study's.
         noted = store.note(metadata.SPECIFICATION)
         name = self.specification.name
-        if noted is not None and (there := Specification.from_json(noted).name) != name:
+        if noted is not None and (there := json.loads(noted)["name"]) != name:
             raise StudyError(
                 f"{self.out} holds the study {there!r}: should be another directory for the study "
                 f"{name!r}, or, if it is the same under a new name, name = {there!r}"

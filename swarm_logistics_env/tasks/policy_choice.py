@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import copy
 import json
+from collections.abc import Callable, Mapping
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, JsonValue, PlainSerializer, field_validator
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.records import Record
+
+Known = Mapping[str, Callable[..., Policy]]
+NONE: Known = MappingProxyType({})
 
 
 class PolicyChoice(Record):
@@ -53,24 +58,30 @@ def policy_label(source: object) -> str:
     return source if isinstance(source, str) else type(source).__name__
 
 
-def policy_of(source: object) -> Policy:
+def policy_of(source: object, known: Known = NONE) -> Policy:
     """Return a policy that no run has used: an object is copied, a name loaded.
+
+    Args:
+        known: what makes the policies that the task knows by name.
 
     Raises:
         PolicyError: it cannot be found or built.
     """
-    if isinstance(source, str):
-        return copy.deepcopy(_loaded(source, "{}"))
-    if isinstance(source, PolicyChoice):
-        return copy.deepcopy(_loaded(source.name, _canonical(source.parameters)))
+    if isinstance(source, str | PolicyChoice):
+        name, parameters = policy_name(source), getattr(source, "parameters", {})
+        if name in known:
+            return _made(known[name], name, parameters)
+        if known and name in policies.NAMES:
+            raise PolicyError(f"the task has no policy {name!r}{suggest(name, known)}")
+        return copy.deepcopy(_loaded(name, _canonical(parameters)))
     policy: Any = copy.deepcopy(source)
     made: Policy = policy
     return made
 
 
-def policy_identity(source: object) -> str:
+def policy_identity(source: object, known: Known = NONE) -> str:
     """Return text that changes whenever the policy's behaviour may have changed."""
-    identity = policies.identity(policy_of(source))
+    identity = policies.identity(policy_of(source, known))
     if not (isinstance(source, PolicyChoice) and source.parameters):
         return identity
     # A class of one's own need not tell its parameters.
@@ -97,6 +108,13 @@ def _written(source: object) -> object:
 
 
 PolicySource = Annotated[Any, BeforeValidator(_chosen), PlainSerializer(_written)]
+
+
+def _made(make: Callable[..., Policy], name: str, parameters: dict[str, Any]) -> Policy:
+    try:
+        return make(**parameters)
+    except TypeError as error:
+        raise PolicyError(f"policy {name!r} cannot be made: {error}") from None
 
 
 @lru_cache(maxsize=8)

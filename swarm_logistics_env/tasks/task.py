@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,16 +56,31 @@ class Playable(Protocol):
         """What fails during a run, of the task's own type."""
 
 
+@runtime_checkable
 class Task(Protocol):
     """Something that a policy can be tested in.
 
+    Its scenarios and faults are records (`records.Record`), so that a store can keep them as JSON;
+    a scenario also has `conditions()`: rows of name, value, and unit with meaning, for the report.
+
     Attributes:
         name: part of a condition's identity, but for the warehouse's.
-        removed: the failure mode that takes members away, for the paper's P_S.
+        removed: the failure mode that takes robots away, for the paper's P_S; None: the task cannot
+            start without a robot, so FT is not asked.
+        performance: what P is, as a sentence for the report.
     """
 
     name: str
-    removed: str
+    removed: str | None
+    performance: str
+
+    @property
+    def default(self) -> Any:
+        """The scenario from which a study's own is varied."""
+
+    @property
+    def policies(self) -> Mapping[str, Callable[..., Any]]:
+        """What makes each policy of the task's own, by name; `policies.load` knows the others."""
 
     @property
     def fields(self) -> Mapping[str, str]:
@@ -73,22 +88,30 @@ class Task(Protocol):
 
     @property
     def failure_modes(self) -> Mapping[str, str]:
-        """The failure modes, each with what it does to a member."""
+        """The failure modes, each with what it does to a robot."""
 
     def code(self) -> str:
         """Return a text that changes whenever the task's runs may have changed."""
 
     def size(self, scenario: Any) -> int:
-        """Return the number N of members."""
+        """Return the number N of robots."""
 
     def duration(self, scenario: Any) -> float:
         """Return the time at which a run ends at the latest [s]."""
 
     def vary(self, base: Any, fields: Mapping[str, Any]) -> Any:
-        """Return a scenario with some fields changed."""
+        """Return a scenario with some fields changed; `n_robots` and `duration` are fields too.
 
-    def fault(self, mode: str, members: int, onset: float, duration: float | None) -> Any:
-        """Return the fault of some members from `onset` on, for `duration` [s] or for good."""
+        Raises:
+            SwarmLogisticsError: a field is unknown or cannot be.
+        """
+
+    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> Any:
+        """Return the fault of some robots from `onset` on, for `duration` [s] or for good.
+
+        Raises:
+            SwarmLogisticsError: the task cannot let robots fail so.
+        """
 
     def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
         """Play one run of a policy, as `policy_choice` knows it, and return what it gave.

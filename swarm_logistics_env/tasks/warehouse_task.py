@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,21 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_of
 from swarm_logistics_env.tasks.task import Outcome, Playable
+from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
 
 __all__ = ["WAREHOUSE", "Fault", "Scenario", "WarehouseTask"]
 
 
 class WarehouseTask:
-    """Episodes of `run_episode`; P is the number of items delivered in the order requested."""
+    """Episodes of `run_episode`; see `Task` for its attributes."""
 
     name = "warehouse"
-    removed = "removed"
+    removed: str | None = "removed"
+    performance = "the number of items delivered in the order requested"
+    default = Scenario()
+    policies: Mapping[str, Callable[..., Any]] = MappingProxyType({})
+    world: type[Warehouse] = Warehouse
 
     @property
     def fields(self) -> dict[str, str]:
@@ -61,15 +67,20 @@ class WarehouseTask:
             base = Scenario.preset(str(changes.pop("preset")))
         return base.replace(**changes)
 
-    def fault(self, mode: str, members: int, onset: float, duration: float | None) -> Fault:
+    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> Fault:
         """Return the fault of some robots from `onset` on, for `duration` [s] or for good."""
-        return Fault(mode, members, onset=onset, duration=duration)
+        return Fault(mode, robots, onset=onset, duration=duration)
 
     def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
         """Play one episode; see `Task.play`."""
         # A policy of its own: one that remembers must not make rows depend on the order of runs.
         episode = run_episode(
-            condition.scenario, policy_of(policy), seed, condition.faults, policy_seed
+            condition.scenario,
+            policy_of(policy, self.policies),
+            seed,
+            condition.faults,
+            policy_seed,
+            self.world,
         )
         return Outcome(
             "",

@@ -84,18 +84,7 @@ class Warehouse:
         scenario = scenario or self.scenario
         occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in faults]
         state = WarehouseState(scenario)
-        state.obstacle_position = layout.place_obstacles(scenario, seed)
-        state.item_position = layout.place_items(scenario, seed, state.obstacle_position)
-        state.robot_position, state.robot_heading = layout.place_robots(
-            scenario, seed, state.obstacle_position
-        )
-        state.robot_heading_drift = layout.heading_drifts(scenario, seed)
-        state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
-        items = state.items
-        items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
-        items.restock_key[0] = key(seed, "restock")
-        layout.draw_order(items.request_key, 0, items.order)
-        state.requested = int(items.order[0])
+        self._lay_out(state, scenario, seed)
         self.scenario, self.state, self._seed = scenario, state, seed
         self.faults, self._occurrences, self.n_removed = tuple(faults), occurrences, 0
         self._make_room_to_work()
@@ -236,6 +225,21 @@ class Warehouse:
     def is_over_time(self) -> bool:
         """Whether the scenario's duration has passed."""
         return self.state.step >= self._n_steps
+
+    def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
+        """Place everything, give it its random streams, and ask for the first item."""
+        state.obstacle_position = layout.place_obstacles(scenario, seed)
+        state.item_position = layout.place_items(scenario, seed, state.obstacle_position)
+        state.robot_position, state.robot_heading = layout.place_robots(
+            scenario, seed, state.obstacle_position
+        )
+        state.robot_heading_drift = layout.heading_drifts(scenario, seed)
+        state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
+        items = state.items
+        items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
+        items.restock_key[0] = key(seed, "restock")
+        layout.draw_order(items.request_key, 0, items.order)
+        state.requested = int(items.order[0])
 
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
         if self._seed is None:

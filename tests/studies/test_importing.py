@@ -273,5 +273,5 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
     with Store.existing(tmp_path / "out") as store:
         assert len(store) == 5
     assert [path.name for path in (tmp_path / "out").iterdir()] == [FILE_NAME]
-    with pytest.raises(StudyError, match="code version imported"):
+    with pytest.raises(StudyError, match="was imported: run into a new directory"):
         Study.stored(tmp_path / "out").run()

@@ -9,6 +9,7 @@ from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsEr
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import Fault
 
 
@@ -57,14 +58,15 @@ def test_conditions_are_known_by_content() -> None:
     one = StudiedPolicy("one", "same", "swarm-dt")
     other_name = StudiedPolicy("other", "same", "swarm-dt")
     other_policy = StudiedPolicy("one", "different", "swarm-dt")
-    base = Condition(one, Scenario(), (Fault("FM1", 2),))
-    assert base.key == Condition(other_name, Scenario(n_robots=25), (Fault("FM1", 2),)).key
+    base = Condition(one, Scenario(), (Fault("FM1", 2),), task=WAREHOUSE)
+    same = Condition(other_name, Scenario(n_robots=25), (Fault("FM1", 2),), task=WAREHOUSE)
+    assert base.key == same.key
     others = [
-        Condition(other_policy, Scenario(), (Fault("FM1", 2),)),
-        Condition(one, Scenario(n_robots=26), (Fault("FM1", 2),)),
-        Condition(one, Scenario(), (Fault("FM1", 1),)),
-        Condition(one, Scenario(), (Fault("FM1", 2, onset=1.0),)),
-        Condition(one, Scenario()),
+        Condition(other_policy, Scenario(), (Fault("FM1", 2),), task=WAREHOUSE),
+        Condition(one, Scenario(n_robots=26), (Fault("FM1", 2),), task=WAREHOUSE),
+        Condition(one, Scenario(), (Fault("FM1", 1),), task=WAREHOUSE),
+        Condition(one, Scenario(), (Fault("FM1", 2, onset=1.0),), task=WAREHOUSE),
+        Condition(one, Scenario(), task=WAREHOUSE),
     ]
     assert len({base.key, *(other.key for other in others)}) == 6
     runs = {base.run("a", 0).key, base.run("a", 1).key, base.run("b", 0).key}

@@ -17,12 +17,13 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies.runs import Condition, Run, StudiedPolicy
 from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
 from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 
 POLICY = StudiedPolicy("mine", "identity", "swarm-dt")
 
 
 def run(seed: int) -> Run:
-    return Condition(POLICY, Scenario()).run("code", seed)
+    return Condition(POLICY, Scenario(), task=WAREHOUSE).run("code", seed)
 
 
 def outcome(of: Run, times: list[float]) -> Outcome:

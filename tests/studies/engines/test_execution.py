@@ -7,12 +7,13 @@ from swarm_logistics_env.policies import SwarmDT, identity
 from swarm_logistics_env.studies.engines import execute
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 
 SCENARIO = Scenario(n_robots=3, n_items=5, warehouse_width=3, warehouse_height=3, duration=10)
 
 
 def condition(source: object) -> Condition:
-    return Condition(StudiedPolicy("mine", identity(SwarmDT()), source), SCENARIO)
+    return Condition(StudiedPolicy("mine", identity(SwarmDT()), source), SCENARIO, task=WAREHOUSE)
 
 
 class Remembering(SwarmDT):
@@ -54,7 +55,7 @@ def test_other_behaviour_meets_the_same_worlds() -> None:
     Recording.seeds.clear()
     source = Recording()
     Recording.seeds.clear()
-    same = Condition(StudiedPolicy("mine", "recording", source), SCENARIO)
+    same = Condition(StudiedPolicy("mine", "recording", source), SCENARIO, task=WAREHOUSE)
     other = replace(same, behaviour=1)
     assert other.key != same.key
     for seed in (0, 1):
