@@ -20,7 +20,7 @@ SUPERSUIT := .venvs/supersuit
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs format clean
+.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs dist format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -34,6 +34,7 @@ help:
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
 	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
 	@echo "make docs            the documentation site, site/index.html"
+	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -91,6 +92,11 @@ docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate_study_files.py
 	$(DOCS)/bin/python docs/generate_training_files.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
+
+dist: $(DEV)/installed
+	rm -rf dist
+	$(DEV)/bin/python -m build
+	$(DEV)/bin/python -m twine check --strict dist/*
 
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .

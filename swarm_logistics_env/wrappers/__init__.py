@@ -7,6 +7,7 @@ draws, and an outer wrapper before an inner one; faults add up.
 """
 
 from swarm_logistics_env.wrappers.condition import Condition
+from swarm_logistics_env.wrappers.discrete_actions import DiscreteActions
 from swarm_logistics_env.wrappers.fault_injection import FaultInjection
 from swarm_logistics_env.wrappers.fixed_agents import FixedAgents
 from swarm_logistics_env.wrappers.indicator_reward import IndicatorReward
@@ -17,6 +18,7 @@ from swarm_logistics_env.wrappers.wrapper import Wrapper
 
 __all__ = [
     "Condition",
+    "DiscreteActions",
     "FaultInjection",
     "FixedAgents",
     "IndicatorReward",
