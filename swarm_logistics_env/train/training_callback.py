@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
@@ -17,7 +18,7 @@ from swarm_logistics_env.policies.card import PolicyCard
 from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.train.checkpoint import save_checkpoint
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate
-from swarm_logistics_env.train.learner import actor_parameters, tensors_of
+from swarm_logistics_env.train.learner import linears, tensors_of
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.training import Training
@@ -61,8 +62,13 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def _on_rollout_start(self) -> None:
         is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
-        for parameter in (*actor_parameters(self.model.policy), self.model.policy.log_std):
-            parameter.requires_grad_(is_free)
+        policy = self.model.policy
+        for layer in linears(policy):
+            layer.requires_grad_(is_free)
+        policy.log_std.requires_grad_(is_free)
+        floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
+        with torch.no_grad():
+            policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve
         if not curve or self.num_timesteps >= curve[-1][0] + self._training.evaluation.every:
             self._evaluate()
