@@ -174,15 +174,12 @@ class Evaluation(Part):
         seeds: how many.
         n_robots: the swarm size.
         faults: mode -> m, each giving R.
-        keep: which policy the training ends with: the "last", or the "best" seen, by the mean
-            over conditions of P relative to that of the first evaluation.
     """
 
     every: PositiveInt = 1_000_000
     seeds: PositiveInt = 4
     n_robots: PositiveInt = 25
     faults: dict[str, PositiveInt] = Field(default_factory=dict)
-    keep: Literal["last", "best"] = "last"
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -86,8 +86,6 @@ def train(
             callback.end()
     view.close()
     tensors = tensors_of(learner.policy)
-    if training.evaluation.keep == "best" and log.best is not None:
-        tensors = log.best[1]
     return _write(training, out, command, learner.num_timesteps, tensors, log.versions)
 
 
