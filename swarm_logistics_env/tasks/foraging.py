@@ -30,7 +30,7 @@ from swarm_logistics_env.warehouse.logistics import (
 )
 from swarm_logistics_env.warehouse.packing import unpacked_at
 from swarm_logistics_env.warehouse.radio import send_messages
-from swarm_logistics_env.warehouse.stepping import move, perceive
+from swarm_logistics_env.warehouse.stepping import log_command, move, perceive
 from swarm_logistics_env.warehouse.structs import (
     DELIVERED,
     NOBODY,
@@ -69,9 +69,10 @@ class Foraging(Warehouse):
 
     def step(self, commands: ArrayLike) -> NDArray[np.float32]:
         """Move the world by one control period; see `Warehouse.step`."""
-        given, rows = self._checked(commands), self._blank_rows()
+        self._world.commands.now[...] = self._checked(commands)
+        rows = self._blank_rows()
         nest_radius = 0.5 * self.scenario.delivery_width
-        self.take(given, rows, forage(self._address, nest_radius, given, rows))
+        self.take(rows, forage(self._address, nest_radius, rows))
         return rows
 
     @property
@@ -122,24 +123,24 @@ def free_place(
 
 
 @kernel
-def forage(
-    address: int, nest_radius: float, commands: NumberRows, rows: NDArray[np.float32]
-) -> bool:
+def forage(address: int, nest_radius: float, rows: NDArray[np.float32]) -> bool:
     """Take a control step in the world at `address`, as `stepping.step` does in the warehouse."""
     world = unpacked_at(World, address)
-    progress, outcome = world.progress, world.outcome
-    outcome.refused[0] = refused_command(commands, world.robots, world.able)
+    commands, progress, outcome = world.commands, world.progress, world.outcome
+    outcome.refused[0] = refused_command(commands.now, world.robots, world.able)
     if outcome.refused[0] != NOBODY:
         return True
+    log_command(commands)
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * world.parameters.control_period
-    move(world, commands)
-    send_messages(commands, world.robots, world.able, progress.step[0])
-    handle_items(world, nest_radius, commands)
+    move(world, commands.now)
+    send_messages(commands.now, world.robots, world.able, progress.step[0])
+    handle_items(world, nest_radius, commands.now)
     outcome.is_paused[0] = progress.step[0] == progress.pause_step[0]
     if not outcome.is_paused[0]:
         perceive(address, rows)
-    return outcome.n_delivered[0] > 0 or outcome.is_paused[0] or not outcome.is_room[0]
+    is_full = commands.n_logged[0] * len(commands.now) == len(commands.log)
+    return is_full or outcome.n_delivered[0] > 0 or outcome.is_paused[0] or not outcome.is_room[0]
 
 
 @inlined_kernel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -152,14 +152,14 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
 
 def values_of(asked: Tuning, found: Evaluated) -> tuple[float, ...]:
     """Return the objectives' values, nothing delivered counting as the worst."""
-    p_o, p_s = found.performance, found.under_faults.get("removed", 0.0)
-    modes = list(asked.modes)
-    values = {
-        "P": p_o,
-        "R": np.mean([found.robustness[mode] for mode in modes]) if p_o else -1.0,
-        "FT": np.mean([found.under_faults[mode] - p_s for mode in modes]) / p_o if p_o else -1.0,
+    if not found.p_o.any():
+        return tuple(0.0 if objective == "P" else -1.0 for objective in asked.objectives)
+    values: dict[str, Callable[[], Any]] = {
+        "P": found.p_o.mean,
+        "R": lambda: np.mean([found.robustness(mode) for mode in asked.modes]),
+        "FT": lambda: np.mean([found.fault_tolerance(mode) for mode in asked.modes]),
     }
-    return tuple(float(values[objective]) for objective in asked.objectives)
+    return tuple(float(values[objective]()) for objective in asked.objectives)
 
 
 def confirm(

@@ -1,4 +1,5 @@
-"""Wrappers: break an environment, resize it, change it while it runs, reward by indicators.
+"""Wrappers: break an environment, resize it, change it while it runs, reward by indicators, and
+let it be read in the frame of its robots' motion.
 
 Each is an environment itself, so they stack in any order, but for `FixedAgents`, which goes around
 all others. What a wrapper draws for an episode
@@ -11,6 +12,7 @@ from swarm_logistics_env.wrappers.discrete_actions import DiscreteActions
 from swarm_logistics_env.wrappers.fault_injection import FaultInjection
 from swarm_logistics_env.wrappers.fixed_agents import FixedAgents
 from swarm_logistics_env.wrappers.indicator_reward import IndicatorReward
+from swarm_logistics_env.wrappers.motion_frame import MotionFrame
 from swarm_logistics_env.wrappers.parameter_change import ParameterChange
 from swarm_logistics_env.wrappers.reference_performances import RunningMeans
 from swarm_logistics_env.wrappers.swarm_size import SwarmSize
@@ -22,6 +24,7 @@ __all__ = [
     "FaultInjection",
     "FixedAgents",
     "IndicatorReward",
+    "MotionFrame",
     "ParameterChange",
     "RunningMeans",
     "SwarmSize",
