@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .efficiency import karp_flatt, marginal_gain, per_robot_efficiency
-from .estimate import Estimate, Verdict
+from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
 from .indicators import (
     adaptability,
@@ -24,6 +24,7 @@ from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
 from .sequential import LookVerdict, look_alphas, verdict_at_look
+from .simulation import Simulation
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -42,8 +43,10 @@ __all__ = [
     "IndicatorError",
     "Interval",
     "LookVerdict",
+    "Options",
     "ScalingFit",
     "SelfRepair",
+    "Simulation",
     "SurvivalCurve",
     "Trial",
     "Trials",

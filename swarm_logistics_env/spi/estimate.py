@@ -11,6 +11,7 @@ import numpy as np
 from .bootstrap import MIN_SEEDS
 from .inputs import IndicatorError, between_0_and_1, finite, performance, positive_mean, same_seeds
 from .ratio import RatioTest, paired_ratio
+from .simulation import Simulation, combined_ratio, simulated_samples
 from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
 
@@ -55,8 +56,9 @@ class Estimate:
             runs: the value is exact, and no evidence), "capped" (a capped P blocks the verdict on
             the side that it leans to: p = 1), "unbounded" (the mean denominator is not
             distinguishable from 0), "assumes_normal" (below ten paired seeds, or unpaired: the
-            verdict rests on normal differences), "skewed" (D is so skewed that the verdict errs
-            more often than it promises at this n).
+            verdict rests on normal differences), "with_simulation" (simulated runs narrow the
+            interval; the verdict rests on normal differences), "skewed" (D is so skewed that the
+            verdict errs more often than it promises at this n).
     """
 
     indicator: str
@@ -107,18 +109,44 @@ def verdict_at(alpha: float, p_value: float | None, probability: float | None) -
 LEAST_SEEDS = 3
 
 
+class Options(TypedDict, total=False):
+    """What every indicator takes besides its performances.
+
+    Attributes:
+        threshold: What theta is tested against, finite; 0 if not given.
+        confidence: Of the interval, in (0, 1); 0.95 if not given.
+        paired: Whether row i of every sample is the same seed; False for results that come without
+            seeds; True if not given.
+        saturated: Names of the performances that are capped (every item delivered in a run). The
+            true P is then larger: a reference that is capped blocks "supported", a changed
+            condition that is capped blocks "refuted".
+        identical: Whether the runs compared are the same runs, seed by seed: the value is then
+            exact.
+        simulation: Simulated runs of the same set-ups and of further ones, to narrow the interval;
+            for at least ten paired real runs.
+    """
+
+    threshold: float
+    confidence: float
+    paired: bool
+    saturated: Collection[str]
+    identical: bool
+    simulation: Simulation | None
+
+
 def judge(
     indicator: str,
     terms: Mapping[str, tuple[ArrayLike, float, float]],
     *,
     offset: float,
-    threshold: float,
-    confidence: float,
-    paired: bool,
+    threshold: float = 0.0,
+    confidence: float = 0.95,
+    paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
+    simulation: Simulation | None = None,
 ) -> Estimate:
-    """Estimate one ratio of means and judge it against `threshold`.
+    """Estimate one ratio of means and judge it against `threshold`; see `Options`.
 
     Args:
         indicator: Its name.
@@ -126,25 +154,16 @@ def judge(
             denominator; the first two are compared, the last is the reference that the ratio
             divides by.
         offset: Added to the ratio of means.
-        threshold: What theta is tested against, finite.
-        confidence: Of the interval, in (0, 1).
-        paired: Whether row i of every sample is the same seed.
-        saturated: Names of the terms whose P is capped (every item delivered in a run). The true P
-            is then larger: a reference that is capped blocks "supported", a changed condition that
-            is capped blocks "refuted".
-        identical: Whether the runs compared are the same runs, seed by seed.
 
     Raises:
         IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
-            reference 0, threshold or confidence out of range, an unknown name in `saturated`, or
-            `identical` with performances that differ.
+            reference 0, threshold or confidence out of range, an unknown name in `saturated`,
+            `identical` with performances that differ, or a simulation that does not fit.
     """
     finite("threshold", threshold)
     between_0_and_1("confidence", confidence)
     weighted = _checked(terms, saturated, paired=paired, identical=identical)
-    samples = {name: term.sample for name, term in weighted.items()}
-    *_, reference = samples.values()
-    n_seeds = min(sample.size for sample in samples.values())
+    n_seeds = min(term.sample.size for term in weighted.values())
     asked = _Asked(
         indicator=indicator,
         threshold=threshold,
@@ -152,30 +171,18 @@ def judge(
         n_seeds=n_seeds,
         paired=paired,
     )
-    if identical or n_seeds == 1:
+    if simulation is None and (identical or n_seeds == 1):
         return _untested(asked, weighted, offset, identical=identical)
-
-    flags = []
-    correlation = None
-    if paired:
-        num, den = _numerator(weighted), reference
-        test = paired_ratio(num, den, offset=offset, threshold=threshold, confidence=confidence)
-        correlation = pairing_correlation(*list(samples.values())[:2])
-        # Without spread the skewness of D would be one of rounding errors.
-        if not test.degenerate and _skewed(num - (threshold - offset) * den):
-            flags.append("skewed")
-    else:
-        test = unpaired_ratio(
-            list(weighted.values()), offset=offset, threshold=threshold, confidence=confidence
-        )
+    test, flags = _tested(weighted, offset, asked, simulation)
     p_value, probability = float(test.p_value), float(test.probability)
     flags += _flags(test, n_seeds, _capped_side(weighted, saturated))
     if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
         p_value, probability = 1.0, 0.5
-    elif not paired or n_seeds < MIN_SEEDS:
+    elif not paired or n_seeds < MIN_SEEDS or simulation is not None:
         flags.append("assumes_normal")
     if test.unbounded:
         flags.append("unbounded")
+    compared = [term.sample for term in weighted.values()][:2]
     return Estimate(
         **asked,
         value=float(test.value),
@@ -184,12 +191,40 @@ def judge(
         probability=probability,
         verdict=verdict_at(1.0 - confidence, p_value, probability),
         p_value=p_value,
-        pairing_correlation=correlation,
+        pairing_correlation=pairing_correlation(*compared) if paired else None,
         difference_sd=float(test.difference_sd),
         mean_denominator=float(test.mean_denominator),
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flags),
     )
+
+
+def _tested(
+    weighted: Mapping[str, Term], offset: float, asked: _Asked, simulation: Simulation | None
+) -> tuple[RatioTest, list[str]]:
+    """Return the test that the data allow, and what to say of it."""
+    asking = {
+        "offset": offset,
+        "threshold": asked["threshold"],
+        "confidence": asked["confidence"],
+    }
+    if not asked["paired"]:
+        if simulation is not None:
+            raise IndicatorError("simulation needs paired = True: set-ups that were replayed")
+        return unpaired_ratio(list(weighted.values()), **asking), []
+    *_, reference = weighted.values()
+    num, den = _numerator(weighted), reference.sample
+    if simulation is not None:
+        weights = {name: (term.in_num, term.in_den) for name, term in weighted.items()}
+        replayed, further = (
+            simulated_samples(name, samples, weights)
+            for name, samples in zip(Simulation._fields, simulation, strict=True)
+        )
+        return combined_ratio((num, den), replayed, further, **asking), ["with_simulation"]
+    test = paired_ratio(num, den, **asking)
+    # Without spread the skewness of D would be one of rounding errors.
+    skewed = not test.degenerate and _skewed(num - (asked["threshold"] - offset) * den)
+    return test, ["skewed"] if skewed else []
 
 
 class _Asked(TypedDict):
