@@ -65,22 +65,23 @@ def main(resamples: int = 2_000, further: int = 150) -> dict[int, tuple[float, f
         trials = spi.read_trials(file)
         few, many = (trials.performance(n_robots=n) for n in SIZES)
         samples.append(((many - few) * weight, few))
-    (num, den), _ = samples
+    (num, den), (sim_num, sim_den) = samples
     truth = num.mean() / den.mean()
     print(f"S from {before} to {after} robots in {num.size} real set-ups: {truth:.3f}")
     found = {}
-    for runs in (10, 20):
-        generator = np.random.default_rng(runs)
-        chosen = generator.integers(num.size, size=(resamples, runs))
+    for n_real in (10, 20):
+        generator = np.random.default_rng(n_real)
+        chosen = generator.integers(num.size, size=(resamples, n_real))
         others = generator.integers(num.size, size=(resamples, further))
-        real, replayed = (tuple(part[chosen] for part in sample) for sample in samples)
-        both = combined_ratio(real, replayed, tuple(part[others] for part in samples[1]))
+        real = num[chosen], den[chosen]
+        replayed, more = ((sim_num[runs], sim_den[runs]) for runs in (chosen, others))
+        both = combined_ratio(real, replayed, more)
         alone = paired_ratio(*real)
         covered = float(((both.low <= truth) & (truth <= both.high)).mean())
         width = float(np.median((both.high - both.low) / (alone.high - alone.low)))
-        found[runs] = covered, width
+        found[n_real] = covered, width
         print(
-            f"{runs} real runs and {further} further simulated ones: the interval holds it in "
+            f"{n_real} real runs and {further} further simulated ones: the interval holds it in "
             f"{covered:.3f} of {resamples} studies, and is {1 - width:.0%} narrower than that of "
             "the real runs alone"
         )

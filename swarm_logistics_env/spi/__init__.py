@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .efficiency import karp_flatt, marginal_gain, per_robot_efficiency
+from .efficiency import karp_flatt
 from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
 from .indicators import (
@@ -23,7 +23,7 @@ from .power import (
 from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
-from .sequential import LookVerdict, look_alphas, verdict_at_look
+from .sequential import look_alphas
 from .simulation import Simulation
 from .summaries import (
     Interval,
@@ -42,7 +42,6 @@ __all__ = [
     "FaultBudget",
     "IndicatorError",
     "Interval",
-    "LookVerdict",
     "Options",
     "ScalingFit",
     "SelfRepair",
@@ -64,12 +63,10 @@ __all__ = [
     "karp_flatt",
     "look_alphas",
     "lower_decile_of_power",
-    "marginal_gain",
     "mean_interval",
     "minimum_detectable_effect",
     "no_plan_because",
     "pairing_correlation",
-    "per_robot_efficiency",
     "prediction_interval",
     "probability_of_improvement",
     "read_trials",
@@ -80,6 +77,5 @@ __all__ = [
     "scalability",
     "seeds_for_power",
     "self_repair",
-    "verdict_at_look",
     "worst_decile",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
@@ -163,17 +163,25 @@ def judge(
     finite("threshold", threshold)
     between_0_and_1("confidence", confidence)
     weighted = _checked(terms, saturated, paired=paired, identical=identical)
-    n_seeds = min(term.sample.size for term in weighted.values())
-    asked = _Asked(
+    samples = [term.sample for term in weighted.values()]
+    mean_den = float(samples[-1].mean())
+    mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
+    n_seeds = min(sample.size for sample in samples)
+    untested = Estimate(
         indicator=indicator,
+        value=mean_num / mean_den + offset,
         threshold=threshold,
         confidence=confidence,
         n_seeds=n_seeds,
         paired=paired,
+        mean_denominator=mean_den,
     )
-    if simulation is None and (identical or n_seeds == 1):
-        return _untested(asked, weighted, offset, identical=identical)
-    test, flags = _tested(weighted, offset, asked, simulation)
+    if identical:  # the same runs leave nothing to test
+        value = untested.value
+        return replace(untested, low=value, high=value, flags=("identical",))
+    if n_seeds == 1 and simulation is None:
+        return replace(untested, flags=("single_seed",))
+    test, flags = _tested(untested, weighted, offset, simulation)
     p_value, probability = float(test.p_value), float(test.probability)
     flags += _flags(test, n_seeds, _capped_side(weighted, saturated))
     if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
@@ -182,16 +190,15 @@ def judge(
         flags.append("assumes_normal")
     if test.unbounded:
         flags.append("unbounded")
-    compared = [term.sample for term in weighted.values()][:2]
-    return Estimate(
-        **asked,
+    return replace(
+        untested,
         value=float(test.value),
         low=None if test.degenerate else float(test.low),
         high=None if test.degenerate else float(test.high),
         probability=probability,
         verdict=verdict_at(1.0 - confidence, p_value, probability),
         p_value=p_value,
-        pairing_correlation=pairing_correlation(*compared) if paired else None,
+        pairing_correlation=pairing_correlation(*samples[:2]) if paired else None,
         difference_sd=float(test.difference_sd),
         mean_denominator=float(test.mean_denominator),
         degrees_of_freedom=test.degrees_of_freedom,
@@ -200,15 +207,15 @@ def judge(
 
 
 def _tested(
-    weighted: Mapping[str, Term], offset: float, asked: _Asked, simulation: Simulation | None
+    asked: Estimate, weighted: Mapping[str, Term], offset: float, simulation: Simulation | None
 ) -> tuple[RatioTest, list[str]]:
     """Return the test that the data allow, and what to say of it."""
     asking = {
         "offset": offset,
-        "threshold": asked["threshold"],
-        "confidence": asked["confidence"],
+        "threshold": asked.threshold,
+        "confidence": asked.confidence,
     }
-    if not asked["paired"]:
+    if not asked.paired:
         if simulation is not None:
             raise IndicatorError("simulation needs paired = True: set-ups that were replayed")
         return unpaired_ratio(list(weighted.values()), **asking), []
@@ -223,34 +230,8 @@ def _tested(
         return combined_ratio((num, den), replayed, further, **asking), ["with_simulation"]
     test = paired_ratio(num, den, **asking)
     # Without spread the skewness of D would be one of rounding errors.
-    skewed = not test.degenerate and _skewed(num - (asked["threshold"] - offset) * den)
+    skewed = not test.degenerate and _skewed(num - (asked.threshold - offset) * den)
     return test, ["skewed"] if skewed else []
-
-
-class _Asked(TypedDict):
-    indicator: str
-    threshold: float
-    confidence: float
-    n_seeds: int
-    paired: bool
-
-
-def _untested(
-    asked: _Asked, weighted: Mapping[str, Term], offset: float, *, identical: bool
-) -> Estimate:
-    """Return the value alone: one seed has no spread, and identical runs leave nothing to test."""
-    *_, reference = (term.sample for term in weighted.values())
-    mean_den = float(reference.mean())
-    mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
-    value = mean_num / mean_den + offset
-    return Estimate(
-        **asked,
-        value=value,
-        low=value if identical else None,
-        high=value if identical else None,
-        mean_denominator=mean_den,
-        flags=("identical",) if identical else ("single_seed",),
-    )
 
 
 def _checked(
@@ -271,7 +252,12 @@ def _checked(
         if name not in samples:
             raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
     if identical:
-        _refuse_differing(samples, paired=paired)
+        first = next(iter(samples))
+        for name in samples:
+            if not paired or not np.array_equal(samples[first], samples[name]):
+                raise IndicatorError(
+                    f"identical = True, but {first} and {name} differ: should be paired and equal"
+                )
     *_, (reference_name, reference) = samples.items()
     positive_mean(reference_name, reference)
     return weighted
@@ -285,15 +271,6 @@ def _flags(test: RatioTest, n_seeds: int, capped_side: set[Verdict]) -> Iterator
         yield "degenerate"
     if ("supported" if test.probability > 0.5 else "refuted") in capped_side:
         yield "capped"
-
-
-def _refuse_differing(samples: Mapping[str, NDArray[np.float64]], *, paired: bool) -> None:
-    (name, first), *others = samples.items()
-    for other_name, other in others:
-        if not paired or not np.array_equal(first, other):
-            raise IndicatorError(
-                f"identical = True, but {name} and {other_name} differ: should be paired and equal"
-            )
 
 
 def _capped_side(terms: Mapping[str, Term], saturated: Collection[str]) -> set[Verdict]:
