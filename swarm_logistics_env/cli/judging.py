@@ -11,7 +11,7 @@ from swarm_logistics_env.cli.study_commands import (
     PolicyOption,
     ProcessesOption,
     TrustCodeOption,
-    show_study,
+    show_report,
     study,
     study_of,
 )
@@ -50,6 +50,14 @@ def judge_command(
     duration: Annotated[
         float | None, typer.Option(help="Length of every trial [s], where no column says it.")
     ] = None,
+    simulated: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE|DIR",
+            help="Simulated trials with the same seeds and further ones, or a study of them, that "
+            "narrow the intervals of at least ten real trials.",
+        ),
+    ] = None,
     setup: Annotated[
         list[str] | None,
         typer.Option(
@@ -65,27 +73,39 @@ def judge_command(
     """
     from tempfile import TemporaryDirectory
 
+    from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.latex import latex_tables
     from swarm_logistics_env.report.report_files import write_text
+    from swarm_logistics_env.report.with_simulation import with_simulation
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.importing import import_results
 
     with TemporaryDirectory() as elsewhere:
-        directory = out or Path(elsewhere) / "study"
-        count = import_results(
-            file,
-            directory,
-            columns=dict(_pair("--column", text) for text in columns or []),
-            ignore=ignore or (),
-            duration=duration,
-            setup=_stated(setup or []),
-        )
-        typer.echo(f"{count} runs in {out or file}\n")
-        stored = Study.stored(directory)
-        whole = show_study(stored, write=out is not None)
-        if out is not None:
-            write_text(out / "tables.tex", latex_tables(whole.summary))
-            typer.echo(f"Written: {out / 'tables.tex'}")
+
+        def results_of(trials: Path, directory: Path) -> StudyResults:
+            count = import_results(
+                trials,
+                directory,
+                columns=dict(_pair("--column", text) for text in columns or []),
+                ignore=ignore or (),
+                duration=duration,
+                setup=_stated(setup or []),
+            )
+            typer.echo(f"{count} runs in {trials}\n")
+            return Study.stored(directory).findings()
+
+        results = results_of(file, out or Path(elsewhere) / "study")
+        whole = document(results)
+        if simulated is not None:
+            if simulated.is_dir():
+                model = Study.stored(simulated).findings()
+            else:
+                model = results_of(simulated, Path(elsewhere) / "simulated")
+            whole = with_simulation(whole, results, model)
+        show_report(results, whole, out)
+    if out is not None:
+        write_text(out / "tables.tex", latex_tables(whole.summary))
+        typer.echo(f"Written: {out / 'tables.tex'}")
 
 
 def _stated(texts: list[str]) -> dict[str, str]:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.engines import Engine
     from swarm_logistics_env.studies.plan import Plan
+    from swarm_logistics_env.studies.results import StudyResults
     from swarm_logistics_env.studies.shards import Shard
     from swarm_logistics_env.studies.study import Tally
 
@@ -108,7 +109,7 @@ def run_command(
         typer.echo(f"{warning}\n")
     tally = _run(chosen, player, part)
     if part is None:
-        show_study(chosen)
+        _show(chosen)
     else:
         typer.echo(
             f"When all {part.count} shards are done: swarm-logistics study merge "
@@ -132,7 +133,7 @@ def report_command(
 
     stored = Study.stored(directory, trust_code=trust_code)
     typer.echo(f"{stored.plan()}\n")
-    show_study(stored)
+    _show(stored)
 
 
 @study.command("export")
@@ -232,24 +233,26 @@ def _in_one_line(tally: Tally, players: str) -> str:
     )
 
 
-def show_study(asked: Study, *, write: bool = True) -> Document:
-    """Print a study's report, and write it into the study's directory; return all of it."""
+def show_report(results: StudyResults, whole: Document, out: Path | None) -> None:
+    """Print the summary of a study's report, and write all of it into a directory."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.report_files import (
         how_to_get_figures,
         missing_packages,
         write_report,
     )
 
-    results = asked.findings()
-    whole = document(results)
     for section in whole.summary:
         show(section)
-    if write:
-        assert asked.out is not None
-        written = write_report(results, asked.out, whole)
+    if out is not None:
+        written = write_report(results, out, whole)
         typer.echo(f"Written: {', '.join(str(path) for path in written)}")
         if missing := missing_packages():
             typer.echo(how_to_get_figures(missing))
-    return whole
+
+
+def _show(asked: Study) -> None:
+    from swarm_logistics_env.report.document import document
+
+    results = asked.findings()
+    show_report(results, document(results), asked.out)

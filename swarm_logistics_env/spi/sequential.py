@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .estimate import verdict_at
 from .inputs import IndicatorError, between_0_and_1, count
 
 if TYPE_CHECKING:
@@ -16,18 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .estimate import Estimate, Verdict
-
 _REACH = 9.0  # standard deviations that the integration grid covers
 _GRID = 801  # its points: the boundaries are then right to five digits
-
-
-class LookVerdict(NamedTuple):
-    """A verdict at one look: the alpha it was taken at, and whether that look was declared."""
-
-    verdict: Verdict
-    alpha: float
-    exploratory: bool
 
 
 def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
@@ -80,24 +69,6 @@ def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
         weights = _simpson(points)
         information, spent = now, spent + to_spend
     return tuple(alphas)
-
-
-def verdict_at_look(estimate: Estimate, looks: Sequence[int]) -> LookVerdict:
-    """Judge an estimate at the look that its number of seeds is.
-
-    At a number of seeds that was not declared the verdict is taken at the full alpha and marked
-    exploratory: nothing bounds the error of stopping where the data please.
-
-    Raises:
-        IndicatorError: Looks as for `look_alphas`.
-    """
-    alpha = 1.0 - estimate.confidence
-    alphas = dict(zip(looks, look_alphas(looks, alpha), strict=True))
-    declared = alphas.get(estimate.n_seeds)
-    at = alpha if declared is None else declared
-    return LookVerdict(
-        verdict_at(at, estimate.p_value, estimate.probability), at, exploratory=declared is None
-    )
 
 
 def _spent(information: float, alpha: float) -> float:

@@ -20,7 +20,7 @@ NO_FAULT = "none"
 REMOVED = "removed"
 REPEATED = "other behaviour"  # no fault, a second time: what chance alone makes of a pair
 _FAULTS = {
-    NO_FAULT: ("", "-", "0", "no", "no fault", "ok", "healthy", "kein", "keine", "ohne"),
+    NO_FAULT: ("", "-", "0", "no", "no fault", "ok", "healthy", "kein", "keine", "keiner", "ohne"),
     REMOVED: ("absent", "entfernt"),
     REPEATED: ("none again", "keine nochmal"),
 }

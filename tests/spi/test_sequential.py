@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -45,26 +43,6 @@ def test_alphas_rise_and_the_last_is_nearly_the_whole() -> None:
 
 def test_a_very_early_look_practically_never_stops() -> None:
     assert spi.look_alphas((1, 1_000))[0] < 1e-15
-
-
-def estimate(n: int, p_value: float) -> spi.Estimate:
-    blank = spi.robustness([39, 40], [35, 30], n=25, m=1)
-    return dataclasses.replace(blank, n_seeds=n, p_value=p_value, probability=1 - p_value / 2)
-
-
-def test_an_early_look_asks_for_more() -> None:
-    early = spi.verdict_at_look(estimate(10, 0.01), looks=(10, 20))
-    assert (early.verdict, early.exploratory) == ("inconclusive", False)
-    assert early.alpha == pytest.approx(0.00305, abs=1e-5)
-    assert spi.verdict_at_look(estimate(20, 0.01), looks=(10, 20)).verdict == "supported"
-    assert spi.verdict_at_look(estimate(10, 0.001), looks=(10, 20)).verdict == "supported"
-
-
-@pytest.mark.parametrize("n", [15, 25])
-def test_an_undeclared_look_is_exploratory(n: int) -> None:
-    look = spi.verdict_at_look(estimate(n, 0.04), looks=(10, 20))
-    assert (look.verdict, look.exploratory) == ("supported", True)
-    assert look.alpha == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("looks", [(), (0, 10), (10, 10), (20, 10)])
