@@ -53,7 +53,7 @@ def _unpacked_at(structure: type, address: int) -> Any:
     def loaded(kind: Any) -> Any:
         if isinstance(kind, tuple):
             where = _load(next(words))
-            shape = tuple(_load(next(words)) for _ in range(kind[1]))
+            shape = tuple(_load(next(words)) for _ in kind[1])
             size = int(np.prod(shape)) * kind[0].itemsize
             memory = (ctypes.c_char * size).from_address(where)
             return np.frombuffer(memory, kind[0]).reshape(shape)
