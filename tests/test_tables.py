@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
@@ -151,3 +152,39 @@ def test_no_table_of_the_readme_is_typed_by_hand() -> None:
     assert not [line for line in rest.splitlines() if line.startswith("|")]
     # Nor is a value with its interval: "9.2 [8.3, 10.1]".
     assert not re.findall(r"\d \[-?\d", rest)
+
+
+def test_foraging_stands_beside_the_warehouse(
+    tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = importlib.import_module("play_foraging")
+    questions: dict[str, Any] = {
+        "seeds": 2,
+        "sizes": [{"values": [5, 10]}],
+        "faults": [{"modes": ["FM4"], "robots": [2]}],
+    }
+    scenario = {"duration": 40.0, "restock": True}
+    small = (
+        Study(out=tmp_path / "1", task="foraging", policies=["forager"], scenario=scenario,
+              **questions),
+        Study(out=tmp_path / "2", policies=["swarm-dt"], scenario=scenario, **questions),
+    )  # fmt: skip
+    monkeypatch.setattr(tables, "PROCESSES", 1)
+    text = script.side_by_side(script.play(small))
+    assert text.startswith("|  | foraging: `forager` | warehouse: `swarm-dt` |")
+    for study, column in zip(small, (2, 3), strict=True):
+        results = study.findings()
+        five = next(c for c in results.cells if str(c.arm.setting) == "N = 5").performance
+        (row,) = [line for line in text.splitlines() if line.startswith("| P, N = 5 |")]
+        assert row.split("|")[column].strip().startswith(f"{five.mean():.1f} [")
+        (robustness,) = [test for test in results.tests if test.indicator == "R"]
+        (row,) = [line for line in text.splitlines() if line.startswith("| R, FM4, m = 2 |")]
+        assert wording.ratio(robustness) in row.split("|")[column]
+    # The real studies ask the same of both worlds, and their table stands on the page.
+    first, second = (study.specification for study in script.studies(tmp_path))
+    for part in ("seeds", "first_seed", "sizes", "faults", "parameters"):
+        assert getattr(first, part) == getattr(second, part)
+    assert (first.scenario.duration, first.scenario.restock) == (500.0, True)
+    assert second.scenario.restock
+    page = script.PAGE.read_text(encoding="utf-8")
+    assert script.rewritten(page, {"foraging": "x"}).count("| ---") < page.count("| ---")

@@ -17,7 +17,7 @@ from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario, Wareho
 class Foraging(WarehouseTask):
     """Each working robot brings as many items as its policy's number says; no physics."""
 
-    name = "toy foraging"
+    name = "toy"
 
     def code(self) -> str:
         return "foraging 1"
@@ -82,7 +82,7 @@ def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_p
 
 def test_a_task_that_was_an_object_is_handed_over_again(tmp_path: Path) -> None:
     Study(out=tmp_path, task=FORAGING, seeds=1, sizes=[{"values": [2, 4]}]).run()
-    with pytest.raises(StudyError, match=r"task 'toy foraging', an object.*Study\.stored\("):
+    with pytest.raises(StudyError, match=r"task 'toy', an object.*Study\.stored\("):
         Study.stored(tmp_path, trust_code=True)
     assert Study.stored(tmp_path, task=FORAGING).run().kept == 2
 
