@@ -17,6 +17,10 @@ from swarm_logistics_env.train.training import Training
 
 ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 
+# What an untrained network says whatever it reads: it drives ahead, so that it meets things. One
+# that trembles on the spot would learn very slowly that searching pays.
+FIRST_OUTPUTS = (0.8, 0.0, 0.0)
+
 
 def make_learner(
     training: Training, view: NetworkView, device: str, *, goes_on: bool = False
@@ -51,6 +55,7 @@ def make_learner(
     )
     with torch.no_grad():
         learner.policy.log_std.copy_(torch.tensor(ppo.deviations).log())
+        learner.policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
     return learner
 
 

@@ -1,13 +1,16 @@
-"""The specification of a training: one validated record, read from TOML."""
+"""The specification of a training: one validated record, read from TOML, and the presets."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
 from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
@@ -20,6 +23,8 @@ from swarm_logistics_env.train.settings import (
     Scores,
     WorldKind,
 )
+
+PRESETS = Path(__file__).parent / "presets"
 
 # stable-baselines3 shuffles with numpy's global generator, which takes seeds of 32 bits.
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
@@ -133,3 +138,30 @@ class Training(Part):
     def rows(self) -> int:
         """Robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
+
+
+def preset_names() -> list[str]:
+    """Return the names of the trainings that come with the package."""
+    return sorted(path.stem for path in PRESETS.glob("*.toml"))
+
+
+def load_training(asked: str, **fields: object) -> Training:
+    """Return a preset by its name, or the training in a TOML file, with some fields changed.
+
+    Raises:
+        TrainingError: there is none, it is not TOML, or a field of it is unknown or cannot be.
+    """
+    path = Path(asked) if asked.endswith(".toml") else PRESETS / f"{asked}.toml"
+    if path.parent == PRESETS and path.stem not in preset_names():
+        raise TrainingError(f"no training preset {asked!r}{suggest(asked, preset_names())}")
+    try:
+        given = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TrainingError(f"cannot read the training {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = str(error).splitlines()[0]
+        raise TrainingError(f"the training {path} is not TOML: {reason}") from error
+    try:
+        return Training(**{"name": path.stem, **given, **fields})
+    except SwarmLogisticsError as error:  # whichever record of it refuses
+        raise TrainingError(f"{path.name}: {error}") from error
