@@ -350,6 +350,7 @@ def _code(task: ParallelTask, settings: str) -> str:
         env = task._made(task.default, ())
         try:
             tops = {kind.__module__.partition(".")[0] for kind in type(env.unwrapped).__mro__}
+            tops -= {package.name}  # its own code is known by its sources
         finally:
             env.close()
         installed = packages_distributions()

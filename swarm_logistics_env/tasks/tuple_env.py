@@ -14,7 +14,7 @@ class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     """The parallel form of a Gymnasium environment with a tuple entry for each agent.
 
     All agents are there from the first step to the last. A reward that is one number is given to
-    each of them, as one info is.
+    each of them; so is an info that is not told by agent.
 
     Args:
         env: e.g. of RWARE, or of VMAS with `terminated_truncated=True`.
@@ -58,7 +58,7 @@ class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         """Begin an episode."""
         observations, info = self.env.reset(seed=seed, options=options)
         self.agents = self.possible_agents[:]
-        return dict(zip(self.agents, observations)), dict.fromkeys(self.agents, info)
+        return dict(zip(self.agents, observations)), self._infos(info)
 
     def step(
         self, actions: dict[str, Any]
@@ -76,6 +76,7 @@ class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             tuple(actions[agent] for agent in agents)
         )
         each = [rewards] * len(agents) if isinstance(rewards, int | float) else rewards
+        infos = self._infos(info)
         if terminated or truncated:
             self.agents = []
         return (
@@ -83,8 +84,12 @@ class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             {agent: float(reward) for agent, reward in zip(agents, each)},
             {agent: bool(terminated) for agent in agents},
             {agent: bool(truncated) for agent in agents},
-            dict.fromkeys(agents, info),
+            infos,
         )
+
+    def _infos(self, info: dict[str, Any]) -> dict[str, Any]:
+        by_agent = set(info) == set(self.agents)
+        return {agent: info[agent] if by_agent else info for agent in self.agents}
 
     def close(self) -> None:
         """Close it."""
