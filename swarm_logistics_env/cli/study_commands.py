@@ -176,6 +176,7 @@ def study_of(
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
+    from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.studies import Study
 
     if seeds is not None:
@@ -184,6 +185,12 @@ def study_of(
         fields["first_seed"] = first_seed
     if policies:
         fields["policies"] = tuple(policies)
+        for name in policies:
+            if name.endswith(".zip") and not trust_code:
+                raise StudyError(
+                    f"--policy {name}: reading a model of stable-baselines3 executes the code in "
+                    "it: should be allowed by --trust-code"
+                )
     if asked.endswith(".toml") or Path(asked).is_file():
         return Study.from_file(asked, out=out, trust_code=trust_code, **fields)
     return Study.preset(asked, out=out, **fields)
