@@ -6,8 +6,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, suggest
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.curves import Curve, Event
@@ -135,14 +133,6 @@ class Session:
         self.note = f"seed {self.seed} again"
 
     # Robots
-
-    def robot_at(self, x: float, y: float, reach: float) -> int | None:
-        """Return the robot nearest to a position [m] and within `reach` [m] of it, if any."""
-        state = self.run.world.state
-        away = np.hypot(state.robot_position[:, 0] - x, state.robot_position[:, 1] - y)
-        away[~state.robot_present] = np.inf
-        nearest = int(np.argmin(away))
-        return nearest if away[nearest] <= reach else None
 
     def select(self, robot: int | None) -> None:
         """Inspect `robot`, or none."""
