@@ -10,6 +10,7 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering.canvas import new_canvas, to_array
 from swarm_logistics_env.rendering.curves import Curve, Event
@@ -19,7 +20,6 @@ from swarm_logistics_env.rendering.projection import LARGEST_SIZE, LEAST_SIZE
 from swarm_logistics_env.rendering.sprites import words
 from swarm_logistics_env.rendering.strip import draw_strip
 from swarm_logistics_env.warehouse.faults import failed_robots
-from swarm_logistics_env.watch.play import Play
 
 MOST_TAKES = 4
 LAST_FRAME = 2.0  # [s] that it stays, so that a loop can be read

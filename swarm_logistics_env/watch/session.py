@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, suggest
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.curves import Curve, Event
@@ -13,7 +14,6 @@ from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
-from swarm_logistics_env.watch.play import Play
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 WIDTH_STEP = 0.25  # [m]
