@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Warehouse
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.testing.items import Count, counted, wrong_count, wrong_item
+from swarm_logistics_env.testing.world_checks import Count, counted, wrong_count, wrong_item
 from swarm_logistics_env.warehouse import FAILURE_MODES, FailureMode
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 

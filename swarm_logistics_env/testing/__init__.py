@@ -10,7 +10,8 @@ Example:
     >>> testing.check_spaces(make, steps=20)
 """
 
-from swarm_logistics_env.testing.conformance_errors import (
+from swarm_logistics_env.testing.determinism import check_determinism
+from swarm_logistics_env.testing.playing import (
     ConformanceError,
     ConservationError,
     DeterminismError,
@@ -18,11 +19,12 @@ from swarm_logistics_env.testing.conformance_errors import (
     OverlapError,
     SpaceError,
 )
-from swarm_logistics_env.testing.determinism import check_determinism
-from swarm_logistics_env.testing.fault_check import check_faults
-from swarm_logistics_env.testing.items import check_conservation
-from swarm_logistics_env.testing.overlap import check_overlap
 from swarm_logistics_env.testing.space_check import check_spaces
+from swarm_logistics_env.testing.world_checks import (
+    check_conservation,
+    check_faults,
+    check_overlap,
+)
 
 __all__ = [
     "ConformanceError",

@@ -15,8 +15,7 @@ import numpy as np
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.testing.conformance_errors import DeterminismError
-from swarm_logistics_env.testing.playing import Make, Moment, played
+from swarm_logistics_env.testing.playing import DeterminismError, Make, Moment, played
 
 HASH_SEEDS = ("0", "20240229")
 

@@ -1,4 +1,4 @@
-"""Plays an episode of whatever a factory makes, through the dicts that everybody has."""
+"""Plays episodes for the checks, through the dict methods; the errors that checks raise."""
 
 from __future__ import annotations
 
@@ -12,6 +12,31 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import Policy, decide, start
 from swarm_logistics_env.warehouse import Warehouse
+
+
+class ConformanceError(AssertionError):
+    """An environment does not hold what this package promises of one."""
+
+
+class DeterminismError(ConformanceError):
+    """The same seed gave two trajectories."""
+
+
+class SpaceError(ConformanceError):
+    """An observation or a state that its space does not contain."""
+
+
+class ConservationError(ConformanceError):
+    """An item was lost, doubled or created."""
+
+
+class OverlapError(ConformanceError):
+    """Two robots stand in one place."""
+
+
+class FaultsError(ConformanceError):
+    """A failed robot did what it can no longer do, or nobody failed at all."""
+
 
 Make = Callable[[], Any]
 

@@ -8,8 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box
 
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.testing.conformance_errors import SpaceError
-from swarm_logistics_env.testing.playing import Make, Moment, played
+from swarm_logistics_env.testing.playing import Make, Moment, SpaceError, played
 
 
 def check_spaces(
