@@ -45,7 +45,7 @@ class Episode:
 
 
 class Play:
-    """An episode that is played step by step; whoever holds it may change its world in between.
+    """An episode that is played step by step; the caller may change its world in between.
 
     Args:
         policy_seed: decides the policy's own randomness; `seed` does if it is None.

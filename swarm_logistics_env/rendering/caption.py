@@ -22,9 +22,9 @@ class Caption:
     """Writes what cannot be seen in the warehouse itself.
 
     Args:
-        left, top: where it begins [px].
-        width: room for a line [px].
-        text_height: [px].
+        left, top: its upper left corner [px].
+        width: the longest line that fits [px].
+        text_height: the height of letters [px].
     """
 
     def __init__(self, left: int, top: int, width: int, text_height: int) -> None:

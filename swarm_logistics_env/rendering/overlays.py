@@ -21,7 +21,7 @@ _TRAIL_SHADES = 5
 
 
 def draw_trails(canvas: pygame.Surface, projection: Projection, trails: Trails) -> None:
-    """Draw where robots have been, the older the paler."""
+    """Draw the paths of the robots; older parts are paler."""
     past = trails.positions()
     times, n_robots, _ = past.shape
     pixels = np.array(projection.points(past.reshape(-1, 2))).reshape(times, n_robots, 2)
@@ -46,9 +46,9 @@ def draw_links(
     """Draw an arrow from the requested item's carrier to the neighbour it follows.
 
     Args:
-        robots: where robots are [px].
-        radius: theirs [px].
-        all_links: thin arrows from all other robots as well.
+        robots: the places of the robots on the picture [px].
+        radius: the radius of a robot [px].
+        all_links: whether to draw thin arrows from all other robots as well.
     """
     carrier = NOBODY
     if state.requested != NOBODY:

@@ -20,8 +20,8 @@ class Picture:
     """Draws states of a warehouse; see `Renderer` for the arguments.
 
     Attributes:
-        trails: where robots were, to which each state that is noted or drawn is added, or None.
-        projection: where the warehouse lies on the picture.
+        trails: the robots' paths so far, or None; each state that is noted or drawn is added.
+        projection: the place of the warehouse on the picture.
     """
 
     def __init__(

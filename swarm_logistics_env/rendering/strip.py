@@ -25,8 +25,9 @@ def draw_strip(
 
     Args:
         size: width and height [px].
-        curves: the runs.
-        duration: where the time axis ends [s].
+        curves: the deliveries of each run.
+        events: failures and repairs; each is marked on the time axis.
+        duration: the end of the time axis [s].
     """
     width, height = size
     canvas = new_canvas(width, height)
@@ -90,7 +91,7 @@ def _marks(events: Sequence[Event], apart: float) -> list[tuple[float, str]]:
 def _draw_names(
     canvas: pygame.Surface, curves: Sequence[Curve], width: int, text_height: int
 ) -> int:
-    """Write whose curve is which; return where the last line of it begins [px]."""
+    """Write which curve is which; return the top of the last line of names [px]."""
     x, y = text_height // 2, text_height // 3
     for curve in curves:
         colour, thick = palette.RUNS[curve.style % len(palette.RUNS)]

@@ -43,7 +43,7 @@ Make = Callable[[], Any]
 
 @dataclass(frozen=True)
 class Moment:
-    """What a reset or a step returned. `expected` are the agents that should be answered."""
+    """What a reset or a step returned; `expected` are the agents that it should answer."""
 
     env: Any
     step: int
@@ -65,12 +65,12 @@ def played(make: Make, policy: Policy | str, seed: int, steps: int) -> Iterator[
 
     Args:
         make: returns a new parallel environment: a `SwarmLogisticsEnv` in any wrappers.
-        policy: who steers, by name, path or as an object.
-        seed: of the episode and the policy.
-        steps: at most so many.
+        policy: the policy that plays: a name, a path, or the object.
+        seed: the seed of the episode and of the policy.
+        steps: the largest number of steps to play.
 
     Raises:
-        SetupError: what it makes is no such environment.
+        SetupError: `make` returns no such environment.
         PolicyError: there is no such policy.
     """
     env = make()

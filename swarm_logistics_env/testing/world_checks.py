@@ -44,9 +44,9 @@ def check_conservation(
 
     Args:
         make: returns a new parallel environment.
-        policy: who steers, by name, path or as an object.
-        seed: of the episode.
-        steps: at most so many.
+        policy: the policy that plays: a name, a path, or the object.
+        seed: the episode's seed.
+        steps: the largest number of steps to play.
 
     Raises:
         ConservationError: names the item and the step.
@@ -105,9 +105,9 @@ def check_overlap(
 
     Args:
         make: returns a new parallel environment.
-        policy: who steers, by name, path or as an object.
-        seed: of the episode.
-        steps: at most so many.
+        policy: the policy that plays: a name, a path, or the object.
+        seed: the episode's seed.
+        steps: the largest number of steps to play.
 
     Raises:
         OverlapError: names the robots, the step and the depth.
@@ -149,9 +149,9 @@ def check_faults(
 
     Args:
         make: returns a new parallel environment in which robots fail.
-        policy: who steers, by name, path or as an object.
-        seed: of the episode.
-        steps: at most so many.
+        policy: the policy that plays: a name, a path, or the object.
+        seed: the episode's seed.
+        steps: the largest number of steps to play.
 
     Raises:
         FaultsError: names the robot, its failure mode and the step; or nobody failed in so many

@@ -22,8 +22,8 @@ from swarm_logistics_env.rendering.strip import draw_strip
 from swarm_logistics_env.warehouse.faults import failed_robots
 
 MOST_TAKES = 4
-LAST_FRAME = 2.0  # [s] that it stays, so that a loop can be read
-_STRIP_HEIGHT = 0.3  # of a picture's longer side
+LAST_FRAME = 2.0  # [s] it stays so long, so that a looping film can be read
+_STRIP_HEIGHT = 0.3  # a part of a picture's longer side
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Take:
     """One of the runs that a film shows.
 
     Attributes:
-        name: what stands above it.
+        name: the title above it.
         play: the run, at its beginning.
     """
 
@@ -43,15 +43,15 @@ class Film:
     """Frames of runs side by side; the same runs give the same frames.
 
     Args:
-        takes: at most `MOST_TAKES`.
-        until: where the film ends [s of the runs].
-        speed: times real time.
-        frame_rate: [1/s].
-        size: longer side of each warehouse [px].
-        trails, all_links: as `Renderer` has them.
+        takes: the runs, at most `MOST_TAKES`.
+        until: the time of the runs at which the film ends [s].
+        speed: how many times real time it plays.
+        frame_rate: the number of frames per second of film [1/s].
+        size: the longer side of each warehouse [px].
+        trails, all_links: as in `Renderer`.
 
     Attributes:
-        n_frames: how many there will be, if the runs last until the end.
+        n_frames: the number of frames, if the runs last until the end.
 
     Raises:
         SetupError: an argument cannot be.

@@ -25,23 +25,23 @@ class Session:
     Args:
         scenario: the conditions.
         make_policy: called once for each of the two.
-        seed: of the first episode.
+        seed: the seed of the first episode.
         faults: scheduled in the run in every episode, besides the faults that one adds by hand.
-        speed: times real time, one of `SPEEDS`.
+        speed: how many times real time it plays; one of `SPEEDS`.
 
     Attributes:
-        run, twin: the two.
-        seed: of this episode.
+        run, twin: the run and its twin.
+        seed: the seed of this episode.
         paused: whether time stands still.
         mode: the failure mode that `break_robot` uses.
         selected: the robot that is inspected, or None.
-        events: what was done to robots in this episode.
-        note: the last thing that happened, a sentence.
-        trails: where the run's robots were in every step of late, however few are shown.
+        events: the failures and repairs of robots in this episode.
+        note: a sentence about what happened last.
+        trails: the paths of the run's robots, with every step, also of steps that are not shown.
 
     Raises:
         FaultError, ScenarioError: as `Warehouse.reset`.
-        SetupError: no such speed.
+        SetupError: `speed` is not one of `SPEEDS`.
     """
 
     def __init__(
@@ -86,11 +86,11 @@ class Session:
     # Time
 
     def play(self, elapsed: float, budget: float = math.inf) -> int:
-        """Let run and twin go on for so much wall time; return the steps that took.
+        """Let run and twin go on for some wall time; return the number of steps taken.
 
         Args:
-            elapsed: since the last call [s].
-            budget: of computing [s]; what does not fit into it is not caught up with.
+            elapsed: wall time since the last call [s].
+            budget: the most time to compute [s]; steps that do not fit into it are left out.
         """
         if self.paused or self.is_over:
             return 0
@@ -135,7 +135,7 @@ class Session:
     # Robots
 
     def select(self, robot: int | None) -> None:
-        """Inspect `robot`, or none."""
+        """Inspect `robot`; None ends the inspection."""
         if robot is not None:
             self._check_there(robot)
         self.selected = robot

@@ -204,7 +204,7 @@ class IndicatorReward(Wrapper):
         """Store the condition of the episode and what it pays."""
         self._seed = seed
         self._paid, self._delivered = Payment(), 0
-        self._carriers = set[int]()  # of the requested item since it was asked for
+        self._carriers = set[int]()  # those that carried the requested item since its request
         self._take_condition()
 
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
