@@ -25,8 +25,8 @@ RenderMode = Literal["rgb_array", "human"]
 class Renderer:
     """Draws states of a warehouse.
 
-    A frame depends on the state and the arguments alone (with `trails`, on the states before it
-    too). It can be pickled and copied; a copy opens a window of its own.
+    A frame depends on the state and the arguments alone; with `trails` also on the states before
+    it. A renderer can be pickled and copied; a copy opens a window of its own.
 
     Args:
         scenario: the conditions; another one may come with each frame, and the picture's size
@@ -39,7 +39,7 @@ class Renderer:
             rather than only the one that carries the requested item.
 
     Raises:
-        SetupError: pygame is not installed, or an argument cannot be.
+        SetupError: pygame is not installed, or an argument is not allowed.
 
     Example:
         >>> from swarm_logistics_env import Scenario, Warehouse
@@ -86,7 +86,7 @@ class Renderer:
         self._was_closed_by_user = False
 
     def frame(self, state: WarehouseState, scenario: Scenario) -> NDArray[np.uint8]:
-        """Return the picture of `state`: (H, W, 3), red, green, blue. Works in either mode."""
+        """Return the picture of `state` in either mode: (H, W, 3), uint8, red, green and blue."""
         from swarm_logistics_env.rendering.canvas import to_array
 
         return to_array(self._picture.draw(state, scenario))
@@ -94,7 +94,7 @@ class Renderer:
     def show(self, state: WarehouseState, scenario: Scenario) -> None:
         """Show `state` in the window, at most one state per control period of real time.
 
-        Nothing is shown any more once the user has closed the window.
+        After the user has closed the window, nothing is shown any more.
 
         Raises:
             SetupError: the mode is not "human", or there is no display.

@@ -1,7 +1,7 @@
 """Checks to run on an environment with wrappers or a policy of one's own.
 
-Each takes `make`, a function that returns a new parallel environment, plays one episode of it, and
-raises an AssertionError of its own kind with one sentence about the first thing that is wrong.
+Each check takes `make`, a function that returns a new parallel environment. It plays one episode
+and raises its own subclass of AssertionError, with a sentence about the first thing that is wrong.
 
 Example:
     >>> import functools

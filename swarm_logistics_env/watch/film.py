@@ -54,7 +54,7 @@ class Film:
         n_frames: the number of frames, if the runs last until the end.
 
     Raises:
-        SetupError: an argument cannot be.
+        SetupError: an argument is not allowed.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Film:
         """Play the runs and return their pictures: (H, W, 3), red, green, blue, even sides.
 
         Raises:
-            PolicyError: the commands of a policy cannot be.
+            PolicyError: a policy returned commands of the wrong shape, or not finite.
         """
         frame, count, time = self._draw(), 0, 0.0
         yield frame

@@ -20,13 +20,13 @@ WIDTH_STEP = 0.25  # [m]
 
 
 class Session:
-    """A run and its twin: same seed, same policy, same conditions, but no fault ever.
+    """A run and its twin, which has the same seed, policy and conditions but no faults.
 
     Args:
         scenario: the conditions.
-        make_policy: called once for each of the two.
+        make_policy: returns a policy; it is called once for the run and once for the twin.
         seed: the seed of the first episode.
-        faults: scheduled in the run in every episode, besides the faults that one adds by hand.
+        faults: faults of the run in every episode, in addition to those that are added by hand.
         speed: how many times real time it plays; one of `SPEEDS`.
 
     Attributes:
@@ -106,11 +106,11 @@ class Session:
         return steps
 
     def pause(self) -> None:
-        """Stop time, or let it go on."""
+        """Pause, or go on."""
         self.paused = not self.paused
 
     def step(self) -> None:
-        """Stop time, and take one control period."""
+        """Pause, and take one control period."""
         self.paused = True
         self._advance()
 
@@ -152,7 +152,7 @@ class Session:
         self.mode = modes[(modes.index(self.mode) + (1 if forward else -1)) % len(modes)]
 
     def break_robot(self, robot: int | None = None) -> None:
-        """Let a robot, the selected one if None, fail from now on in the chosen mode."""
+        """Let `robot` fail from now on in the chosen mode; None means the selected robot."""
         robot = self._meant(robot)
         if robot is None:
             return
@@ -167,7 +167,7 @@ class Session:
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
 
     def repair_robot(self, robot: int | None = None) -> None:
-        """End every failure that holds of a robot, the selected one if None."""
+        """End all failures of `robot`; None means the selected robot."""
         robot = self._meant(robot)
         if robot is None:
             return
