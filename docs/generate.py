@@ -92,8 +92,8 @@ All agents terminate when every item is delivered (never with `restock`); a robo
 
 ## Infos
 
-A dict of its own for each agent, of numbers, with the same keys at the reset and at every step. Robots are not told: infos are for
-whoever trains or judges them.
+A dict of its own for each agent, of numbers, with the same keys at the reset and at every step. Robots do not
+sense them: infos are for those who train or judge robots.
 
 {infos}
 

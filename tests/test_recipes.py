@@ -274,8 +274,8 @@ def test_a_scenario_parameter(copy: Copy) -> None:
     copy.insert("scenario.py", "    item_radius: ", field)
     copy.insert(
         "episode.py",
-        "        try:\n            observations = world.step",
-        "        if world.state.time < scenario.rest:\n            commands = 0.0 * commands",
+        "        try:\n            self._observations = self.world.step",
+        "        if self.world.state.time < self.world.scenario.rest:\n            commands *= 0.0",
     )
     copy.run("-c", RESTS)
     assert "| rest | 2 (default 0) | at first nobody moves [s]; off |" in copy.run(

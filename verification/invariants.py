@@ -1,4 +1,4 @@
-"""What holds at every step of every world, checked without the kernels that make it so."""
+"""Invariants of every step of every world, checked without the kernels that keep them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Warehouse
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.testing.items import Count, counted, wrong_count, wrong_item
+from swarm_logistics_env.testing.world_checks import Count, counted, wrong_count, wrong_item
 from swarm_logistics_env.warehouse import FAILURE_MODES, FailureMode
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
@@ -61,7 +61,7 @@ class Watch:
     def faults_changed(self) -> None:
         """Note that faults were set: what was repaired may come back within the next step.
 
-        Who was removed is above nothing when it begins.
+        A robot that was removed stands above nothing when that step begins.
         """
         now = self.world.state.failure_modes
         self._modes = tuple(
@@ -71,7 +71,7 @@ class Watch:
         self._before["robot_item"][~self.world.state.robot_present] = NOBODY
 
     def _demand(self, holds: bool, words: str) -> None:
-        # Every comparison is written so that a number that is none fails it.
+        # Every comparison is written so that NaN fails it.
         if not holds:
             raise BrokenPromiseError(f"at step {self.world.state.step} {words}")
 
@@ -128,7 +128,7 @@ class Watch:
             "close in one substep, beyond the depth of a jam",
         )
         inside = np.minimum(at, far - at).min(axis=1)[here]
-        self._demand(bool((inside > 0.0).all()), "a robot is out")
+        self._demand(bool((inside > 0.0).all()), "a robot is outside the walls")
         self.deepest = max(self.deepest, deepest)
         # For how long each pair is deeper than it may be in a jam.
         if self._jammed.shape != depth.shape:
@@ -161,7 +161,7 @@ class Watch:
                 {"robot_position": state.robot_position, "item_position": state.item_position}, took
             ).any(axis=0)
             if (before["robot_present"] & ~state.robot_present).any():
-                # Where they were when they took something is not known any more.
+                # It is no longer known where they were when they took something.
                 self._covered |= state.item_covered == 1
         self._covered &= stored
         self._demand(
@@ -201,8 +201,12 @@ class Watch:
         lowest = np.where(reached, state.robot_told[None], np.inf).min(axis=1, initial=np.inf)
         heard = np.where(np.isnan(state.robot_heard), np.inf, state.robot_heard)
         deaf = ~(state.hears & state.robot_present)
-        self._demand(bool(np.isinf(heard[deaf]).all()), "who does not hear has heard a timer")
-        self._demand(bool((heard >= lowest).all()), "a timer was heard that nobody near tells")
+        self._demand(
+            bool(np.isinf(heard[deaf]).all()), "a robot that does not hear has heard a timer"
+        )
+        self._demand(
+            bool((heard >= lowest).all()), "a timer was heard that no robot in range broadcasts"
+        )
 
     def _exercised(self, robot: int, modes: list[FailureMode]) -> None:
         state, scenario = self.world.state, self.world.scenario

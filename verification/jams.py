@@ -17,7 +17,7 @@ from verification.invariants import JAM, SUSTAINED
 
 SIZES = (25, 150)
 SECONDS = 40.0
-# Where everybody drives [m]; None: to where it is, along that axis.
+# The point that all robots drive to [m]; along an axis that is None each stays where it is.
 TARGETS: dict[str, tuple[float, float | None]] = {
     "point": (5.0, 5.0),
     "wall": (10.0, None),
@@ -31,9 +31,9 @@ class Overlaps:
     """Overlaps of a jam [m].
 
     Attributes:
-        median: of the deepest overlap of every step.
-        lasting: the deepest that was there for longer than `JAM` seconds without a break.
-        robots, walls: the deepest of two robots, and of a robot with a wall.
+        median: the median over all steps of the deepest overlap.
+        lasting: the deepest overlap that lasted longer than `JAM` seconds without a break.
+        robots, walls: the deepest overlap of two robots, and of a robot with a wall.
     """
 
     median: float

@@ -2,7 +2,7 @@
 
     python verification/lowest.py study render > constraints.txt
 
-Of the dependencies of the package and of the extras that are named.
+They cover the dependencies of the package and of the extras that are named.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def _sentence(error: Exception) -> str | None:
 
 
 def _of_a_policy(error: Exception) -> str | None:
-    """Return what a user's own policy raised, and where; None if none of those raised the error."""
+    """Return what a user's own policy raised, and where; None if the error came from elsewhere."""
     from swarm_logistics_env.policies import policy
 
     frames = traceback.extract_tb(error.__traceback__)

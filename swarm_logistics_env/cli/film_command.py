@@ -72,8 +72,8 @@ def film_command(
         raise SetupError("--twin: shows the run without its faults, so --fault should be given")
     check_film(out)
     load_pygame()
+    from swarm_logistics_env.episode import Play
     from swarm_logistics_env.watch.film import Film, Take
-    from swarm_logistics_env.watch.play import Play
 
     takes = []
     for name in policies or ["swarm-dt"]:

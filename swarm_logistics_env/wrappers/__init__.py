@@ -1,10 +1,9 @@
 """Wrappers: break an environment, resize it, change it while it runs, reward by indicators, and
 let it be read in the frame of its robots' motion.
 
-Each is an environment itself, so they stack in any order, but for `FixedAgents`, which goes around
-all others. What a wrapper draws for an episode
-follows from the episode's seed. What a reset's options ask for comes before what a wrapper
-draws, and an outer wrapper before an inner one; faults add up.
+Each is an environment itself, so they stack in any order; only `FixedAgents` has to be the
+outermost. The seed of an episode decides what a wrapper draws for it. If several ask for the same
+thing, the options of the reset win, then the outer wrapper, then the inner one; faults add up.
 """
 
 from swarm_logistics_env.wrappers.condition import Condition

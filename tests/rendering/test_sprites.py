@@ -5,7 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from swarm_logistics_env.rendering.shapes import box, disc, painted, pixels, wedge
+from swarm_logistics_env.rendering.renderer import load_pygame
+
+load_pygame()
+from swarm_logistics_env.rendering.sprites import (  # noqa: E402 - it imports pygame
+    box,
+    disc,
+    painted,
+    pixels,
+    wedge,
+)
 
 
 @pytest.mark.parametrize("radius", [2.3, 3.0, 9.5, 40.2])
