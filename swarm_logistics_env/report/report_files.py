@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.report.document import Document, document, figures_of
+from swarm_logistics_env.report.document import Document, document
 from swarm_logistics_env.report.drawing import INK, PAPER, WIDTH
 from swarm_logistics_env.report.figures import Figure
 from swarm_logistics_env.report.markup import html, markdown
@@ -38,10 +38,9 @@ def write_report(
         pictures.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(f"cannot write to {pictures}: {error.strerror}") from error
-    cells, claims = results.performance_table(), results.indicator_table()
     whole = whole or document(results)
-    for figure in figures_of(whole):
-        write_csv(pictures / f"{figure.name}.csv", figure.columns, figure.rows)
+    for figure in whole.figures():
+        write_csv(pictures / f"{figure.name}.csv", figure.data)
     missing = missing_packages()
     if missing:
         text = markdown(whole, note=how_to_get_figures(missing))
@@ -49,13 +48,13 @@ def write_report(
         text = markdown(whole, pictures=pictures.name)
         drawings = {
             figure.name: inline_svg(figure, write_images(figure, pictures))
-            for figure in figures_of(whole)
+            for figure in whole.figures()
         }
         write_text(directory / "report.html", html(whole, drawings))
     files = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
     write_text(files[0], text)
-    write_csv(files[1], list(cells[0]), (list(cell.values()) for cell in cells))
-    write_csv(files[2], list(claims[0]), (list(claim.values()) for claim in claims))
+    write_csv(files[1], results.performance.drop(columns=["arm", "by_seed", "digests"]))
+    write_csv(files[2], results.indicators.drop(columns=["compared", "estimate"]))
     return files if missing else (directory / "report.html", *files)
 
 

@@ -6,7 +6,8 @@ import json
 from collections.abc import Iterator
 from importlib.metadata import version
 
-from swarm_logistics_env.report.result_tables import NOTHING, Section
+from swarm_logistics_env.report.result_tables import Section
+from swarm_logistics_env.report.wording import NOTHING
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.tasks.warehouse_task import Scenario
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Arm
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.train.training import Training
 
@@ -50,22 +52,20 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
 def scores_of(results: StudyResults) -> tuple[Score, ...]:
     """Return every P and every indicator of a study with its interval."""
     scores = []
-    for cell in results.cells:
-        mean = cell.mean
-        if mean is None:
+    for cell in rows_of(results.performance):
+        if not cell.n_seeds:
             continue
         scores.append(
             Score(
                 measure="P",
                 condition=_in_words(cell.arm),
-                value=mean.value,
-                low=mean.low,
-                high=mean.high,
-                seeds=cell.performance.size,
+                value=cell.mean,
+                low=None if isnan(cell.low) else cell.low,
+                high=None if isnan(cell.high) else cell.high,
+                seeds=cell.n_seeds,
             )
         )
-    for test in results.tests:
-        estimate, comparison = test.estimate, test.comparison
+    for estimate, comparison in rows_of(results.indicators[["estimate", "compared"]]):
         if estimate is None:
             continue
         scores.append(
