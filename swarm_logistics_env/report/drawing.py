@@ -6,6 +6,7 @@ paper `PAPER`, so that a page can put its own colours in their place.
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +30,54 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # 
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
 WIDTH = 5.2  # inch: still legible at the width of a phone
+_STYLE: Any = {
+    "axes.edgecolor": INK,
+    "axes.facecolor": "none",
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.labelcolor": INK,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": "medium",
+    "figure.facecolor": PAPER,
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "grid.alpha": 0.25,
+    "grid.color": INK,
+    "grid.linewidth": 0.5,
+    "legend.columnspacing": 1.2,
+    "legend.fontsize": 9.0,
+    "legend.frameon": False,
+    "legend.handletextpad": 0.5,
+    "lines.linewidth": 1.6,
+    "savefig.facecolor": PAPER,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "swarm-logistics-env",
+    "text.color": INK,
+    "text.parse_math": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+_NO_METADATA = {"Creator": None, "Date": None, "Format": None, "Type": None}
+DOTS_PER_INCH = 200
 LAWS = {"usl": "USL", "power_exponential": "kN^p exp(-qN)"}
+
+
+def images(draw: Draw, height: float) -> tuple[str, bytes]:
+    """Return a drawing of the given height [inch] as SVG and as PNG; equal ones as equal bytes."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure as NewCanvas
+
+    svg, png = io.StringIO(), io.BytesIO()
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        canvas = NewCanvas(figsize=(WIDTH, height), layout="constrained")
+        draw(canvas)
+        canvas.savefig(svg, format="svg", metadata=_NO_METADATA)
+        canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return svg.getvalue(), png.getvalue()
 
 
 @dataclass(frozen=True)
@@ -75,46 +123,25 @@ def _panel(axes: Axes, panel: Panel) -> None:
         _bars(axes, known["x"], known["low"], known["high"], (bottom, top), colour)
         for decided in (True, False):
             here = known[known["decided"] == decided]
-            axes.plot(
-                here["x"],
-                here["value"],
-                marker,
-                color=colour,
-                markerfacecolor=colour if decided else PAPER,
-                markersize=6,
-                zorder=3,
-                # Only the filled marks name the series.
-                label=points["series"].iloc[0] if decided else None,
-            )
+            # Only the filled marks name the series.
+            label = points["series"].iloc[0] if decided else None
+            fill = colour if decided else PAPER
+            (marks,) = axes.plot(here["x"], here["value"], marker, color=colour, zorder=3)
+            marks.set(markerfacecolor=fill, label=label)
         # Beside the mark, which would hide it.
         published = points.dropna(subset="published")
-        axes.plot(
-            published["x"] + 0.1, published["published"], "x", color=INK, markersize=4.5, zorder=4
-        )
+        crosses = published["x"] + 0.1, published["published"]
+        axes.plot(*crosses, "x", color=INK, markersize=4.5, zorder=4)
         capped = known[known["saturated"]]
-        _daggers(axes, capped["x"], capped["value"], (-9, 3), fontsize=9)
+        for place in zip(capped["x"], capped["value"]):
+            axes.annotate("†", place, (-9, 3), textcoords="offset points", fontsize=9)
     axes.set_xticks(range(len(categories)), categories)
     if len(categories) > 6:
         axes.tick_params(axis="x", labelsize=8.0)
     if sum(len(category) + 2 for category in categories) > 80:
         axes.tick_params(axis="x", rotation=40)
-    axes.set_xlim(-0.6, len(categories) - 0.4)
-    axes.set_ylim(bottom, top)
-    axes.set(ylabel=panel.y_label, xlabel=panel.x_label)
-    axes.set_title(panel.title, fontsize="medium", loc="left")
-    axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
-
-
-def _daggers(
-    axes: Axes,
-    x: Iterable[float],
-    y: Iterable[float],
-    offset: tuple[float, float],
-    fontsize: float,
-) -> None:
-    """Mark points whose P is capped."""
-    for place in zip(x, y):
-        axes.annotate("†", place, offset, textcoords="offset points", fontsize=fontsize)
+    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=(bottom, top))
+    axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
 def _range(panel: Panel) -> tuple[float, float]:
@@ -145,13 +172,11 @@ def _bars(
     bottom, top = limits
     known = low.notna()
     x, low, high = x[known], low[known], high[known]
-    axes.vlines(
-        x, low.clip(lower=bottom), high.clip(upper=top), color=colour, linewidth=1.4, zorder=2
-    )
-    ends = [
-        (place, end) for place, *both in zip(x, low, high) for end in both if bottom <= end <= top
-    ]
-    axes.plot([p for p, _ in ends], [end for _, end in ends], "_", color=colour, markersize=5)
+    ends = low.clip(lower=bottom), high.clip(upper=top)
+    axes.vlines(x, *ends, color=colour, linewidth=1.4, zorder=2)
+    for limit in (low, high):
+        inside = limit.between(bottom, top)
+        axes.plot(x[inside], limit[inside], "_", color=colour, markersize=5)
     for edge, arrow, leaving in ((bottom, "v", x[low < bottom]), (top, "^", x[high > top])):
         if len(leaving):  # an empty line that is not clipped spoils the layout
             edges = [edge] * len(leaving)
@@ -175,41 +200,29 @@ def scaling(canvas: Canvas, cells: pd.DataFrame, fits: Sequence[ScalingFit], lab
     for fit in sorted(fits, key=lambda fit: list(LAWS).index(fit.law)):
         place = list(LAWS).index(fit.law)
         colour, marker = COLOURS[place + 1], MARKERS[place + 1]
-        axes.plot(
-            grid, curves[fit.law], LINES[place], color=colour, label=LAWS[fit.law], linewidth=1.6
-        )
+        axes.plot(grid, curves[fit.law], LINES[place], color=colour, label=LAWS[fit.law])
         if fit.peak is None or fit.peak_low is None or fit.peak_high is None:
             continue
         height = -(0.06 + 0.07 * place) * highest
         low, high = min(fit.peak_low, right), min(fit.peak_high, right)
-        axes.plot([low, high], [height, height], color=colour, linewidth=1.6)
+        axes.plot([low, high], [height, height], color=colour)
         axes.plot(low, height, "|", color=colour, markersize=7)
-        goes_on = fit.peak_high > right
-        axes.plot(
-            high, height, ">" if goes_on else "|", color=colour, markersize=6, clip_on=not goes_on
-        )
+        end = ">" if fit.peak_high > right else "|"
+        axes.plot(high, height, end, color=colour, markersize=6, clip_on=end == "|")
         if fit.peak <= right:
             axes.plot(fit.peak, height, marker, color=colour, markersize=6)
     _bars(axes, cells["value"], cells["low"], cells["high"], (0.0, math.inf), COLOURS[0])
-    axes.plot(
-        cells["value"],
-        cells["mean"],
-        MARKERS[0],
-        color=COLOURS[0],
-        markersize=5,
-        zorder=3,
-        label=label,
-    )
+    (means,) = axes.plot(cells["value"], cells["mean"], MARKERS[0], color=COLOURS[0], zorder=3)
+    means.set(markersize=5, label=label)
     capped = cells[cells["saturated"]]
-    _daggers(axes, capped["value"], capped["mean"], (5, 2), fontsize=8)
+    for point in zip(capped["value"], capped["mean"]):
+        axes.annotate("†", point, (5, 2), textcoords="offset points", fontsize=8)
     if any(fit.peak is not None for fit in fits):
         axes.axhline(0.0, color=INK, linewidth=0.5)
         axes.annotate("N*", (0.0, -0.08 * highest), (4, -3), textcoords="offset points", fontsize=8)
-    axes.set_xlim(0.0, right)
-    axes.set_ylim(-0.2 * highest if fits else 0.0, 1.08 * highest)
+    axes.set(xlim=(0.0, right), ylim=(-0.2 * highest if fits else 0.0, 1.08 * highest))
     axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= 1.08 * highest])
     axes.set(xlabel="swarm size N [robots]", ylabel="P [items]")
-    axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
     _legend(canvas, axes, lines=True)
 
 
@@ -230,17 +243,9 @@ def rates(canvas: Canvas, panels: Mapping[str, pd.DataFrame], onset: float, y_la
                 axes.fill_between(
                     curve["seconds"], low, high, color=colour, alpha=0.16, linewidth=0
                 )
-            axes.plot(
-                curve["seconds"],
-                curve["deliveries"],
-                LINES[index % len(LINES)],
-                color=colour,
-                marker=MARKERS[index % len(MARKERS)],
-                markevery=(index * 4, 12),
-                markersize=4.5,
-                linewidth=1.6,
-                label=runs,
-            )
+            (line,) = axes.plot(curve["seconds"], curve["deliveries"], color=colour, label=runs)
+            line.set(linestyle=LINES[index % len(LINES)], marker=MARKERS[index % len(MARKERS)])
+            line.set(markevery=(index * 4, 12), markersize=4.5)
         axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
         axes.set_ylim(bottom=0.0)
 
@@ -258,28 +263,13 @@ def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None
             # Once all runs are back no interval is defined, so the last one ends there.
             known = int(np.count_nonzero(share > 0.0))
             ends = [*range(known), known - 1]
-            axes.fill_between(
-                np.append(seconds[:known], seconds[min(known, seconds.size - 1)]),
-                low[ends],
-                high[ends],
-                step="post",
-                color=colour,
-                alpha=0.14,
-                linewidth=0,
-            )
-            axes.step(
-                seconds,
-                share,
-                where="post",
-                linestyle=line,
-                color=colour,
-                linewidth=1.6,
-                label=curve.runs,
-            )
+            until = np.append(seconds[:known], seconds[min(known, seconds.size - 1)])
+            band = until, low[ends], high[ends]
+            axes.fill_between(*band, step="post", color=colour, alpha=0.14, linewidth=0)
+            axes.step(seconds, share, line, where="post", color=colour, label=curve.runs)
             if curve.censored:
                 axes.plot(seconds[-1], share[-1], "x", color=colour, markersize=6, clip_on=False)
-        axes.set_ylim(0.0, 1.05)
-        axes.set_xlim(left=0.0)
+        axes.set(xlim=(0.0, None), ylim=(0.0, 1.05))
 
 
 def _over_time(
@@ -289,9 +279,7 @@ def _over_time(
     grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
     for axes, (title, curves) in zip(grid[:, 0], panels.items()):
         yield axes, curves
-        axes.set(ylabel=y_label)
-        axes.set_title(title, fontsize="medium", loc="left")
-        axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
+        axes.set(ylabel=y_label, title=title)
     grid[-1, 0].set_xlabel(x_label)
     _legend(canvas, grid[0, 0], lines=True)
 
@@ -304,8 +292,5 @@ def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
         labels,
         loc="outside upper left",
         ncols=min(len(labels), 3),
-        frameon=False,
         handlelength=2.6 if lines else 1.0,
-        handletextpad=0.5,
-        columnspacing=1.2,
     )

@@ -21,16 +21,18 @@ if TYPE_CHECKING:
 
 _MOST_MISSES = 8  # more are no list that anybody reads
 _FLAGS = {
-    "single_seed": "one seed gives a value, no interval and no verdict",
-    "identical": "unaffected by construction: both conditions gave the same runs, so the value is "
-    "exact and no evidence; it stands outside Holm's family",
-    "too_few_seeds": "two seeds give no verdict, as counts agree by chance",
-    "degenerate": "no spread between seeds, so no interval and no verdict",
-    "capped": "inconclusive, because P is capped on the side that the verdict leans to",
-    "unbounded": "mean P_o is not distinguishable from 0 at so few seeds, so the interval is "
-    "infinite; the verdict comes from the test",
-    "assumes_normal": "below ten paired seeds, or unpaired, the verdict assumes normal differences",
-    "skewed": "so skewed that at so few seeds the verdict errs more often than its level",
+    "single_seed": "One seed gives a value, but no interval and no verdict",
+    "identical": "Both conditions gave the same runs, so the value is exact, but it is no evidence "
+    "and stands outside Holm's family",
+    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
+    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
+    "capped": "P is capped on the side that the verdict leans to, so the verdict is inconclusive",
+    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
+    "the verdict comes from the test",
+    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
+    "ten, or unpaired",
+    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
+    "its level says",
 }
 
 
@@ -211,19 +213,19 @@ def warnings(results: StudyResults) -> tuple[str, ...]:
 def _warnings(results: StudyResults) -> Iterator[str]:
     if results.performance["saturated"].any():
         yield (
-            f"{wording.SATURATED} saturated: in at least one run every item was delivered, so P is "
-            "capped; indicators that rest on it are marked as well. A capped reference cannot "
-            "support that an indicator lies above its threshold, a capped changed condition cannot "
+            f"{wording.SATURATED} marks a P that is capped, because every item was delivered in at "
+            "least one run, and the indicators that rest on it. A capped reference cannot support "
+            "that an indicator lies above its threshold, and a capped changed condition cannot "
             "refute it."
         )
     if results.exploratory:
-        since = "it is judged at a look that was not declared before its first run"
-        if not results.looks:
-            since = "seeds were added after the study began"
-        yield f"Exploratory: {since}, so the verdicts' error level is not the nominal one."
+        because = "seeds were added after the study began"
+        if results.looks:
+            because = "the study is judged at a look that was not declared before its first run"
+        yield f"The verdicts are exploratory: {because}, so they err more often than their level."
     for cell in rows_of(results.performance):
         if cell.problem:
-            yield f"{cell.policy}, {cell.table}, {cell.cell}: {cell.problem}."
+            yield f"{cell.policy}, {cell.table}, {cell.cell} is incomplete: {cell.problem}."
     for test in rows_of(results.indicators):
         if test.problem:
             yield f"{test.policy}, {test.indicator}, {test.comparison} is blocked: {test.problem}."
@@ -231,7 +233,7 @@ def _warnings(results: StudyResults) -> Iterator[str]:
     for flag, meaning in _FLAGS.items():
         flagged = flags.map(lambda here, flag=flag: flag in here)
         if flagged.any():
-            yield f"{flag}: {meaning}: {'; '.join(_families(results.indicators, flagged))}."
+            yield f"{meaning}: {'; '.join(_families(results.indicators, flagged))}."
 
 
 def _families(tests: pd.DataFrame, chosen: pd.Series[bool]) -> Iterator[str]:

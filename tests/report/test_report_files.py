@@ -131,7 +131,7 @@ def test_saturated_cells_and_all_that_rests_on_them_are_marked(
     }
     assert marked == {f"warehouse_width 5 -> {x}" for x in (10, 15, 20)}
     page = (directory / "report.html").read_text()
-    assert "† saturated" in page
+    assert "† marks a P that is capped" in page
     drawing = ElementTree.parse(directory / "figures" / "A.svg")
     assert sum(element.text == "†" for element in drawing.iter()) == 3
     drawing = ElementTree.parse(directory / "figures" / "S-Table-I-scalability.svg")
