@@ -57,51 +57,32 @@ class Document:
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
-    text = [
-        (
-            f"{plan.specification.name}: {len(plan.conditions)} conditions, {len(plan.seeds)} "
-            f"{'seed' if len(plan.seeds) == 1 else 'seeds'} of each; every verdict holds for the "
-            "conditions of the set-up sheet below and for no others."
-        )
-    ]
+    seeds = "1 seed" if len(plan.seeds) == 1 else f"{len(plan.seeds)} seeds"
+    about = (
+        f"{plan.specification.name}: {len(plan.conditions)} conditions, {seeds} of each; every "
+        "verdict holds for the conditions of the set-up sheet below and for no others."
+    )
+    text = [about]
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
     result_tables, lines = tuple(tables(results)), warnings(results)
-    faults = (
-        *budget_sections(results),
-        *resilience_sections(results),
-        *load_sections(results),
-    )
+    faults = *budget_sections(results), *resilience_sections(results), *load_sections(results)
     summary = (
         *result_tables,
         *([Section("Warnings", lines=lines)] if lines else []),
         *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
+    chapters = tuple(one for one in _chapters(results, result_tables, faults) if one.sections)
+    whole = Document(f"Study {plan.specification.name!r}", tuple(text), chapters, summary)
+    # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
-    chapters = (
-        replace(
-            chapter, sections=tuple(_with_own_names(section, taken) for section in chapter.sections)
-        )
-        for chapter in _chapters(results, result_tables, faults)
-        if chapter.sections
-    )
-    return Document(f"Study {plan.specification.name!r}", tuple(text), tuple(chapters), summary)
-
-
-def _with_own_names(section: Section, taken: set[str]) -> Section:
-    """Return a section whose figures have names that are not taken, and take them.
-
-    Policies and tables that differ in punctuation or case alone would give equal files.
-    """
-    figures = []
-    for figure in section.figures:
+    for figure in whole.figures():
         name, number = figure.name, 1
-        while name.lower() in taken:
+        while figure.name.lower() in taken:
             number += 1
-            name = f"{figure.name}-{number}"
-        taken.add(name.lower())
-        figures.append(replace(figure, name=name))
-    return replace(section, figures=tuple(figures))
+            figure.name = f"{name}-{number}"
+        taken.add(figure.name.lower())
+    return whole
 
 
 def _chapters(

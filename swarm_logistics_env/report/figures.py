@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
+@dataclass
 class Figure:
     """One figure.
 
@@ -131,7 +131,7 @@ def _panels(
     return [
         Panel(
             title,
-            definition.axis,
+            definition.heading,
             points[points["indicator"] == definition.symbol],
             thresholds or tuple(definition.adjectives),
             x_label,

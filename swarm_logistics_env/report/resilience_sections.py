@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.report.drawing import rates, repairs
@@ -23,6 +22,7 @@ from swarm_logistics_env.studies.fault_measures import (
     resiliences,
     window_of,
 )
+from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 
 _WHO: list[Column] = [
@@ -87,8 +87,7 @@ def resilience_sections(results: StudyResults) -> Iterator[Section]:
         if one.problem
     ]
     yield table_section("Self-repair time", repaired, _REPAIR, _REPAIR_TEXT, *problems)
-    faults = list(mid_run_faults(results))
-    yield Section("Deliveries over time", figures=tuple(_rate_figures(results, faults)))
+    yield Section("Deliveries over time", figures=tuple(_rate_figures(results)))
     if repaired:
         singles = {one.compared: one.single for one in repaired}
         yield replace(
@@ -121,14 +120,36 @@ def _not_back(curve: RepairCurve) -> str:
     return f"{curve.censored} of {curve.total} runs"
 
 
+def _rate_figures(results: StudyResults) -> Iterator[Figure]:
+    """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
+    import pandas as pd
+
+    for (*where, mode, onset), tests in groups_of(mid_run_faults(results), *_ONE_FIGURE):
+        curves = {_members(test): rate_curves(results, test.compared) for test in rows_of(tests)}
+        data = pd.concat(curves, names=["panel"]).reset_index(level="panel")
+        window = window_of(tests["compared"].iloc[0])
+        if not data.empty:
+            yield Figure(
+                slug("deliveries", *where[:2], mode, f"{onset:g}s"),
+                f"{_where(*where)}: deliveries in the trailing {window:g} s around failure mode "
+                f"{mode} from {onset:g} s (dotted line). Mean over {wording.seeds_text(results)} "
+                "with pointwise 95 % t-intervals.",
+                data,
+                0.6 + 2.3 * len(curves),
+                partial(rates, panels=curves, onset=onset, y_label=f"deliveries in {window:g} s"),
+            )
+
+
 def _repair_figures(
     results: StudyResults, singles: Mapping[Comparison, tuple[RepairCurve, ...]]
 ) -> Iterator[Figure]:
     """Yield the curves of single runs' self-repair times, a figure per failure mode."""
     import pandas as pd
 
-    for fault, comparisons in _by_fault(singles).items():
-        panels = {_members(compared): singles[compared] for compared in comparisons}
+    tests = mid_run_faults(results)
+    tests = tests[tests["compared"].isin(list(singles))]
+    for (*where, mode, onset), here in groups_of(tests, *_ONE_FIGURE):
+        panels = {_members(test): singles[test.compared] for test in rows_of(here)}
         rows = [
             (title, curve.runs, *point)
             for title, curves in panels.items()
@@ -137,71 +158,25 @@ def _repair_figures(
         ]
         if rows:
             yield Figure(
-                slug("self-repair", *fault.names),
-                f"{fault.where}: share of runs whose delivery rate is not back yet after failure "
-                f"mode {fault.mode} from {fault.onset:g} s, beside pairs of runs without fault "
-                "that differ in behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals "
+                slug("self-repair", *where[:2], mode, f"{onset:g}s"),
+                f"{_where(*where)}: share of runs whose delivery rate is not back yet after "
+                f"failure mode {mode} from {onset:g} s, beside pairs of runs without fault that "
+                "differ in behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals "
                 f"(Greenwood, log-log); {wording.seeds_text(results)}; a cross where runs are "
                 "censored.",
-                pd.DataFrame(
-                    rows, columns=["panel", "runs", "seconds", "share_not_back", "low", "high"]
-                ),
+                pd.DataFrame(rows, columns=_REPAIR_DATA),
                 0.6 + 2.1 * len(panels),
                 partial(repairs, panels=panels),
             )
 
 
-def _rate_figures(results: StudyResults, faults: Iterable[Comparison]) -> Iterator[Figure]:
-    """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
-    import pandas as pd
-
-    for fault, comparisons in _by_fault(faults).items():
-        panels = {_members(compared): rate_curves(results, compared) for compared in comparisons}
-        data = pd.concat(panels, names=["panel"]).reset_index(level="panel")
-        window = window_of(comparisons[0])
-        if not data.empty:
-            yield Figure(
-                slug("deliveries", *fault.names),
-                f"{fault.where}: deliveries in the trailing {window:g} s around failure mode "
-                f"{fault.mode} from {fault.onset:g} s (dotted line). Mean over "
-                f"{wording.seeds_text(results)} with pointwise 95 % t-intervals.",
-                data,
-                0.6 + 2.3 * len(panels),
-                partial(
-                    rates,
-                    panels=panels,
-                    onset=fault.onset,
-                    y_label=f"deliveries in {window:g} s",
-                ),
-            )
+_ONE_FIGURE = ("policy", "table", "n_robots", "factor", "onset")
+_REPAIR_DATA = ["panel", "runs", "seconds", "share_not_back", "low", "high"]
 
 
-class _Fault(NamedTuple):
-    """A failure mode and its onset [s], in the swarm that one table is about."""
-
-    policy: str
-    table: str
-    n_robots: int
-    mode: str
-    onset: float
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.policy, self.table, self.mode, f"{self.onset:g}s"
-
-    @property
-    def where(self) -> str:
-        return f"{self.policy}, {self.table}, N = {self.n_robots}"
+def _where(policy: str, table: str, n_robots: int) -> str:
+    return f"{policy}, {table}, N = {n_robots}"
 
 
-def _by_fault(comparisons: Iterable[Comparison]) -> dict[_Fault, list[Comparison]]:
-    groups: dict[_Fault, list[Comparison]] = {}
-    for c in comparisons:
-        setting = c.changed.setting
-        fault = _Fault(c.policy, c.table, c.original.condition.size, setting.name, setting.onset)
-        groups.setdefault(fault, []).append(c)
-    return groups
-
-
-def _members(comparison: Comparison) -> str:
-    return f"m = {comparison.changed.setting.value:g}"
+def _members(test: Row) -> str:
+    return f"m = {test.after:g}"

@@ -13,6 +13,17 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+_TYPES = {
+    "seed": "Int64",
+    "delivered": "Int64",
+    "behaviour": "Int64",
+    "ended_at": "Float64",
+    "anchoring_seconds": "Float64",
+    "all_delivered": "boolean",
+    "delivery_times": "object",
+}
+
+
 def export(store: Store, path: Path) -> tuple[int, str]:
     """Write every stored run, sorted by key, without wall times, as CSV or Parquet by suffix.
 
@@ -51,27 +62,13 @@ def write_csv(path: Path, table: pd.DataFrame) -> None:
 
 
 def _write_parquet(path: Path, runs: pd.DataFrame) -> None:
+    # Named types: a column of failed runs alone would have none.
+    types = {name: _TYPES.get(name, "string") for name in runs.columns}
     try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        runs.astype(types).to_parquet(path, engine="pyarrow", index=False)
     except ImportError:
         raise StudyError(
             "Parquet needs pyarrow: pip install 'swarm-logistics-env[study]', or export to .csv"
         ) from None
-    numbers = {
-        "seed": pa.int64(),
-        "delivered": pa.int64(),
-        "behaviour": pa.int64(),
-        "ended_at": pa.float64(),
-        "anchoring_seconds": pa.float64(),
-        "all_delivered": pa.bool_(),
-        "delivery_times": pa.list_(pa.float64()),
-    }
-    if not runs.empty:
-        runs["all_delivered"] = runs["all_delivered"].map(bool, na_action="ignore")
-    # Named types: a column of failed runs alone would have none.
-    schema = pa.schema([(name, numbers.get(name, pa.string())) for name in runs.columns])
-    try:
-        pq.write_table(pa.Table.from_pandas(runs, schema, preserve_index=False), path)
     except OSError as error:
         raise StudyError(f"cannot write {path}: {error}") from error

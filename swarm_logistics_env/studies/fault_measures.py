@@ -68,13 +68,9 @@ class Resilience:
 
 def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
-    for comparison in mid_run_faults(results):
-        assert comparison.removed is not None
+    for comparison in mid_run_faults(results)["compared"]:
         m, n = comparison.changed.setting.value, comparison.original.condition.size
-        faulty, removed, whole = (
-            results.times_of(arm)
-            for arm in (comparison.changed, comparison.removed, comparison.original)
-        )
+        whole, removed, faulty = (results.times_of(arm) for arm in comparison.arms)
         if faulty is None or removed is None or whole is None:
             continue
         onset = comparison.changed.setting.onset
@@ -88,11 +84,11 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
             yield Resilience(comparison, *indices, *repair)
 
 
-def mid_run_faults(results: StudyResults) -> Iterator[Comparison]:
-    """Yield FT's comparison of every fault that begins during the run."""
-    for comparison in results.plan.comparisons:
-        if comparison.removed is not None and comparison.changed.setting.onset > 0:
-            yield comparison
+def mid_run_faults(results: StudyResults) -> pd.DataFrame:
+    """Return the rows of the indicators that compare a fault in mid-run with robots removed."""
+    tests = results.indicators
+    has_removed = tests["compared"].map(lambda compared: compared.removed is not None)
+    return tests[has_removed & (tests["onset"] > 0)]
 
 
 def _index(faulty: Times, reference: Times, onset: float, threshold: float) -> Estimate | None:
@@ -157,17 +153,11 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> pd.DataFrame:
     """
     import pandas as pd
 
-    assert comparison.removed is not None
-    arms = {
-        "no fault": comparison.original,
-        "removed": comparison.removed,
-        "fault": comparison.changed,
-    }
     window = window_of(comparison)
     end = comparison.original.condition.duration
     seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
     rows = []
-    for runs, arm in arms.items():
+    for runs, arm in zip(("no fault", "removed", "fault"), comparison.arms):
         counts = np.array(
             [
                 np.searchsorted(times, seconds, side="right")

@@ -44,13 +44,12 @@ def test_a_new_row_reaches_the_report(
 ) -> None:
     row = Definition(
         symbol="K",
-        name="performance kept",
+        heading="performance kept K",
         compares="fault",
         performances={"p_o": "P_o", "p_f": "P_F"},
         function=kept,
         arguments=lambda _: {},
         adjectives={0.0: "alive"},
-        axis="performance kept K",
     )
     monkeypatch.setitem(DEFINITIONS, "K", row)
     study = Study(**small, indicators=["K"])
