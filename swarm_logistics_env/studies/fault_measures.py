@@ -98,7 +98,8 @@ def mid_run_faults(results: StudyResults) -> pd.DataFrame:
     compares = late["compared"].map(lambda compared: compared.removed is not None)
     fault = [(one.policy, one.table, one.changed) for one in late["compared"]]
     with_removed = set(compress(fault, compares))
-    return late[[has or one not in with_removed for has, one in zip(compares, fault)]]
+    kept = [has or one not in with_removed for has, one in zip(compares, fault)]
+    return late[np.array(kept, dtype=np.bool_)]
 
 
 def _index(
