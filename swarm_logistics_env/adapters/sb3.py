@@ -103,7 +103,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             )
         self._worlds = Worlds(make_env, n_worlds, threads)
         self.worlds = self._worlds.envs
-        # What the next infos say of each row, unless its world has something to tell.
+        # What the next infos are copies of, unless a world has something to tell.
         self._abouts: Infos = [{} for _ in range(self._worlds.n_rows)]
         n_rows = self._worlds.n_rows
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
@@ -272,12 +272,12 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             "n_robots": state.n_robots,
             **env.episode_info,
         }
-        abouts: Infos = [about.copy() for _ in range(rows.start, rows.stop)]
+        abouts: Infos = [about] * (rows.stop - rows.start)
         for robot, modes in enumerate(state.failure_modes):
             if modes:
-                abouts[robot]["failed"] = 1
+                abouts[robot] = {**about, "failed": 1}
         for row in np.flatnonzero(~self._worlds.present[rows]).tolist():
-            abouts[row]["padding"] = True
+            abouts[row] = {**abouts[row], "padding": True}
         self._abouts[rows] = abouts
 
     def _end(self, world: int, step: RowsStep, dones: NDArray[np.bool_], infos: Infos) -> None:

@@ -16,6 +16,8 @@ from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.kinematics import first_not_finite
+from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers import Wrapper
 
@@ -126,8 +128,8 @@ class Worlds:
                 f"actions of shape {given.shape} and type {given.dtype}: should be {wanted} numbers"
             )
         self._commands[:] = given
-        if not np.isfinite(self._commands).all():
-            row = int(np.argwhere(~np.isfinite(given))[0, 0])
+        row = first_not_finite(self._commands)
+        if row != NOBODY:
             world = int(self.world_of[row])
             raise CommandError(
                 f"actions[{row}] = {given[row]} (world {world}, robot_"
@@ -160,9 +162,9 @@ class Worlds:
             env.close()
 
     def _step_together(self, outcome: RowsStep) -> RowsStep:
-        for place, world in enumerate(self._shared_out):
-            *wrappers, core = self._layers[world]
-            self._pool.is_watched[place] = bool(wrappers) or core.is_watched
+        layers = [self._layers[world] for world in self._shared_out]
+        self._pool.is_watched[:] = [len(each) > 1 or each[-1].is_watched for each in layers]
+        for world, (*wrappers, _) in zip(self._shared_out, layers):
             for wrapper in wrappers:
                 robots = self._robots(world)
                 self._commands[robots] = wrapper.before_step(self._commands[robots].copy())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.kernels import inlined_kernel, kernel
 from swarm_logistics_env.warehouse.structs import (
     NOBODY,
     Capabilities,
@@ -14,6 +14,16 @@ from swarm_logistics_env.warehouse.structs import (
 )
 
 FORWARD, LEFT, TURN, GRIPPER, MESSAGE = range(5)  # columns of a command row; messages are the rest
+
+
+@kernel
+def first_not_finite(commands: Numbers) -> int:
+    """Return the first row of commands (N, C) that is not finite; NOBODY if all are."""
+    for row in range(len(commands)):
+        for column in range(commands.shape[1]):
+            if not math.isfinite(commands[row, column]):
+                return row
+    return NOBODY
 
 
 @inlined_kernel

@@ -78,12 +78,12 @@ class WorldThreadPool:
         self._wake: SimpleQueue[None] = SimpleQueue()
         # Compiled before helpers are many and in the way of the caller, and so that no Ctrl-C
         # finds them half compiled.
-        compiling = np.zeros(FIRST_JOB, np.int64).ctypes.data
-        submit(compiling, np.zeros((0, 0)), np.zeros((0, 0), np.float32))
-        help_out(compiling, 0)
-        take_sleepers(compiling)
-        next_told(compiling, 0, 0)
-        finish(compiling)
+        no_jobs = np.zeros(FIRST_JOB, np.int64)
+        submit(no_jobs.ctypes.data, np.zeros((0, 0)), np.zeros((0, 0), np.float32))
+        for compiled in (take_sleepers, finish):
+            compiled(no_jobs.ctypes.data)
+        help_out(no_jobs.ctypes.data, 0)
+        next_told(no_jobs.ctypes.data, 0, 0)
         self.close = weakref.finalize(self, _close, queue, self._wake, self._n_helpers)
         for _ in range(self._n_helpers):
             threading.Thread(
@@ -130,23 +130,27 @@ class WorldThreadPool:
                 if told == _NOT_YET:
                     time.sleep(0)  # a thread that works may be waiting for this one's core
                     continue
-                while place < n_worlds and place <= told:
+                while place < told:
                     place += 1
-                    sensed = self._take(place - 1, rows)
+                    self._take(place - 1, rows, is_eventful=False)
                 if told < n_worlds:
-                    arrived(told, sensed)
+                    place += 1
+                    is_eventful = bool(self._jobs[told, IS_EVENTFUL])
+                    arrived(told, self._take(told, rows, is_eventful))
         finally:
             if place < n_worlds:
                 finish(self._address)
             for left in range(place, n_worlds):
                 # One is raised already.
                 with contextlib.suppress(ScenarioError):
-                    self._take(left, rows)
+                    self._take(left, rows, bool(self._jobs[left, IS_EVENTFUL]))
 
-    def _take(self, place: int, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _take(
+        self, place: int, rows: NDArray[np.float32], is_eventful: bool
+    ) -> NDArray[np.float32]:
         world, first = self._worlds[place], self._firsts[place]
         sensed = rows[first : first + world.scenario.n_robots]
-        world.take(sensed, bool(self._jobs[place, IS_EVENTFUL]))
+        world.take(sensed, is_eventful)
         return sensed
 
 
