@@ -1,8 +1,8 @@
 """Few real runs with many simulated ones: how often the interval is right, and how much narrower.
 
 The world with differential drive, noisy sensors and drifting headings (the preset `realistic`)
-stands for reality, the paper's world for its simulator. Both met the same 200 set-ups, which
-differ in the warehouse, the items and the delivery area; in simulation each three times. Studies
+stands for reality, the paper's world for its simulator. Both met the same 120 set-ups, which
+differ in the warehouse, the items and the delivery area; in simulation each twice. Studies
 of a few real runs are drawn from them, and S from 10 to 20 robots is estimated from the real runs
 alone and with simulation.
 
@@ -24,8 +24,8 @@ from swarm_logistics_env.spi.simulation import combined_ratio
 
 FOLDER = Path(__file__).parent
 SIZES = (10, 20)
-SETUPS = 200
-TIMES = {"realistic": 1, "paper": 3}  # how often each set-up is met
+SETUPS = 120
+TIMES = {"realistic": 1, "paper": 2}  # how often each set-up is met
 FILES = {"realistic": FOLDER / "reality.csv", "paper": FOLDER / "simulation.csv"}
 
 

@@ -234,7 +234,10 @@ def _columns(
     long = [column for column in _LONG if column in places]
     if long and len(long) < len(_LONG):
         lacking = next(column for column in _LONG if column not in places)
-        raise IndicatorError(f"{path} has no column {lacking!r}, as it has {long[0]!r}")
+        raise IndicatorError(
+            f"{path} has no column {lacking!r}, as it has {long[0]!r}: should have kind, name and "
+            f"value, or none of them (--ignore {header[places[long[0]]]!r})"
+        )
     return places, tuple(others)
 
 
