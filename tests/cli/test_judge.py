@@ -112,4 +112,4 @@ def test_too_few_real_trials_keep_their_own_interval_and_say_so(
     trials(lab / "real.csv", range(9), 0.8)
     trials(lab / "model.csv", range(40), 1.0)
     assert app.run(["judge", "real.csv", "--simulated", "model.csv"]) == 0
-    assert "wheel, m = 2: 9 real runs: should be at least 10." in capsys.readouterr().out
+    assert "R > 0, wheel, m = 2: 9 real runs: should be at least 10." in capsys.readouterr().out
