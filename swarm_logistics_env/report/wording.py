@@ -21,11 +21,12 @@ NOTHING = "–"
 
 def items(interval: Interval | None) -> str:
     """Return a performance with its limits, e.g. "28.7 [27.1, 30.3]"."""
-    if interval is None:
-        return "no run"
-    if interval.low is None or interval.high is None:
-        return f"{interval.value:.1f}"
-    return f"{interval.value:.1f} [{interval.low:.1f}, {interval.high:.1f}]"
+    return "no run" if interval is None else bracketed(interval, _digits(interval.value))
+
+
+def _digits(p: float) -> int:
+    """Return how many digits after the point tell a performance: three in all where it is small."""
+    return 1 if p >= 1 or p <= 0 else 2 - math.floor(math.log10(p))
 
 
 def bracketed(interval: Interval | None, digits: int) -> str:
@@ -53,7 +54,8 @@ def limits(interval: Interval | None) -> str:
     """Return the limits alone."""
     if interval is None or interval.low is None or interval.high is None:
         return NOTHING
-    return f"[{interval.low:.1f}, {interval.high:.1f}]"
+    low, high = (fixed(x, _digits(interval.value)) for x in (interval.low, interval.high))
+    return f"[{low}, {high}]"
 
 
 def number(value: float | None) -> str:
