@@ -48,7 +48,8 @@ def judge_command(
         typer.Option(metavar="NAME", help="Column to leave out; may be repeated."),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Length of every trial [s], where no column says it.")
+        float | None,
+        typer.Option(help="Length of every trial in seconds, where no column says it."),
     ] = None,
     simulated: Annotated[
         Path | None,

@@ -105,7 +105,9 @@ def _plain(value: float) -> str:
 def _one_run(cell: Row) -> str:
     if not wording.is_known(cell.prediction_low):
         return NOTHING
-    return f"[{cell.prediction_low:.1f}, {cell.prediction_high:.1f}]"
+    digits = wording.digits_of(cell.mean)
+    low, high = (wording.fixed(x, digits) for x in (cell.prediction_low, cell.prediction_high))
+    return f"[{low}, {high}]"
 
 
 def _answers(

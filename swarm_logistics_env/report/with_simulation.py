@@ -22,19 +22,17 @@ def with_simulation(whole: Document, real: StudyResults, simulated: StudyResults
     seeds, further = replays(real, simulated)
     rows, problems = [], []
     for one in narrowed(real, simulated):
-        comparison = one.comparison
-        name = f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}"
         if one.combined is None:
-            problems.append(f"{comparison.policy}, {name}: {one.problem}.")
+            problems.append(f"{one.policy}, {one.name}: {one.problem}.")
             continue
-        width = wording.NOTHING if one.width is None else f"{one.width:.2f}"
         rows.append(
             (
-                comparison.policy,
-                name,
-                *(_interval(estimate) for estimate in (one.alone, one.combined)),
-                width,
-                one.combined.verdict,
+                one.policy,
+                one.name,
+                _interval(one.alone),
+                _interval(one.combined),
+                wording.NOTHING if one.width is None else f"{one.width:.2f}",
+                one.combined.verdict if isinstance(one.combined, Estimate) else wording.NOTHING,
             )
         )
     explained = (
@@ -47,8 +45,8 @@ def with_simulation(whole: Document, real: StudyResults, simulated: StudyResults
     section = Section(
         "Real trials with simulation",
         (
-            "policy", "question", "real alone [95 %]", "with simulation [95 %]",
-            "width, with over alone", "with simulation",
+            "policy", "what", "real alone [95 %]", "with simulation [95 %]",
+            "width, with over alone", "verdict with",
         ),
         tuple(rows),
         (explained, *problems),
@@ -61,5 +59,5 @@ def with_simulation(whole: Document, real: StudyResults, simulated: StudyResults
     )
 
 
-def _interval(estimate: Estimate) -> str:
-    return wording.bracketed(Interval(estimate.value, estimate.low, estimate.high), 3)
+def _interval(found: Interval | Estimate) -> str:
+    return wording.bracketed(Interval(found.value, found.low, found.high), 3)

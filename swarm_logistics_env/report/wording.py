@@ -29,6 +29,11 @@ def is_known(value: float | None) -> TypeGuard[float]:
     return value is not None and not math.isnan(value)
 
 
+def digits_of(p: float) -> int:
+    """Return how many digits after the point tell a performance: three in all where it is small."""
+    return 1 if p >= 1 or p <= 0 else 2 - math.floor(math.log10(p))
+
+
 def bracketed(interval: Interval | Estimate | Row | None, digits: int) -> str:
     """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
     if interval is None or not is_known(interval.value):
@@ -66,7 +71,7 @@ def mean_p(cell: Row) -> str:
     """Return the mean P of a row of performances with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
         return "no run"
-    return bracketed(Interval(cell.mean, cell.low, cell.high), 1) + mark(cell)
+    return bracketed(Interval(cell.mean, cell.low, cell.high), digits_of(cell.mean)) + mark(cell)
 
 
 def mark(row: Row) -> str:

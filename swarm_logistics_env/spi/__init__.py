@@ -24,7 +24,7 @@ from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
 from .sequential import look_alphas
-from .simulation import Simulation
+from .simulation import Simulation, mean_with_simulation
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -64,6 +64,7 @@ __all__ = [
     "look_alphas",
     "lower_decile_of_power",
     "mean_interval",
+    "mean_with_simulation",
     "minimum_detectable_effect",
     "no_plan_because",
     "pairing_correlation",

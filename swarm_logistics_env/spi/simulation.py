@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .inputs import IndicatorError, performance, same_seeds
+from .inputs import IndicatorError, between_0_and_1, performance, same_seeds
 from .ratio import ROUNDING, RatioTest, limits_from_moments, probability_of
+from .summaries import Interval
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -61,6 +62,34 @@ def simulated_samples(
     same_seeds(**checked)
     num, den = (sum(checked[key] * weights[key][part] for key in weights) for part in (0, 1))
     return np.asarray(num), np.asarray(den)
+
+
+def mean_with_simulation(
+    p: ArrayLike, replayed: ArrayLike, further: ArrayLike, confidence: float = 0.95
+) -> Interval:
+    """Mean performance of few real runs, with the interval that simulated runs narrow.
+
+    Args:
+        p: Of r >= 10 real runs, shape (r,).
+        replayed: Of the same set-ups in simulation, in the same order, shape (r,).
+        further: Of n >= 2 other set-ups in simulation, shape (n,).
+        confidence: Of the interval, in (0, 1).
+
+    Raises:
+        IndicatorError: Too few runs, unequally many real and replayed ones, or performances that
+            are negative or not finite; confidence outside (0, 1).
+    """
+    between_0_and_1("confidence", confidence)
+    samples = [
+        performance(name, sample)
+        for name, sample in (("p", p), ("replayed", replayed), ("further", further))
+    ]
+    # A mean is a ratio whose denominator is always 1.
+    test = combined_ratio(*((s, np.ones_like(s)) for s in samples), confidence=confidence)
+    value = float(test.value)
+    if test.degenerate:
+        return Interval(value, None, None)
+    return Interval(value, max(0.0, float(test.low)), float(test.high))
 
 
 def combined_ratio(

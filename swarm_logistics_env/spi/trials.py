@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -186,8 +186,7 @@ def _events(table: Table, duration: float | None) -> list[Trial]:
     found = []
     for deliveries in runs.values():
         times = tuple(sorted(time for _, time in deliveries if time is not None))
-        first = deliveries[0][0]
-        found.append(Trial(**{**vars(first), "times": times, "performance": float(len(times))}))
+        found.append(replace(deliveries[0][0], times=times, performance=float(len(times))))
     return found
 
 

@@ -170,7 +170,9 @@ def read_table(path: Path, columns: dict[str, str], ignore: tuple[str, ...]) -> 
             f"{path} is not a CSV file in UTF-8 ({error.reason}): save it as CSV UTF-8"
         ) from error
     lines = text.splitlines()
-    start = next((n for n, line in enumerate(lines) if line.strip()), None)
+    # Spreadsheets may say the delimiter in a first line such as "sep=;".
+    empty = ("", "sep=;", "sep=,", "sep=")
+    start = next((n for n, line in enumerate(lines) if line.strip().lower() not in empty), None)
     if start is None:
         raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
     delimiter = max(";\t,", key=lines[start].count)
@@ -234,7 +236,10 @@ def _columns(
     long = [column for column in _LONG if column in places]
     if long and len(long) < len(_LONG):
         lacking = next(column for column in _LONG if column not in places)
-        raise IndicatorError(f"{path} has no column {lacking!r}, as it has {long[0]!r}")
+        raise IndicatorError(
+            f"{path} has no column {lacking!r}, as it has {long[0]!r}: should have kind, name and "
+            f"value, or none of them (--ignore {header[places[long[0]]]!r})"
+        )
     return places, tuple(others)
 
 

@@ -1,7 +1,8 @@
-"""Few real trials beside many simulated ones: each indicator from the real alone and from both."""
+"""Few real trials and many simulated ones: what the real say alone, and with the simulated."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -11,34 +12,36 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.results import StudyResults
 
 
 class Narrowed(NamedTuple):
-    """One indicator of the real trials.
+    """One mean performance or indicator of the real trials.
 
     Attributes:
-        comparison: of the real study.
-        alone: from its trials alone.
+        policy: label of the policy.
+        name: what it is, e.g. "P, no fault" or "R > 0, FM1, m = 2".
+        alone: from the real trials alone.
         combined: with the simulated ones; None: `problem` says why not.
     """
 
-    comparison: Comparison
-    alone: Estimate
-    combined: Estimate | None
-    problem: str | None
+    policy: str
+    name: str
+    alone: Interval | Estimate
+    combined: Interval | Estimate | None
+    problem: str | None = None
 
     @property
     def width(self) -> float | None:
-        """Width of the combined interval over that of the real trials alone."""
-        if self.combined is None:
-            return None
-        low, high, combined = self.alone.low, self.alone.high, self.combined
-        if low is None or high is None or combined.low is None or combined.high is None:
-            return None
-        ratio = (combined.high - combined.low) / (high - low)
-        return ratio if np.isfinite(ratio) else None
+        """Width of the combined interval over that of the real trials alone; None: unknown."""
+        widths = [
+            math.nan if one is None or one.low is None or one.high is None else one.high - one.low
+            for one in (self.combined, self.alone)
+        ]
+        ratio = widths[0] / widths[1] if widths[1] else math.nan
+        return ratio if math.isfinite(ratio) else None
 
 
 def replays(real: StudyResults, simulated: StudyResults) -> tuple[list[int], list[int]]:
@@ -61,7 +64,7 @@ def replays(real: StudyResults, simulated: StudyResults) -> tuple[list[int], lis
 
 
 def narrowed(real: StudyResults, simulated: StudyResults) -> Iterator[Narrowed]:
-    """Yield every indicator of the real trials, alone and with the simulated ones.
+    """Yield P and every indicator of the real trials, alone and with the simulated ones.
 
     What is compared in both is matched by the words and numbers of the settings, and by the policy
     where the simulated study has several.
@@ -75,29 +78,54 @@ def narrowed(real: StudyResults, simulated: StudyResults) -> Iterator[Narrowed]:
         (comparison.question, comparison.policy if several else ""): comparison
         for comparison in simulated.plan.comparisons
     }
-    found = False
-    for comparison in real.plan.comparisons:
-        model = models.get((comparison.question, comparison.policy if several else ""))
-        if model is None:
-            continue
-        found = True
-        alone = comparison.estimate(lambda arm: _performance(real, arm, seeds))
-        named = model.arguments.items()
-        simulation = spi.Simulation(
-            {name: _performance(simulated, arm, seeds) for name, arm in named},
-            {name: _performance(simulated, arm, further) for name, arm in named},
-        )
-        try:
-            both = comparison.estimate(
-                lambda arm: _performance(real, arm, seeds), simulation=simulation
-            )
-            yield Narrowed(comparison, alone, both, None)
-        except spi.IndicatorError as error:
-            yield Narrowed(comparison, alone, None, str(error))
-    if not found:
+    matched = {
+        comparison: models[key]
+        for comparison in real.plan.comparisons
+        if (key := (comparison.question, comparison.policy if several else "")) in models
+    }
+    if not matched:
         asked = "; ".join(dict.fromkeys(c.label for c in real.plan.comparisons))
         theirs = "; ".join(dict.fromkeys(c.label for c in simulated.plan.comparisons))
         raise StudyError(f"the simulated trials compare {theirs}: should be some of {asked}")
+    arms = {
+        (comparison.policy, arm): other
+        for comparison, model in matched.items()
+        for arm, other in zip(comparison.arguments.values(), model.arguments.values())
+    }
+    for (policy, arm), model_arm in arms.items():
+        p = _performance(real, arm, seeds)
+        found = Narrowed(policy, f"P, {arm.setting}", spi.mean_interval(p), None)
+        replayed, others = (_performance(simulated, model_arm, some) for some in (seeds, further))
+        try:
+            yield found._replace(combined=spi.mean_with_simulation(p, replayed, others))
+        except spi.IndicatorError as error:
+            yield found._replace(problem=str(error))
+    for comparison, model in matched.items():
+        yield _indicator(comparison, model, real, simulated, (seeds, further))
+
+
+def _indicator(
+    comparison: Comparison,
+    model: Comparison,
+    real: StudyResults,
+    simulated: StudyResults,
+    seeds: tuple[Sequence[int], Sequence[int]],
+) -> Narrowed:
+    def of_real(arm: Arm) -> NDArray[np.float64]:
+        return _performance(real, arm, seeds[0])
+
+    simulation = spi.Simulation(
+        *(
+            {name: _performance(simulated, arm, some) for name, arm in model.arguments.items()}
+            for some in seeds
+        )
+    )
+    name = f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}"
+    found = Narrowed(comparison.policy, name, comparison.estimate(of_real), None)
+    try:
+        return found._replace(combined=comparison.estimate(of_real, simulation=simulation))
+    except spi.IndicatorError as error:
+        return found._replace(problem=str(error))
 
 
 def _performance(results: StudyResults, arm: Arm, seeds: Sequence[int]) -> NDArray[np.float64]:

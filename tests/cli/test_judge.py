@@ -35,6 +35,14 @@ def test_judge_prints_the_tables_and_leaves_nothing(
     assert [path.name for path in lab.iterdir()] == ["lab.csv"]
 
 
+def test_a_small_performance_is_not_rounded_away(
+    lab: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("rates.csv").write_text("N;P\n4;0,0123\n4;0,0131\n4;0,011\n8;0,02\n8;0,021\n8;0,019\n")
+    assert app.run(["judge", "rates.csv"]) == 0
+    assert "| N = 4 | 0.0121 [0.0095, 0.0148] | [" in capsys.readouterr().out
+
+
 def test_judge_keeps_study_report_and_latex(lab: Path) -> None:
     Path("setup.toml").write_text('arena = "4 m x 4 m"\nrobots = 8\n')
     given = ["--column", "performance=Kisten", "--setup", "setup.toml", "--setup", "floor=tiles"]
@@ -112,4 +120,4 @@ def test_too_few_real_trials_keep_their_own_interval_and_say_so(
     trials(lab / "real.csv", range(9), 0.8)
     trials(lab / "model.csv", range(40), 1.0)
     assert app.run(["judge", "real.csv", "--simulated", "model.csv"]) == 0
-    assert "wheel, m = 2: 9 real runs: should be at least 10." in capsys.readouterr().out
+    assert "R > 0, wheel, m = 2: 9 real runs: should be at least 10." in capsys.readouterr().out

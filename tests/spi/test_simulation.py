@@ -126,3 +126,21 @@ def test_a_simulation_that_does_not_fit_is_refused(
 ) -> None:
     with pytest.raises(spi.IndicatorError, match=words):
         combined(real, model, **options)
+
+
+def test_the_mean_of_few_real_runs_is_narrowed_too() -> None:
+    rng = np.random.default_rng(3)
+    ease = rng.uniform(0.5, 1.5, 200)
+    model, reality = 40 * ease, 30 * ease[:12] + rng.normal(0, 1, 12)
+    combined = spi.mean_with_simulation(reality, model[:12], model[12:])
+    alone = spi.mean_interval(reality)
+    assert None not in (*combined, *alone)
+    low, high = combined.low or 0.0, combined.high or 0.0
+    assert low < 30 * ease.mean() < high
+    assert high - low < 0.4 * ((alone.high or 0.0) - (alone.low or 0.0))
+    with pytest.raises(spi.IndicatorError, match="p\\[3\\] = -1"):
+        spi.mean_with_simulation([1, 2, 3, -1], model[:4], model)
+    with pytest.raises(spi.IndicatorError, match="4 real runs: should be at least 10"):
+        spi.mean_with_simulation([1, 2, 3, 1], model[:4], model)
+    flat = spi.mean_with_simulation(np.full(12, 5.0), model[:12], model[12:])
+    assert flat == (5.0, None, None)

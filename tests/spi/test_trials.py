@@ -53,6 +53,7 @@ def test_a_file_typed_in_a_german_lab_is_read(tmp_path: Path) -> None:
         "trial,robots,fault,faulty,delivered\n1,8,,,10.5\n2,8,stuck wheel,2,7\n",
         "n_robots\tfailure mode\tfaulty robots\tP\n8\tnone\t0\t10.5\n8\tstuck wheel\t2\t7\n",
         "\ufeffRobots;Fault;Faulty;Items [box]\r\n8;ok;0;10,5\r\n8;stuck wheel;2;7\r\n",
+        "sep=;\nN;mode;m;p\n8;ok;0;10.5\n8;stuck wheel;2;7\n",
         'N,mode,m,p\n8,ok,0,"10,5"\n\n8,stuck wheel,2,7\n,,,\n',
     ],
 )

@@ -60,6 +60,22 @@ size,n_robots,10,,0,18
 parameter,delivery_width,2,,0,20
 parameter,delivery_width,1,,0,10
 """
+WIDE = """\
+Versuch;Roboter;Fehler;Defekt;Geliefert;Breite
+1;8;keine;;12,5;2
+2;8;Radbruch;1;10,5;2
+3;8;entfernt;1;11;2
+4;8;keine;;9,5;1,5
+5;4;keine;;6,5;2
+"""
+EVENTS = """\
+trial,robots,fault,faulty,onset,duration,seed,time
+a,8,none,,,60,1,10.5
+a,8,none,,,60,1,30
+b,8,jam,2,20,60,1,40
+c,8,removed,2,20,60,1,
+d,8,none again,,,60,1,50
+"""
 SPICES = [
     "1e999", "-1", "0", "nan", "inf", "99999999999999999999", "''", "[]", "{}", "true", '"', "\0",
     "\n", ",", "=", "[[", "../../x", "1.5", "2026-01-01", "é", "\ufeff", "os:abort", "a" * 200_000,
@@ -198,12 +214,12 @@ def test_a_policy_on_the_command_line_needs_no_leave(
     assert policy in capsys.readouterr().out
 
 
-@given(st.randoms(use_true_random=False))
+@given(st.randoms(use_true_random=False), st.sampled_from([TABLE, WIDE, EVENTS]))
 @examples
-def test_any_table_is_imported_or_refused(source: random.Random) -> None:
+def test_any_table_is_imported_or_refused(source: random.Random, table: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path, out = Path(folder) / "mine.csv", Path(folder) / "out"
-        path.write_bytes(mangled(source, TABLE.encode()))
+        path.write_bytes(mangled(source, table.encode()))
         refused_or_done(lambda: import_results(path, out))
         assert listing(Path(folder)) <= {"mine.csv", "out", f"out/{FILE_NAME}"}
         if out.exists():
