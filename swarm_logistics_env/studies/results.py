@@ -78,22 +78,22 @@ class StudyResults:
 def judge(
     plan: Plan,
     outcomes: Mapping[str, Outcome],
-    declared_seeds: int,
-    declared_looks: tuple[int, ...] = (),
-    declared_first_seed: int = 0,
+    declared: Declaration | None = None,
 ) -> StudyResults:
     """Judge a plan by the outcomes of its runs, keyed by run.
 
     Args:
         plan: of the study.
         outcomes: of its runs, by key.
-        declared_seeds: how many seeds were declared before the first run.
-        declared_looks: at how many seeds the study was then declared to be judged.
-        declared_first_seed: the smallest of the declared seeds.
+        declared: seeds and looks that were declared before the first run; None: those of the plan.
     """
     reference = load_reference(plan.specification.reference)
-    declared = range(declared_first_seed, declared_first_seed + declared_seeds)
-    level, exploratory = _level(plan, Declaration(declared, declared_looks))
+    exploratory = declared is not None and not declared.covers(plan)
+    looks = declared.looks if declared else ()
+    level = LEVEL
+    if looks and not exploratory:
+        alpha = spi.look_levels(looks, 1 - LEVEL)[looks.index(len(plan.seeds))]
+        level = 1 - max(alpha, _LEAST_ALPHA)
     performance = performance_table(plan, outcomes, reference)
     return StudyResults(
         plan,
@@ -103,19 +103,9 @@ def judge(
         exploratory=exploratory,
         outcomes=outcomes,
         level=level,
-        looks=declared_looks,
+        looks=looks,
     )
 
 
 def _by_arm(performance: pd.DataFrame) -> dict[CellKey, Row]:
     return {(row.policy, row.table, row.arm): row for row in rows_of(performance)}
-
-
-def _level(plan: Plan, declared: Declaration) -> tuple[float, bool]:
-    """Return the confidence level of the verdicts, and whether they are exploratory."""
-    if not declared.covers(plan):
-        return LEVEL, True
-    if not declared.looks:
-        return LEVEL, False
-    alphas = spi.look_levels(declared.looks, 1 - LEVEL)
-    return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False
