@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from record_tables import fields, summary
+from record_tables import fields, summary, table
 
 from swarm_logistics_env.scenario import SCENARIO_PRESETS
+from swarm_logistics_env.studies.indicator_table import INDICATORS
+from swarm_logistics_env.studies.performance_table import PERFORMANCE, Columns
 from swarm_logistics_env.studies.presets import presets
 from swarm_logistics_env.studies.specification import (
     Ablation,
@@ -45,6 +47,16 @@ error that suggests the one that was meant. What is varied comes in tables of ta
 `swarm-logistics study run NAME` knows these without a file:
 
 {presets}
+
+## The tables of results
+
+`Study.performance()` has one row a policy and condition, and `cells.csv` in the directory of a study holds it but for the last three columns:
+
+{performance}
+
+`Study.indicators()` has one row a comparison, and `claims.csv` holds it but for the last two columns:
+
+{indicators}
 """
 
 
@@ -62,7 +74,14 @@ def page() -> str:
             f"{study.scenario.duration:g} s; {varied(study)}"
             for name, study in presets().items()
         ),
+        performance=columns(PERFORMANCE),
+        indicators=columns(INDICATORS),
     )
+
+
+def columns(known: Columns) -> str:
+    """Return the columns of a table of results with what they mean."""
+    return table(("column", "meaning"), [(f"`{name}`", text) for name, (_, text) in known.items()])
 
 
 def varied(study: Specification) -> str:

@@ -43,21 +43,21 @@ class Figure:
 
 def indicator_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield S per step, FT and R per mode and m, A per parameter, and P without a part."""
-    yield from _scalability(results)
-    yield from _faults(results)
-    yield from _adaptability(results)
-    yield from _ablations(results)
-
-
-def _scalability(results: StudyResults) -> Iterator[Figure]:
     for table, tests in groups_of(_asked(results, "size"), "table"):
-        yield _interval_figure(
-            results,
-            slug(_symbols(tests), table),
-            f"{_policies(tests)}, {table}: {_caption(tests, 'per step in N')}",
-            tests,
-            _panels(_by_policy(tests, _steps(tests)), "swarm size N → N + m"),
-        )
+        panels = _panels(_by_policy(tests, _steps(tests)), "swarm size N → N + m")
+        title = f"{_policies(tests)}, {table}: {_caption(tests, 'per step in N')}"
+        yield _interval_figure(results, (table,), title, tests, panels)
+    yield from _faults(results)
+    tests = _asked(results, "parameter")
+    if not tests.empty:
+        panels = [
+            panel
+            for (table, name), here in groups_of(tests, "table", "factor")
+            for panel in _panels(_by_policy(here, _steps(here)), f"{name}, x_o → x_new", table)
+        ]
+        title = f"{_policies(tests)}: {_caption(tests, 'per parameter')}"
+        yield _interval_figure(results, (), title, tests, panels)
+    yield from _ablations(results)
 
 
 def _faults(results: StudyResults) -> Iterator[Figure]:
@@ -70,28 +70,12 @@ def _faults(results: StudyResults) -> Iterator[Figure]:
         )
         if policy != asked["policy"].iloc[0]:
             points["published"] = np.nan  # crosses for one policy are enough
-        yield _interval_figure(
-            results,
-            slug(_symbols(tests), policy, table, f"{onset:g}s" if onset else ""),
+        title = (
             f"{policy}, {table}, N = {swarm}{start}: "
-            f"{_caption(tests, 'per failure mode and number m of faulty robots')}",
-            tests,
-            _panels(points, "failure mode"),
+            f"{_caption(tests, 'per failure mode and number m of faulty robots')}"
         )
-
-
-def _adaptability(results: StudyResults) -> Iterator[Figure]:
-    asked = _asked(results, "parameter")
-    if asked.empty:
-        return
-    points = _by_policy(asked, _steps(asked))
-    panels = [
-        panel
-        for (table, name), here in groups_of(points, "table", "factor")
-        for panel in _panels(here, f"{name}, x_o → x_new", title=table)
-    ]
-    caption = f"{_policies(asked)}: {_caption(asked, 'per parameter')}"
-    yield _interval_figure(results, slug(_symbols(asked)), caption, asked, panels)
+        names = policy, table, f"{onset:g}s" if onset else ""
+        yield _interval_figure(results, names, title, tests, _panels(points, "failure mode"))
 
 
 def _ablations(results: StudyResults) -> Iterator[Figure]:
@@ -100,14 +84,12 @@ def _ablations(results: StudyResults) -> Iterator[Figure]:
         # 0 first: it is the threshold that always stands in the picture.
         thresholds = tuple(dict.fromkeys([0.0, *tests["threshold"]]))
         points = _by_policy(tests, tests["comparison"])
-        yield _interval_figure(
-            results,
-            slug(_symbols(tests), table),
+        title = (
             f"{_policies(tests)}, {table}: relative change of P where another policy takes its "
-            "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share.",
-            tests,
-            _panels(points, "in its place", thresholds=thresholds),
+            "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share."
         )
+        panels = _panels(points, "in its place", thresholds=thresholds)
+        yield _interval_figure(results, (table,), title, tests, panels)
 
 
 def _by_policy(tests: pd.DataFrame, categories: pd.Series[str]) -> pd.DataFrame:
@@ -141,7 +123,11 @@ def _panels(
 
 
 def _interval_figure(
-    results: StudyResults, name: str, caption: str, tests: pd.DataFrame, panels: Sequence[Panel]
+    results: StudyResults,
+    names: tuple[str, ...],
+    caption: str,
+    tests: pd.DataFrame,
+    panels: Sequence[Panel],
 ) -> Figure:
     """Return the figure of indicators with their intervals."""
     columns = [
@@ -155,7 +141,7 @@ def _interval_figure(
         f"thresholds{crosses}."
     )
     return Figure(
-        name,
+        slug(*(definition.symbol for definition in _definitions(tests)), *names),
         f"{caption} {seeds_text(results).capitalize()}. {marks}{_saturation(tests)}",
         tests[columns],
         0.5 + 2.5 * len(panels),
@@ -204,10 +190,6 @@ def _saturation(rows: pd.DataFrame) -> str:
 def _definitions(tests: pd.DataFrame) -> list[Definition]:
     asked = set(tests["indicator"])
     return [definition for symbol, definition in DEFINITIONS.items() if symbol in asked]
-
-
-def _symbols(tests: pd.DataFrame) -> str:
-    return "-".join(definition.symbol for definition in _definitions(tests))
 
 
 def _policies(tests: pd.DataFrame) -> str:

@@ -231,9 +231,8 @@ def _warnings(results: StudyResults) -> Iterator[str]:
     for test in rows_of(results.indicators):
         if test.problem:
             yield f"{test.policy}, {test.indicator}, {test.comparison} is blocked: {test.problem}."
-    flags = results.indicators["flags"].fillna("").str.split()
     for flag, meaning in _FLAGS.items():
-        flagged = flags.map(lambda here, flag=flag: flag in here)
+        flagged = results.indicators["flags"].str.contains(flag).eq(True)
         if flagged.any():
             yield f"{meaning}: {'; '.join(_families(results.indicators, flagged))}."
 

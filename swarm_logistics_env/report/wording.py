@@ -146,16 +146,17 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
     if test.problem:
         yield f"Blocked: {test.problem}."
         return
-    seeds = f"{test.n_seeds} runs a condition, unpaired"
-    if results.plan.paired:
-        seeds = seeds_text(results)
+    unpaired = f"{test.n_seeds} runs a condition, unpaired"
+    seeds = seeds_text(results) if results.plan.paired else unpaired
     if test.verdict == "unaffected":
         yield f"{test.indicator} = {test.value:.3f} exactly, over {seeds}: {UNAFFECTED}."
         yield "Both conditions gave the same runs, so there is nothing to test."
         return
-    value, brackets, limits = bracketed(test, 3).partition("[")
-    interval = f", {percent(test.confidence)} interval [{limits}" if brackets else " (no interval)"
-    yield f"{test.indicator}{mark(test)} = {value.rstrip()}{interval} over {seeds}."
+    interval = " (no interval)"
+    if is_known(test.low) and is_known(test.high):
+        limits = f"[{fixed(test.low, 3)}, {fixed(test.high, 3)}]"
+        interval = f", {percent(test.confidence)} interval {limits}"
+    yield f"{test.indicator}{mark(test)} = {fixed(test.value, 3)}{interval} over {seeds}."
     # One seed gives no p, and Holm's placeholder of 1 says nothing.
     adjusted_p = test.p_holm if is_known(test.p_value) else None
     yield f"Unadjusted: {test.answer}{_p(test.p_value)};"

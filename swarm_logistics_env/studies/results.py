@@ -80,22 +80,22 @@ class StudyResults:
 def judge(
     plan: Plan,
     outcomes: Mapping[str, Outcome],
-    declared_seeds: int,
-    declared_looks: tuple[int, ...] = (),
-    declared_first_seed: int = 0,
+    declared: Declaration | None = None,
 ) -> StudyResults:
     """Judge a plan by the outcomes of its runs, keyed by run.
 
     Args:
         plan: of the study.
         outcomes: of its runs, by key.
-        declared_seeds: how many seeds were declared before the first run.
-        declared_looks: at how many seeds the study was then declared to be judged.
-        declared_first_seed: the smallest of the declared seeds.
+        declared: seeds and looks that were declared before the first run; None: those of the plan.
     """
     reference = load_reference(plan.specification.reference)
-    declared = range(declared_first_seed, declared_first_seed + declared_seeds)
-    confidence, exploratory = _confidence(plan, Declaration(declared, declared_looks))
+    exploratory = declared is not None and not declared.covers(plan)
+    looks = declared.looks if declared else ()
+    confidence = CONFIDENCE
+    if looks and not exploratory:
+        alpha = spi.look_alphas(looks, 1 - CONFIDENCE)[looks.index(len(plan.seeds))]
+        confidence = 1 - max(alpha, _LEAST_ALPHA)
     performance = performance_table(plan, outcomes, reference)
     return StudyResults(
         plan,
@@ -105,19 +105,9 @@ def judge(
         exploratory=exploratory,
         outcomes=outcomes,
         confidence=confidence,
-        looks=declared_looks,
+        looks=looks,
     )
 
 
 def _by_arm(performance: pd.DataFrame) -> dict[CellKey, Row]:
     return {(row.policy, row.table, row.arm): row for row in rows_of(performance)}
-
-
-def _confidence(plan: Plan, declared: Declaration) -> tuple[float, bool]:
-    """Return the confidence level of the verdicts, and whether they are exploratory."""
-    if not declared.covers(plan):
-        return CONFIDENCE, True
-    if not declared.looks:
-        return CONFIDENCE, False
-    alphas = spi.look_alphas(declared.looks, 1 - CONFIDENCE)
-    return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False

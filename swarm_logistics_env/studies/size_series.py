@@ -104,7 +104,7 @@ def steps(results: StudyResults, series: SizeSeries) -> Iterator[Step]:
         yield Step(
             n_1,
             n_2,
-            _scaled(spi.mean_interval(large.by_seed), 1 / n_2),
+            Interval(large.mean / n_2, large.low / n_2, large.high / n_2),
             _gain(small, large, paired=paired),
             _karp_flatt(small, large, n_1, n_2, paired=paired),
             small.saturated or large.saturated,
@@ -135,13 +135,6 @@ def _karp_flatt(small: Row, large: Row, n_1: int, n_2: int, *, paired: bool) -> 
 def _serial_fraction(speed_up: float, growth: float) -> float:
     if speed_up <= 0.0:
         return math.inf
-    return (
-        spi.karp_flatt(1.0, speed_up, n_1=1.0, n_2=growth)
-        if math.isfinite(speed_up)
-        else (-1.0 / (growth - 1.0))
-    )
-
-
-def _scaled(interval: Interval, factor: float) -> Interval:
-    # A generator's length is no part of its type.
-    return Interval(*(None if x is None else factor * x for x in interval))  # type: ignore[arg-type]
+    if math.isinf(speed_up):
+        return -1.0 / (growth - 1.0)
+    return spi.karp_flatt(1.0, speed_up, n_1=1.0, n_2=growth)

@@ -239,14 +239,7 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            declared = Declaration.noted(store) or Declaration(self.specification.seed_numbers)
-            return judge(
-                plan,
-                store.outcomes(plan.runs()),
-                len(declared.seeds),
-                declared.looks,
-                declared.seeds.start,
-            )
+            return judge(plan, store.outcomes(plan.runs()), Declaration.noted(store))
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error."""

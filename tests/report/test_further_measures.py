@@ -47,7 +47,7 @@ def judged(study: Study, play: Callable[[str, Setting, int], Outcome]) -> StudyR
             outcome.ended_at,
             anchoring_seconds=outcome.anchoring_seconds,
         )
-    return judge(plan, outcomes, declared_seeds=len(plan.seeds))
+    return judge(plan, outcomes)
 
 
 def after_a_fault(share: float, back: float) -> StudyResults:
@@ -142,7 +142,7 @@ def test_self_repair_without_its_null_says_so(repaired: StudyResults) -> None:
     (null_pair,) = repaired.plan.null_pairs
     null = {null_pair.other.condition.run(repaired.plan.code, seed).key for seed in range(SEEDS)}
     outcomes = {key: o for key, o in repaired.outcomes.items() if key not in null}
-    found = judge(repaired.plan, outcomes, declared_seeds=SEEDS)
+    found = judge(repaired.plan, outcomes)
     assert only(found).repair is None
     assert "the runs of the no-fault null are missing" in markdown(document(found))
 
@@ -152,7 +152,7 @@ def test_null_that_ran_out_of_items_is_none(repaired: StudyResults) -> None:
     key = null_pair.other.condition.run(repaired.plan.code, 0).key
     emptied = replace(repaired.outcomes[key], all_delivered=True)
     outcomes = {**repaired.outcomes, key: emptied}
-    one = only(judge(repaired.plan, outcomes, declared_seeds=SEEDS))
+    one = only(judge(repaired.plan, outcomes))
     assert one.repair is None
     assert "the items ran out" in str(one.problem)
 
@@ -250,7 +250,7 @@ def test_policies_are_set_against_the_first() -> None:
     assert one.differences["random-walk"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     titles = {chapter.title for chapter in document(found).chapters}
     assert "Policies compared" in titles
-    alone = judge(Study(sizes=[{"values": [5, 10]}]).plan(), {}, declared_seeds=20)
+    alone = judge(Study(sizes=[{"values": [5, 10]}]).plan(), {})
     assert "Policies compared" not in {chapter.title for chapter in document(alone).chapters}
 
 

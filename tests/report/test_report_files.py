@@ -39,7 +39,7 @@ def results(seeds: int, p: Callable[[str, Setting], float] | None = None) -> Stu
         times = np.sort(noise.uniform(0.0, 500.0, max(0, round(delivered))))
         capped = level == NARROW and run.seed == 0
         outcomes[run.key] = Outcome(run.key, times, all_delivered=capped)
-    return judge(plan, outcomes, declared_seeds=seeds)
+    return judge(plan, outcomes)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_every_verdict_quotes_seeds_interval_and_both_verdicts(found: StudyResul
 def test_blocked_verdict_says_why(found: StudyResults) -> None:
     key = found.plan.comparisons[0].changed.condition.run(found.plan.code, 2).key
     outcomes = {name: o for name, o in found.outcomes.items() if name != key}
-    blocked = judge(found.plan, outcomes, declared_seeds=4)
+    blocked = judge(found.plan, outcomes)
     told = sentence(blocked, next(rows_of(blocked.indicators)))
     assert told.verdict == "blocked"
     assert "N = 10: 1 of 4 runs missing" in told.text

@@ -66,7 +66,7 @@ def results(performance: dict[tuple[int, int], int], **fields: Any) -> StudyResu
             **fields,
         }
     ).plan()
-    return judge(plan, dict(outcomes(plan, performance)), len(SPREAD))
+    return judge(plan, dict(outcomes(plan, performance)))
 
 
 def outcomes(plan: Plan, performance: dict[tuple[int, int], int]) -> Any:
@@ -147,7 +147,7 @@ def test_other_seeds_and_another_policy_are_compared_where_they_can_be() -> None
 def test_the_same_runs_answer_a_gate_exactly(text: str, failing: bool) -> None:
     plan = results(WELL).plan
     # Where nothing is delivered no change could be estimated.
-    nothing = judge(plan, {run.key: Outcome(run.key, digest=run.key) for run in plan.runs()}, 6)
+    nothing = judge(plan, {run.key: Outcome(run.key, digest=run.key) for run in plan.runs()})
     for same in (results(WELL), results(WORSE, seeds=2), nothing):
         said = answers(Gate.parse(text), same, same)
         assert {(answer.fails, answer.exact) for answer in said} == {(failing, 0.0)}
@@ -243,7 +243,7 @@ def test_a_policy_under_no_common_condition_cannot_be_judged() -> None:
 
 def test_what_cannot_be_judged_fails() -> None:
     plan = results(WELL).plan
-    failed = judge(plan, {run.key: Outcome(run.key, error="x") for run in plan.runs()}, 6)
+    failed = judge(plan, {run.key: Outcome(run.key, error="x") for run in plan.runs()})
     (answer,) = answers(Gate.parse("R < 0"), results(WELL), failed)
     assert answer.fails
     assert "6 of 6 runs failed" in str(answer.problem)

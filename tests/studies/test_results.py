@@ -51,7 +51,7 @@ def results(
             all_delivered=level == full and run.seed == 0,
             digest=f"no fault {run.seed}" if original else run.key,
         )
-    return judge(plan, outcomes, declared_seeds=seeds)
+    return judge(plan, outcomes)
 
 
 def as_published(level: Setting) -> float:
@@ -218,6 +218,6 @@ def test_a_study_at_its_cap_everywhere_decides_nothing() -> None:
         run.key: Outcome(run.key, np.arange(60.0), all_delivered=True, digest=run.key)
         for run in plan.runs()
     }
-    found = judge(plan, outcomes, declared_seeds=SEEDS)
+    found = judge(plan, outcomes)
     assert set(found.indicators["verdict"]) == {"inconclusive"}
     assert set(found.indicators["verdict_holm"]) == {"inconclusive"}

@@ -19,7 +19,7 @@ def pilot(preset: str = "", seeds: int = 5, **fields: Any) -> StudyResults:
         run.key: Outcome(run.key, untimed=run.condition.scenario.n_robots + (7 * number) % 5)
         for number, run in enumerate(plan.runs())
     }
-    return judge(plan, outcomes, seeds)
+    return judge(plan, outcomes)
 
 
 def test_named_effect_decides_the_number() -> None:
@@ -55,5 +55,5 @@ def test_threshold_as_effect_has_no_number() -> None:
 
 def test_blocked_comparison_says_why() -> None:
     plan = pilot().plan
-    (demand,) = demands(judge(plan, {}, 5), effect=1.0)
+    (demand,) = demands(judge(plan, {}), effect=1.0)
     assert "5 of 5 runs missing" in str(demand.problem)
