@@ -17,10 +17,11 @@ BENCHMARL := .venvs/benchmarl
 SKRL      := .venvs/skrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
+TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs dist format clean
+.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -33,6 +34,7 @@ help:
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
 	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
+	@echo "make tasks           studies of RWARE, simple_spread and VMAS, with their tests; checks the numbers of their pages"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them"
 	@echo "make format          sort imports and format"
@@ -86,6 +88,10 @@ interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPER
 	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
 	$(RLLIB)/bin/python -m interop.rllib_ppo
 
+tasks: $(TASKS)/installed
+	$(TASKS)/bin/python -m pytest tests/tasks
+	$(TASKS)/bin/python -m pytest $(patsubst %,"tests/test_docs.py::test_page_runs_and_prints_what_it_shows[%.md]",rware simple_spread dispersion)
+
 # study: autodoc reads the package. -W: a warning is an error.
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate.py
@@ -113,6 +119,8 @@ $(TORCHRL)/installed: OTHERS := torch torchrl
 $(BENCHMARL)/installed: OTHERS := torch benchmarl
 $(SKRL)/installed: OTHERS := torch skrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
+$(TASKS)/installed: EXTRAS := study,tasks
+$(TASKS)/installed: OTHERS := hypothesis pytest
 $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-import sqlite3
-import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -17,41 +14,11 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import metadata
+from swarm_logistics_env.studies.database import Database
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
 FILE_NAME = "study.sqlite"
-SCHEMA_VERSION = 3
-TIMEOUT = 60.0  # s, for other processes that write
-APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
-
-_SCHEMA = """
-CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE conditions (
-    condition TEXT PRIMARY KEY,
-    policy TEXT NOT NULL,
-    policy_identity TEXT NOT NULL,
-    scenario TEXT NOT NULL,  -- JSON
-    faults TEXT NOT NULL,    -- JSON
-    behaviour INTEGER NOT NULL DEFAULT 0
-) WITHOUT ROWID;
-CREATE TABLE runs (
-    run TEXT PRIMARY KEY,
-    condition TEXT NOT NULL REFERENCES conditions,
-    code TEXT NOT NULL,
-    seed INTEGER NOT NULL,
-    delivered INTEGER,           -- P, a REAL where a task measures fractions; NULL: the run failed
-    delivery_times BLOB,         -- float64, little-endian [s]; NULL: no times are known
-    ended_at REAL,               -- [s]
-    all_delivered INTEGER,
-    failed_robots TEXT,          -- JSON
-    anchoring_seconds REAL,
-    digest TEXT,                 -- of the trajectory; equal: the same run
-    error TEXT,                  -- traceback
-    wall_seconds REAL NOT NULL,
-    UNIQUE (condition, code, seed)
-) WITHOUT ROWID;
-"""
 
 _RESULT = (
     "delivered, delivery_times, ended_at, all_delivered, failed_robots, anchoring_seconds, digest"
@@ -89,22 +56,7 @@ class Store:
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
         self.path = path
-        self._read_only = read_only
-        place = str(path or ":memory:")
-        if path is not None and read_only:
-            _refuse_unmerged(path)
-            # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
-            place = f"{path.absolute().as_uri()}?immutable=1"
-        with self._explained():
-            # Autocommit: transactions are opened by hand, one per run.
-            self._database = sqlite3.connect(
-                place, timeout=TIMEOUT, isolation_level=None, uri=read_only
-            )
-            try:
-                self._prepare()
-            except BaseException:
-                self._database.close()
-                raise
+        self._database = Database(path, read_only=read_only)
 
     @classmethod
     def existing(cls, directory: Path) -> Self:
@@ -122,12 +74,7 @@ class Store:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -137,59 +84,43 @@ class Store:
     def add(self, run: Run, outcome: Outcome) -> None:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
         condition = run.condition
-        failed = outcome.error is not None
         result: tuple[object, ...] = (
             outcome.delivered,
-            outcome.delivery_times.astype("<f8").tobytes(),
+            outcome.delivery_times.astype("<f8").tobytes() if outcome.untimed is None else None,
             outcome.ended_at,
             int(outcome.all_delivered),
             json.dumps(outcome.failed_robots),
             outcome.anchoring_seconds,
             outcome.digest,
         )
-        if outcome.untimed is not None:
-            known = result[2:] if outcome.digest else (None,) * (len(result) - 2)
-            result = (outcome.untimed, None, *known)
-        with self._transaction():
-            self._database.execute(
-                "INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?, ?)",
-                (
-                    condition.key,
-                    condition.policy.label,
-                    condition.policy.identity,
-                    condition.scenario_json,
-                    condition.faults_json,
-                    condition.behaviour,
-                ),
-            )
-            self._database.execute(
-                "DELETE FROM runs WHERE run = ? AND error IS NOT NULL", (run.key,)
-            )
-            self._database.execute(
-                "INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (
-                    run.key,
-                    condition.key,
-                    run.code,
-                    run.seed,
-                    *((None,) * len(result) if failed else result),
-                    outcome.error,
-                    outcome.wall_seconds,
-                ),
-            )
+        if outcome.untimed is not None and outcome.digest is None:  # nothing but P is known
+            result = (outcome.untimed, *(None,) * 6)
+        if outcome.error is not None:
+            result = (None,) * len(result)
+        conditions = (
+            condition.key,
+            condition.policy.label,
+            condition.policy.identity,
+            condition.scenario_json,
+            condition.faults_json,
+            condition.behaviour,
+        )
+        runs = (
+            run.key, condition.key, run.code, run.seed, *result, outcome.error, outcome.wall_seconds
+        )  # fmt: skip
+        with self._database.transaction() as write:
+            write("INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?, ?)", conditions)
+            write("DELETE FROM runs WHERE run = ? AND error IS NOT NULL", (run.key,))
+            write("INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", runs)
 
     def __len__(self) -> int:
-        with self._explained():
-            (count,) = self._database.execute("SELECT count(*) FROM runs").fetchone()
-            return int(count)
+        return self._database.number("SELECT count(*) FROM runs")
 
     @property
     def size(self) -> int:
         """Size of the database [bytes]."""
-        with self._explained():
-            (pages,) = self._database.execute("PRAGMA page_count").fetchone()
-            (page,) = self._database.execute("PRAGMA page_size").fetchone()
-            return int(pages) * int(page)
+        pages, page = "PRAGMA page_count", "PRAGMA page_size"
+        return self._database.number(pages) * self._database.number(page)
 
     def absorb(self, path: Path) -> None:
         """Add the runs of another store, to which `add`'s rule applies.
@@ -197,150 +128,52 @@ class Store:
         Raises:
             StudyError: the file is not a store, or has another result of a run that is here.
         """
-        Store(path).close()  # is it one, of this schema?
-        with self._explained():
-            self._database.execute("ATTACH ? AS other", (str(path),))
-        try:
-            with self._transaction():
-                clash = self._database.execute(_CLASH).fetchone()
-                if clash is not None:
-                    raise StudyError(
-                        f"{path} has another result than the stores before it for the run "
-                        f"{clash[0]} (seed {clash[1]}), of the same scenario, policy and code"
-                    )
-                for statement in _ABSORB:
-                    self._database.execute(statement)
-        finally:
-            self._database.execute("DETACH other")
+        with self._database.attached(path), self._database.transaction() as write:
+            for clash in self._database.read(_CLASH):
+                raise StudyError(
+                    f"{path} has another result than the stores before it for the run "
+                    f"{clash['run']} (seed {clash['seed']}), of the same scenario, policy and code"
+                )
+            for statement in _ABSORB:
+                write(statement)
 
     def succeeded(self) -> set[str]:
         """Return the keys of the runs that need not run again."""
-        with self._explained():
-            rows = self._database.execute("SELECT run FROM runs WHERE error IS NULL")
-            return {run for (run,) in rows}
+        rows = self._database.read("SELECT run FROM runs WHERE error IS NULL")
+        return {row["run"] for row in rows}
 
     def outcomes(self, runs: Iterable[Run]) -> dict[str, Outcome]:
         """Return the outcomes of those of `runs` that finished, by key."""
         wanted = {run.key for run in runs}
-        found = {}
-        with self._explained(), self._sound():
-            rows = self._database.execute(f"SELECT run, {_RESULT}, error, wall_seconds FROM runs")
-            for run, *result, error, wall in rows:
-                if run not in wanted:
-                    continue
-                count, times, ended_at, all_delivered, robots, anchoring, digest = result
-                if error is not None:
-                    found[run] = Outcome(run, error=str(error), wall_seconds=float(wall))
-                    continue
-                if times is None and digest is None:  # imported
-                    found[run] = Outcome(run, untimed=_performance(count))
-                    continue
-                found[run] = Outcome(
-                    run,
-                    delivery_times=np.empty(0) if times is None else _times(times, count),
-                    ended_at=float(ended_at),
-                    all_delivered=bool(all_delivered),
-                    failed_robots=tuple(json.loads(robots)),
-                    anchoring_seconds=None if anchoring is None else float(anchoring),
-                    digest=None if digest is None else str(digest),
-                    wall_seconds=float(wall),
-                    untimed=_performance(count) if times is None else None,
-                )
-        return found
+        rows = self._database.read(f"SELECT run, {_RESULT}, error, wall_seconds FROM runs")
+        with self._sound():
+            return {row["run"]: _outcome(row) for row in rows if row["run"] in wanted}
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield every stored run as one flat row, sorted by key, without wall times.
 
         `delivery_times` is a list [s]; the fields of a result are None where the run failed.
         """
-        with self._explained(), self._sound():
-            cursor = self._database.execute(_ROWS)
-            names = [column[0] for column in cursor.description]
-            for values in cursor:
-                row = dict(zip(names, values))
+        with self._sound():
+            for row in map(dict, self._database.read(_ROWS)):
                 if row["delivery_times"] is not None:
                     row["delivery_times"] = _times(row["delivery_times"], row["delivered"]).tolist()
                 yield row
 
     def note(self, name: str) -> str | None:
         """Return what was noted under `name`."""
-        with self._explained():
-            row = self._database.execute(
-                "SELECT value FROM notes WHERE name = ?", (name,)
-            ).fetchone()
-        if row is None:
-            return None
-        if not metadata.reads(name, row[0]):
-            raise StudyError(f"the store {self.path} is damaged: its note {name!r} does not read")
-        return str(row[0])
+        for row in self._database.read("SELECT value FROM notes WHERE name = ?", name):
+            if not metadata.reads(name, row["value"]):
+                raise StudyError(
+                    f"the store {self.path} is damaged: its note {name!r} does not read"
+                )
+            return str(row["value"])
+        return None
 
     def set_note(self, name: str, value: str) -> None:
         """Note a fact about the study."""
-        with self._transaction():
-            self._database.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
-
-    def _prepare(self) -> None:
-        # One moment's answers: another process may be making the tables.
-        self._database.execute("BEGIN")
-        try:
-            (version,) = self._database.execute("PRAGMA user_version").fetchone()
-            (application,) = self._database.execute("PRAGMA application_id").fetchone()
-            (tables,) = self._database.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        finally:
-            self._database.execute("ROLLBACK")
-        if application != APPLICATION_ID and tables:
-            raise StudyError(f"{self.path} is a database, but not the store of a study")
-        if application == APPLICATION_ID and version != SCHEMA_VERSION:
-            raise StudyError(
-                f"{self.path} has store schema {version}, this version of the package reads "
-                f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
-            )
-        if self._read_only:
-            if (application, version) != (APPLICATION_ID, SCHEMA_VERSION):
-                raise StudyError(
-                    f"{self.path} may not be written: should be a store of schema "
-                    f"{SCHEMA_VERSION} to be read there; copy it to where it may"
-                )
-            return
-        # A process that is killed loses nothing; a power cut at most the latest runs.
-        self._change_to_wal()
-        self._database.execute("PRAGMA synchronous = NORMAL")
-        if application == APPLICATION_ID:
-            return
-        with self._transaction():
-            # Another process may have made the tables since: two shards start at once.
-            (tables,) = self._database.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            if tables:
-                return
-            for statement in _SCHEMA.split(";\n"):
-                self._database.execute(statement)
-            self._database.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-            self._database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-
-    def _change_to_wal(self) -> None:
-        give_up = time.monotonic() + TIMEOUT
-        while True:
-            try:
-                self._database.execute("PRAGMA journal_mode = WAL")
-            except sqlite3.OperationalError as error:
-                # When two processes change a new file at once, SQLite refuses one without waiting.
-                if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:
-                    raise
-                time.sleep(0.01)
-            else:
-                return
-
-    @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        with self._explained():
-            self._database.execute("BEGIN IMMEDIATE")
-            try:
-                yield
-            except BaseException:
-                if self._database.in_transaction:
-                    self._database.execute("ROLLBACK")
-                raise
-            self._database.execute("COMMIT")
+        with self._database.transaction() as write:
+            write("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
 
     @contextmanager
     def _sound(self) -> Iterator[None]:
@@ -351,21 +184,25 @@ class Store:
                 f"the store {self.path} is damaged: a run in it does not read ({error!r})"
             ) from error
 
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.Error as error:
-            raise StudyError(f"cannot use the store {self.path}: {error}") from error
 
-
-def _refuse_unmerged(path: Path) -> None:
-    log = path.with_name(f"{path.name}-wal")
-    if log.is_file() and log.stat().st_size:
-        raise StudyError(
-            f"{path} may not be written, and its latest runs are still in {log.name}: copy both "
-            "to where they may"
-        )
+def _outcome(row: Any) -> Outcome:
+    if row["error"] is not None:
+        return Outcome(row["run"], error=str(row["error"]), wall_seconds=float(row["wall_seconds"]))
+    times, digest, anchoring = row["delivery_times"], row["digest"], row["anchoring_seconds"]
+    untimed = _performance(row["delivered"]) if times is None else None
+    if times is None and digest is None:  # nothing but P is known
+        return Outcome(row["run"], untimed=untimed)
+    return Outcome(
+        row["run"],
+        delivery_times=np.empty(0) if times is None else _times(times, row["delivered"]),
+        ended_at=float(row["ended_at"]),
+        all_delivered=bool(row["all_delivered"]),
+        failed_robots=tuple(json.loads(row["failed_robots"])),
+        anchoring_seconds=None if anchoring is None else float(anchoring),
+        digest=None if digest is None else str(digest),
+        wall_seconds=float(row["wall_seconds"]),
+        untimed=untimed,
+    )
 
 
 def _performance(number: object) -> float:

@@ -49,13 +49,14 @@ class FixedLandmarks(Scenario):  # type: ignore[misc]
 
     def reset_world(self, world: Any, np_random: np.random.Generator) -> None:
         """Place the landmarks and the robots; where one starts does not depend on how many are."""
+        # Drawn before anything whose number of draws depends on the robots that are there.
+        marks = np_random.uniform(-1, 1, (self._landmarks, world.dim_p))
+        places = np_random.uniform(-1, 1, (self._whole, world.dim_p))
         super().reset_world(world, np_random)
-        for landmark in world.landmarks:
-            landmark.state.p_pos = np_random.uniform(-1, 1, world.dim_p)
-        places = [np_random.uniform(-1, 1, world.dim_p) for _ in range(self._whole)]
-        rows = [row for row in range(self._whole) if row not in self._absent]
-        for row, agent in zip(rows, world.agents):
-            agent.state.p_pos = places[row]
+        for place, landmark in zip(marks, world.landmarks):
+            landmark.state.p_pos = place
+        for place, agent in zip(np.delete(places, list(self._absent), axis=0), world.agents):
+            agent.state.p_pos = place
 
 
 def make_env(n_robots: int, landmarks: int, absent: Sequence[int] = ()) -> Env:

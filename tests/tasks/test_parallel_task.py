@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,8 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.engines import execute
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks import ParallelTask, SumOfInfos
+from tests.tasks.killing import run_killed_and_resumed
 from tests.tasks.lane import ACTIONS, FAILURES, LANE, OBSERVATIONS, STAY, Lane, Walker
 
 STUDY = """
@@ -155,37 +154,7 @@ def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Pa
 
 
 def test_a_killed_study_goes_on_where_it_was(file: Path, tmp_path: Path) -> None:
-    def command(out: Path) -> list[str]:
-        run = ["study", "run", str(file), "--seeds", "40", "--processes", "1", "--trust-code"]
-        start = "from swarm_logistics_env.cli import app; app()"
-        return [sys.executable, "-c", start, *run, "--out", str(out)]
-
-    killed, whole = tmp_path / "killed", tmp_path / "whole"
-    process = subprocess.Popen(command(killed), stdout=subprocess.DEVNULL)
-    while not (killed / FILE_NAME).is_file() or n_runs(killed) < 30:
-        assert process.poll() is None
-        time.sleep(0.005)
-    process.kill()
-    process.wait()
-    kept = n_runs(killed)
-    assert 30 <= kept < 6 * 2 * 40
-    done = subprocess.run(command(killed), capture_output=True, text=True, check=True)
-    assert f"{6 * 2 * 40 - kept} runs played" in done.stdout
-    subprocess.run(command(whole), check=True, stdout=subprocess.DEVNULL)
-    assert rows(killed) == rows(whole)
-
-
-def n_runs(directory: Path) -> int:
-    try:
-        with Store.existing(directory) as store:
-            return len(store.succeeded())
-    except StudyError:  # the tables are being made
-        return 0
-
-
-def rows(directory: Path) -> list[dict[str, Any]]:
-    with Store.existing(directory) as store:
-        return list(store.rows())
+    run_killed_and_resumed(file, tmp_path, "--seeds", "40", "--trust-code", kept=30)
 
 
 def test_a_model_of_stable_baselines3_plays(tmp_path: Path) -> None:
