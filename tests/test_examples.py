@@ -30,6 +30,18 @@ def test_ppo_learns_over_two_swarm_sizes(capsys: pytest.CaptureFixture[str]) -> 
     assert len(delivered) == 3
 
 
+def test_a_loop_of_ones_own_learns_on_the_frame_of_motion(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    torch = pytest.importorskip("torch", reason="needs the extra train")
+    pytest.importorskip("stable_baselines3", reason="needs the extra train")
+    torch.set_num_threads(1)
+    delivered = main("ppo_from_nothing", total_timesteps=92_160, duration=20.0)
+    assert len(delivered) == 36
+    # It begins with next to none, and lifts the requested item on purpose soon.
+    assert "Swarm D-T's" in capsys.readouterr().out
+
+
 def test_own_policy_is_judged_beside_swarm_dt(tmp_path: Path) -> None:
     table = main("judge_my_policy", seeds=2, duration=20.0, out=tmp_path / "out")
     assert sorted(set(table["policy"])) == ["Straight", "swarm-dt"]
@@ -54,7 +66,7 @@ def test_study_file_can_be_planned(study: Path) -> None:
 
 def test_examples_are_short() -> None:
     for example in EXAMPLES.glob("*.py"):
-        assert len(example.read_text("utf-8").splitlines()) < 60, example.name
+        assert len(example.read_text("utf-8").splitlines()) < 80, example.name
 
 
 def test_simulation_narrows_the_intervals_of_few_real_runs_that_stay_right() -> None:

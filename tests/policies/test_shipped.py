@@ -29,12 +29,8 @@ def test_they_are_small_and_say_how_they_were_made(name: str) -> None:
     assert all(score.low is not None and score.low <= score.value for score in card.scores)
 
 
-# ppo-robust listens to no timer and its memory fades: in a crowd it finds the delivery area as late
-# as Swarm D-T does.
-@pytest.mark.parametrize(
-    ("name", "n_robots"),
-    [(name, n) for name in SHIPPED for n in (5, 40) if (name, n) != ("ppo-robust", 40)],
-)
+@pytest.mark.parametrize("n_robots", [5, 40])
+@pytest.mark.parametrize("name", SHIPPED)
 def test_they_deliver_more_than_swarm_dt(name: str, n_robots: int) -> None:
     scenario = SHORT.replace(n_robots=n_robots)
     ours, scripted = (

@@ -14,6 +14,7 @@ import pytest
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.engines import execute
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.tasks.parallel_policies import observation_rows
 from swarm_logistics_env.tasks.task_choice import task_of
 from tests.tasks.killing import run_killed_and_resumed
@@ -94,5 +95,5 @@ def test_the_tasks_own_policy_is_better_than_random(shipped: str) -> None:
     _, task, policy, _ = SHIPPED[shipped]
     study = Study(task=task, policies=[policy, "random"], seeds=2, sizes=[{"values": [3, 4]}])
     assert study.run().failed == 0
-    p = {(c.policy, str(c.arm.setting)): c.performance.mean() for c in study.findings().cells}
+    p = {(c.policy, c.cell): c.mean for c in rows_of(study.findings().performance)}
     assert p[policy, "N = 4"] > 2 * p["random", "N = 4"]
