@@ -80,16 +80,16 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         """Take one control period; see `step_arrays`.
 
         Args:
-            actions: one command (4,) for every agent in `agents`; those of possible agents who
-                are not there are ignored, as trainers of fixed size send them.
+            actions: one command (4,) for every agent in `agents`. Commands for possible agents
+                that are not present are ignored, because trainers of fixed size send them.
 
         Returns:
             Observations, rewards, terminations, truncations and infos (see `reset`) of the agents
-            that were there; empty dicts when the episode is over.
+            that were present; empty dicts when the episode is over.
 
         Raises:
-            CommandError: no dict; an agent's command is missing, for an unknown agent, not
-                readable, of the wrong shape or not finite.
+            CommandError: `actions` is not a dict, or a command is missing, belongs to an unknown
+                agent, cannot be read, has the wrong shape or is not finite.
             SetupError: there was no reset.
         """
         agents = self.agents

@@ -30,7 +30,7 @@ def checked_seed(seed: int) -> int:
     """Return the seed as an int.
 
     Raises:
-        SetupError: it is none.
+        SetupError: it is not an integer.
     """
     try:
         return operator.index(seed)

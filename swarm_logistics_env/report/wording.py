@@ -50,7 +50,7 @@ def percent(level: float) -> str:
 
 
 def limits(interval: Interval | None) -> str:
-    """Return the limits alone."""
+    """Return the limits of an interval as text, without its value."""
     if interval is None or interval.low is None or interval.high is None:
         return NOTHING
     return f"[{interval.low:.1f}, {interval.high:.1f}]"

@@ -115,7 +115,7 @@ class Comparison:
 
     @property
     def question(self) -> Question:
-        """The comparison without its policy."""
+        """What is compared, apart from the policy; it is the same for all policies."""
         return Question(self.indicator, self.original.setting, self.changed.setting, self.threshold)
 
     @property

@@ -50,13 +50,13 @@ class Study:
     """A study of how a swarm copes: conditions, paired seeds, indicators with their verdicts.
 
     Args:
-        out: directory of the store and the report; None: kept in memory.
-        task: what is played; policies, sizes, faults and parameters are its own.
-        fields: those of `Specification`, e.g. `policies=["swarm-dt"]`, `seeds=20`,
+        out: directory of the store and the report; None keeps the results in memory.
+        task: the task to play, which defines the policies, sizes, faults and parameters.
+        fields: the fields of `Specification`, e.g. `policies=["swarm-dt"]`, `seeds=20`,
             `faults=[{"modes": ["FM1"], "robots": [1, 2]}]`.
 
     Raises:
-        StudyError: a field is unknown or cannot be.
+        StudyError: a field is unknown, or its value is not allowed.
 
     Example:
         >>> study = Study(

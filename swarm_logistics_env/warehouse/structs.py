@@ -269,7 +269,7 @@ def blank_robots(scenario: Scenario) -> Robots:
 
 
 def blank_capabilities(scenario: Scenario) -> Capabilities:
-    """Return full capabilities but for speeds and ranges, which `faults` fills."""
+    """Return the capabilities of sound robots; `faults` fills in speeds and ranges."""
     n = scenario.n_robots
     return Capabilities(
         max_speed=np.zeros(n),
