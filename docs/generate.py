@@ -30,7 +30,7 @@ TEXT = """\
 
 <!-- Written by docs/generate.py from the code; change that, not this. -->
 
-A swarm fetches requested items from the storage of a warehouse to its delivery area. Each robot has its own sensors only.
+A swarm fetches requested items from the storage of a warehouse to its delivery area. Each robot uses only its own sensors.
 
 {facts}
 
@@ -47,22 +47,22 @@ while env.agents:
 env.close()
 ```
 
-`swarm_logistics_v0.env` is the same with agents in turn (AEC). `env.reset_arrays` and `env.step_arrays` give and take one array for the
-whole swarm. `gymnasium.make("swarm_logistics_env:SwarmLogistics-v0")` is the swarm as one agent. [In other
-people's code](ecosystem.md) says how each library takes them.
+`swarm_logistics_v0.env` is the same environment with agents that act in turn (AEC). `env.reset_arrays` and `env.step_arrays` take and return
+one array for the whole swarm. In `gymnasium.make("swarm_logistics_env:SwarmLogistics-v0")` the swarm is one agent. [In other people's
+code](ecosystem.md) says how each library takes them.
 
 ## Agents
 
-`robot_0` to `robot_{last}`, as many as the scenario has robots. A removed robot is gone from `agents` for the rest of the episode.
+The agents are `robot_0` to `robot_{last}`, one for each robot of the scenario. A removed robot is not in `agents` for the rest of the episode.
 
-`possible_agents` and all spaces stay as they were made. A reset may ask for fewer robots; for more, give `max_robots` when the environment
-is made, or wrap it in `SwarmSize`. Trainers that need the same agents from the first step to the last take `FixedAgents(env)`: all
-possible agents are always there, absent ones with rows of zeros, and all end together.
+`possible_agents` and all spaces never change. A reset may ask for fewer robots. If it is to ask for more, give `max_robots` when you make
+the environment, or wrap it in `SwarmSize`. For trainers that need the same agents from the first step to the last, use `FixedAgents(env)`:
+all possible agents are always present, absent robots have rows of zeros, and all agents end together.
 
 ## Observation space
 
-One float32 row for each robot, in its own frame: x forward, y left. Things in view and neighbours are sorted by distance, nearest first;
-absent ones are zeros. `observations.unflatten` gives the columns by name.
+Each robot has one float32 row, in its own frame: x forward, y left. Items in view and neighbours are sorted by distance, nearest first; absent
+ones are zeros. `observations.unflatten` returns the columns by name.
 
 {observations}
 
@@ -70,58 +70,58 @@ With `message_size` M above 0, `neighbour_message` follows: M numbers in [-1, 1]
 
 ## Action space
 
-`Box(-1, 1, (4,), float32)`: {commands}. Forward and left are fractions of the top speed, turn of the top turn rate (to the left); the
-gripper holds above 0.5, opens below -0.5 and stays as it is between. Beyond the bounds is cut. With `message_size` M, M numbers to
-broadcast follow.
+The space is `Box(-1, 1, (4,), float32)` with the columns {commands}. Forward and left are fractions of the top speed; turn is a fraction of
+the top turn rate, to the left. The gripper holds above 0.5, opens below -0.5 and keeps its state between these. Values beyond the bounds are
+clipped. With `message_size` M, M numbers to broadcast follow.
 
 ## State
 
-`env.state()` is one float32 vector for central critics, of {state_length} numbers by default: for each robot {robot_features}; for each
-item {item_features}; then the time [s].
+`env.state()` is one float32 vector for central critics, with {state_length} numbers by default. For each robot it has {robot_features}; for each
+item it has {item_features}; the last number is the time [s].
 
 ## Rewards
 
-The weighted sum of terms, `parallel_env(rewards={{"own_delivery": 1.0, "contact": -0.1}})`.
+The reward is the weighted sum of these terms, for example `parallel_env(rewards={{"own_delivery": 1.0, "contact": -0.1}})`.
 
 {rewards}
 
 ## Episode end
 
-All agents terminate when every item is delivered (never with `restock`); a robot terminates when it is removed. All are truncated after
-`duration` ({duration:g} s, {n_steps} steps), or after `max_cycles` steps if that is sooner.
+All agents terminate when every item is delivered, which never happens with `restock`. A robot terminates when it is removed. All agents are
+truncated after `duration` ({duration:g} s, {n_steps} steps), or after `max_cycles` steps if that is sooner.
 
 ## Infos
 
-A dict of its own for each agent, of numbers, with the same keys at the reset and at every step. Robots do not
-sense them: infos are for those who train or judge robots.
+Each agent has a dict of its own. It contains numbers, with the same keys at the reset and at every step. Robots do not sense them: infos
+are for those who train or judge robots.
 
 {infos}
 
-`IndicatorReward` adds the indicators and their references, see its `episode_info`. `warehouse.state.failure_modes` names the modes of each
-robot. `SwarmVecEnv` tells `world`, `n_robots` and `padding` of each row besides; `CentralEnv` tells `failed` as an array (N,).
+`IndicatorReward` adds the indicators and their references; see its `episode_info`. `warehouse.state.failure_modes` names the modes of each
+robot. `SwarmVecEnv` adds `world`, `n_robots` and `padding` of each row; in `CentralEnv`, `failed` is an array (N,).
 
 ## Arguments
 
 {arguments}
 
-Every field of `Scenario` is an argument too. Those marked * can change during a run. Each default comes from a source ({sources}), was
-fitted to bring the paper's tables closest, was chosen without a source, or is off: an addition of this package that the default leaves out.
+Every field of `Scenario` is an argument, too. Fields marked * can change during a run. Each default either comes from a source ({sources}), or was
+fitted to bring the paper's tables closest, or was chosen without a source, or is off: then the default leaves out an addition of this package.
 
 {scenario}
 
 `reset(seed, options)` takes `options={{"scenario": {{...}}, "faults": [...]}}` for one episode. A fault is a `Fault` or, as JSON and YAML
-have it, a dict of its arguments: `{{"mode": "FM1", "robots": 2}}`. Any argument, option or command that cannot be
-raises a subclass of `SwarmLogisticsError`, itself a `ValueError`, before anything has happened.
+have it, a dict of its arguments: `{{"mode": "FM1", "robots": 2}}`. Any argument, option or command that is not allowed raises a subclass of
+`SwarmLogisticsError`, which is a `ValueError`, before anything has changed.
 
 ## Failure modes
 
-`Fault(mode, robots, onset, duration, factor)`; robots are not told, `infos[agent]["failed"]` is 1 while any mode holds.
+A fault is `Fault(mode, robots, onset, duration, factor)`. Robots do not sense it; `infos[agent]["failed"]` is 1 while any mode holds.
 
 {failures}
 
 ## Wrappers
 
-They stack in any order, but for `FixedAgents`, which goes around all others, and keep the array path.
+Wrappers stack in any order, except `FixedAgents`, which has to be the outermost. All of them have the array methods.
 
 {wrappers}
 

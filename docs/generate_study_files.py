@@ -29,7 +29,7 @@ TEXT = """\
 <!-- Written by docs/generate_study_files.py from the code; change that, not this. -->
 
 A study is a TOML file, or the same fields in Python: `Study(policies=[...], seeds=20, faults=[{{"modes": ["FM1"]}}])`. An unknown field is an
-error that suggests the one that was meant. What is varied comes in tables of tables, each as often as wanted:
+error, which suggests the nearest known field. Each factor that the study varies is a table, and each table may come several times:
 
 {heads}
 

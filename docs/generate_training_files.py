@@ -7,9 +7,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from record_tables import fields, summary
+from swarm_logistics_env.train.preset_files import load_training, preset_names
 
 from swarm_logistics_env.policies.card import Network
-from swarm_logistics_env.train.preset_files import load_training, preset_names
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
@@ -36,7 +36,8 @@ TEXT = """\
 
 <!-- Written by docs/generate_training_files.py from the code; change that, not this. -->
 
-A training is a TOML file; an unknown field is an error that suggests the one that was meant. [Training](training.md) explains what for.
+A training is a TOML file. An unknown field is an error, which suggests the nearest known field. [Training](training.md) explains how
+trainings work.
 
 ## The training
 

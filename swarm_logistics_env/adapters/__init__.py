@@ -1,4 +1,4 @@
-"""Adapters: the environment in the forms that other libraries ask for."""
+"""Adapters: the environment in the forms that other libraries expect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arrays whose memory is used again."""
+"""Arrays whose memory is reused."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _HELD_BY_NOBODY = _references([np.empty(0, np.float32)], 0)
 
 
 class Buffers:
-    """Hands out arrays, an old one as soon as nobody holds it or a part of it.
+    """Returns arrays; an old array is returned again once nothing refers to it or to a part of it.
 
-    New memory of this size comes from the system page by page and goes back at once, which with
-    two threads costs as much as stepping a world.
+    The system would give new memory of this size page by page, and would take it back at once. With
+    two threads this costs as much as stepping a world.
 
     Args:
-        shape: of every array, float32.
+        shape: the shape of every array; the dtype is float32.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -35,13 +35,13 @@ class Buffers:
         self._kept: list[NDArray[np.float32]] = []
 
     def zeros(self) -> NDArray[np.float32]:
-        """Return an array of zeros of the caller's own."""
+        """Return an array of zeros, which belongs to the caller."""
         array = self.used()
         array.fill(0.0)
         return array
 
     def used(self) -> NDArray[np.float32]:
-        """Return an array of the caller's own, that holds what it held before."""
+        """Return an array with its old contents, which belongs to the caller."""
         for place in range(len(self._kept)):
             if _references(self._kept, place) == _HELD_BY_NOBODY:
                 return self._kept[place]

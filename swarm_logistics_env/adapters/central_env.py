@@ -21,29 +21,31 @@ if TYPE_CHECKING:
 
 
 class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """One controller senses what all robots sense and commands them all.
+    """One controller receives the observations of all robots and commands all of them.
 
-    Observations are the swarm's rows (N, D), actions its commands (N, 4 + message_size), for the
-    largest swarm there may be; rows of robots that are absent are zeros, their commands ignored.
-    The reward is the mean of the rewards of the robots present: 1 per delivery by default. An
-    episode terminates when everything is delivered or nobody is left, and is truncated when the
-    time is up. A robot that hears nothing gets no commands, see `mask_unreachable_commands`.
+    Observations are the swarm's rows (N, D), and actions are its commands (N, 4 + message_size).
+    N is the largest swarm that is possible; robots that are absent have rows of zeros, and their
+    commands are ignored. The reward is the mean of the rewards of the robots present: 1 per
+    delivery by default. An episode terminates when everything is delivered or no robot is left,
+    and is truncated when the time is up. A robot that hears nothing gets no commands; see
+    `mask_unreachable_commands`.
 
-    Infos are numbers, with the same keys at every step: "failed" (N,), 1 for each robot in which
-    any failure mode holds, else 0; "delivered", items so far; what wrappers add.
+    Infos are numbers, with the same keys at every step: "failed" (N,) is 1 for each robot in
+    which any failure mode holds, else 0; "delivered" is the number of items so far; wrappers add
+    their own.
 
     `np_random_seed` is the seed of the current episode, also after a reset that was given none:
     `reset(seed=env.np_random_seed)` plays it again.
 
     Args:
-        env: a `SwarmLogisticsEnv` or a wrapper of one; default: one made with the arguments.
+        env: a `SwarmLogisticsEnv` or a wrapper of one; without it, the arguments make one.
         flat: whether observations and actions are vectors, (N * D,) and (N * (4 + message_size),),
             robot after robot, for learners that take no matrices (RLlib, stable-baselines3).
-        **arguments: those of `SwarmLogisticsEnv`.
+        **arguments: the arguments of `SwarmLogisticsEnv`.
 
     Raises:
-        SetupError: both are given, or an argument cannot be.
-        ScenarioError, FaultError: an argument cannot be.
+        SetupError: both are given, or an argument is not allowed.
+        ScenarioError, FaultError: an argument is not allowed.
 
     Example:
         >>> env = gymnasium.make("SwarmLogistics-v0", n_robots=3)
@@ -101,8 +103,8 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Take one control period.
 
         Raises:
-            CommandError: the action's shape is not that of the action space, or it is not
-                readable, no numbers or not finite.
+            CommandError: the action has another shape than the action space, cannot be read, or is
+                not finite.
             SetupError: there was no reset.
         """
         state = self.env.warehouse.state

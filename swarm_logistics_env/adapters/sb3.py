@@ -133,11 +133,13 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         return list(self._seeds)
 
     def set_options(self, options: Mapping[str, Any] | Sequence[Any] | None = None) -> None:
-        """Give the next `reset` options: the same to all worlds, or a list of one for each.
+        """Set the options of the next `reset`: a dict for all worlds, or a list with one for each.
+
+        stable-baselines3 passes a list of length `num_envs`; in it all rows of a world have to
+        have the same options.
 
         Raises:
-            SetupError: a list of another length. One of a length of `num_envs`, which
-                stable-baselines3 passes, should have the same for all rows of a world.
+            SetupError: the list has another length, or different options for rows of one world.
         """
         if options is None or isinstance(options, Mapping):
             self._options = [dict(options or {})] * self.num_envs
@@ -232,7 +234,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         )
 
     def get_images(self) -> list[NDArray[np.uint8]]:
-        """Return a picture of each world, all of the largest one's size."""
+        """Return a picture (H, W, 3) of each world; all have the size of the largest."""
         pictures = [env.render() for env in self.worlds]
         shown = [picture for picture in pictures if picture is not None]
         height, width = np.max([picture.shape[:2] for picture in shown], axis=0)

@@ -1,4 +1,4 @@
-"""Commands as arrays, whatever library they come from."""
+"""Reading of commands, which may be arrays of any library."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from swarm_logistics_env.errors import CommandError
 
 
 def as_array(given: ArrayLike, name: str) -> NDArray[Any]:
-    """Return what was given as an array, of whatever shape and dtype it has.
+    """Return `given` as an array; shape and dtype stay as they are.
 
     Args:
         given: an array, a list, a tensor on the CPU, ...
-        name: what it is, for errors.
+        name: the name of the value, for errors.
 
     Raises:
         CommandError: NumPy cannot read it, as a tensor of bfloat16, on a GPU or with a gradient;

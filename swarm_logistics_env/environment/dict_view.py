@@ -1,4 +1,4 @@
-"""The dicts that PettingZoo asks for, as a view of an environment's array methods."""
+"""PettingZoo's methods with dicts, as a view of an environment's array methods."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ArrayStep = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], N
 class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # type: ignore[misc]  # PettingZoo ships no types
     """`reset` and `step` for classes that have `reset_arrays` and `step_arrays`.
 
-    What a wrapper does to the arrays so holds for the dicts as well.
+    So a wrapper that changes the arrays changes the dicts, too.
     """
 
     agents: list[str]
@@ -38,17 +38,17 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         raise NotImplementedError
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
-        """Take one control period; `agents` are then those that go on."""
+        """Take one control period; afterwards `agents` are those that go on."""
         raise NotImplementedError
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """The part of every agent's infos that is about the episode; always of the same keys."""
+        """The entries of every agent's infos that are about the episode; keys never change."""
         raise NotImplementedError
 
     @property
     def n_rows(self) -> int:
-        """Rows of the arrays in this episode: its robots, absent ones included."""
+        """The number of rows of the arrays in this episode: its robots, also absent ones."""
         return self.warehouse.state.n_robots
 
     @property
@@ -66,9 +66,9 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
     ) -> tuple[Observations, Infos]:
         """Begin an episode; see `reset_arrays`. Returns observations and infos by agent.
 
-        An agent's infos are a dict of its own of numbers, with the same keys at every step:
-        "failed", 1 while any failure mode holds for the robot, else 0; "delivered", items of the
-        whole swarm so far; what wrappers add (`episode_info`).
+        Each agent has a dict of infos of its own. It contains numbers, with the same keys at
+        every step: "failed" is 1 while any failure mode holds for the robot, else 0; "delivered"
+        is the number of items that the whole swarm has delivered; wrappers add `episode_info`.
         """
         observations = self.reset_arrays(seed, options)
         agents = self.agents
@@ -80,16 +80,16 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         """Take one control period; see `step_arrays`.
 
         Args:
-            actions: one command (4,) for every agent in `agents`; those of possible agents who
-                are not there are ignored, as trainers of fixed size send them.
+            actions: one command (4,) for every agent in `agents`. Commands for possible agents
+                that are not present are ignored, because trainers of fixed size send them.
 
         Returns:
             Observations, rewards, terminations, truncations and infos (see `reset`) of the agents
-            that were there; empty dicts when the episode is over.
+            that were present; empty dicts when the episode is over.
 
         Raises:
-            CommandError: no dict; an agent's command is missing, for an unknown agent, not
-                readable, of the wrong shape or not finite.
+            CommandError: `actions` is not a dict, or a command is missing, belongs to an unknown
+                agent, cannot be read, has the wrong shape or is not finite.
             SetupError: there was no reset.
         """
         agents = self.agents

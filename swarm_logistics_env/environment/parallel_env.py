@@ -44,28 +44,28 @@ _OTHER_NAMES = {
 
 
 class SwarmLogisticsEnv(DictView):
-    """A swarm fetches requested items in a warehouse, each robot with its own sensors only.
+    """A swarm fetches requested items in a warehouse; each robot uses only its own sensors.
 
     `reset_arrays` and `step_arrays` are the environment; `reset` and `step` are their dict view.
 
     Args:
-        scenario: the conditions; default: the paper's.
+        scenario: the conditions; the paper's by default.
         faults: the faults that are scheduled in every episode, each a `Fault` or a dict of its
             arguments, as `{"mode": "FM1", "robots": 2}`.
-        rewards: reward term -> weight; default: 1 to everybody for each delivery.
+        rewards: reward term -> weight; by default each robot gets 1 for each delivery.
         render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
-        max_robots: the largest swarm that a reset's options may ask for; default: n_robots.
+        max_robots: the largest swarm that a reset's options may ask for; n_robots by default.
         **fields: fields of the scenario to replace, e.g. `n_robots=40`.
 
     Attributes:
-        next_seed: the seed of the episode that a reset without one begins; follows from the
-            seed of the episode before.
+        next_seed: the seed of the next episode if a reset gives none; it follows from the seed
+            of the episode before.
         is_begun: whether there was a reset.
 
     Raises:
-        ArgumentError: there is no such argument; a ScenarioError and a TypeError.
-        ScenarioError, FaultError, SetupError: an argument cannot be.
+        ArgumentError: there is no such argument; it is a ScenarioError and a TypeError.
+        ScenarioError, FaultError, SetupError: an argument is not allowed.
 
     Example:
         >>> env = SwarmLogisticsEnv(n_robots=3)
@@ -137,17 +137,17 @@ class SwarmLogisticsEnv(DictView):
         """Begin an episode and return the first observations (N, D).
 
         Args:
-            seed: decides everything random in this episode, and in those that follow with seed
-                None, each of which differs.
-            options: for this episode: "scenario", fields to replace; "faults", instead of the
-                environment's. Other keys are ignored with a warning.
+            seed: decides everything random in this episode, and in later ones that begin with
+                seed None; these differ from each other.
+            options: conditions of this episode. "scenario" has the fields to replace; "faults"
+                replaces the environment's faults. Other keys are ignored with a warning.
 
         Raises:
-            ScenarioError, FaultError: an option cannot be.
-            SetupError: a seed or option is of the wrong type; no robot would be there; or such a
+            ScenarioError, FaultError: an option is not allowed.
+            SetupError: a seed or option is of the wrong type; no robot would be present; or the
                 scenario has more robots than `possible_agents`, or observations or states that
-                could leave their spaces, which are those of the environment's own (and of those
-                given to `declare_spaces`).
+                could leave the spaces. Spaces hold the environment's own scenario and those given
+                to `declare_spaces`.
         """
         options = checked_options(options)
         for unknown in options.keys() - set(OPTIONS):
@@ -170,7 +170,7 @@ class SwarmLogisticsEnv(DictView):
         return observations
 
     def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
-        """Return the scenario of the episode that such a reset would begin; changes nothing.
+        """Return the scenario of the episode that such a reset would begin; it begins nothing.
 
         Raises:
             ScenarioError, SetupError: as `reset_arrays`.
@@ -190,11 +190,12 @@ class SwarmLogisticsEnv(DictView):
 
         Returns:
             Observations (N, D), rewards (N,), terminations (N,) and truncations (N,). A robot
-            terminates when it is removed, all do when everything is delivered; all are truncated
-            when the time is up. `agents` are those to whom neither happened yet.
+            terminates when it is removed; all terminate when everything is delivered, and all are
+            truncated when the time is up. `agents` are those that go on.
 
         Raises:
-            CommandError: wrong shape, not readable or not finite; nothing has happened then.
+            CommandError: the commands have the wrong shape, cannot be read or are not finite; the
+                world has not changed then.
         """
         if not isinstance(commands, np.ndarray):
             commands = as_array(commands, "commands")
@@ -229,7 +230,7 @@ class SwarmLogisticsEnv(DictView):
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """The part of every agent's infos that is about the episode; it always has the same keys.
+        """The entries of every agent's infos that are about the episode; keys never change.
 
         "delivered": items delivered so far, the paper's performance P.
         """
@@ -238,10 +239,11 @@ class SwarmLogisticsEnv(DictView):
     def declare_spaces(self, scenario: Scenario) -> None:
         """Widen the observation space so that episodes may also be played in `scenario`.
 
-        For wrappers, when they are made: spaces must not change once they were handed out.
+        Wrappers call it when they are made; later spaces must not change any more.
 
         Raises:
-            SetupError: its rows or commands are longer or shorter than this environment's.
+            SetupError: the rows or commands of `scenario` have another length than this
+                environment's.
         """
         self._spaces.widen(scenario)
         if scenario.n_robots > len(self.possible_agents):

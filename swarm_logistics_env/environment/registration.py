@@ -10,7 +10,7 @@ PETTINGZOO_ID = "swarm_logistics_v0"
 
 
 def register() -> None:
-    """Register the names; the modules are imported when somebody makes an environment."""
+    """Register the names; modules are imported when an environment is made."""
     if GYMNASIUM_ID not in gymnasium.registry:
         gymnasium.register(GYMNASIUM_ID, "swarm_logistics_env.adapters.central_env:CentralEnv")
     if not hasattr(pettingzoo, "register"):

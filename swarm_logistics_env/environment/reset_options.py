@@ -14,10 +14,10 @@ OPTIONS = ("faults", "scenario")
 
 
 def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return the options as a dict of one's own, empty for None.
+    """Return a copy of the options as a dict; it is empty for None.
 
     Raises:
-        SetupError: they are no mapping.
+        SetupError: they are not a mapping.
     """
     if options is None:
         return {}
@@ -30,7 +30,7 @@ def checked_seed(seed: int) -> int:
     """Return the seed as an int.
 
     Raises:
-        SetupError: it is none.
+        SetupError: it is not an integer.
     """
     try:
         return operator.index(seed)
@@ -42,7 +42,7 @@ def scenario_fields(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of the scenario that the options replace.
 
     Raises:
-        SetupError: they are no mapping from names.
+        SetupError: they are not a mapping from names.
     """
     fields = options.get("scenario", {})
     if not isinstance(fields, Mapping) or not all(isinstance(name, str) for name in fields):
@@ -53,7 +53,7 @@ def scenario_fields(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[Fault, ...]:
-    """Return the faults that the options give, or `default` where they give none.
+    """Return the faults of the options, or `default` if there are none.
 
     Raises:
         SetupError, FaultError: as `checked_faults`.

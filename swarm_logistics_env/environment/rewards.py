@@ -1,4 +1,4 @@
-"""Named reward terms; how much each counts is configuration."""
+"""Named reward terms; an environment gives them their weights."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RewardTerms:
         pays_steadily: whether a step without a delivery may pay.
 
     Raises:
-        SetupError: no dict; a term is unknown or its weight is not a finite number.
+        SetupError: `weights` is not a dict, a term is unknown, or a weight is not a finite number.
     """
 
     def __init__(self, weights: Mapping[str, float] | None = None) -> None:

@@ -20,12 +20,12 @@ class Spaces:
     """The spaces of observations, commands and states in all declared scenarios.
 
     Args:
-        scenario: the environment's own.
+        scenario: the environment's own scenario.
 
     Attributes:
-        observation: of an observation row (D,).
-        action: of a command (4 + message_size,).
-        n_items: the most items that there may be.
+        observation: the space of an observation row (D,).
+        action: the space of a command (4 + message_size,).
+        n_items: the largest number of items in a declared scenario.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -39,7 +39,7 @@ class Spaces:
         """Widen the spaces for `scenario`.
 
         Raises:
-            SetupError: its rows or commands are longer or shorter than the environment's own.
+            SetupError: its rows or commands have another length than the environment's own.
         """
         low, high = bounds(scenario)
         if low.shape != self.observation.shape:

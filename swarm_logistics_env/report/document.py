@@ -25,7 +25,7 @@ from swarm_logistics_env.studies.size_series import size_series
 
 @dataclass(frozen=True)
 class Chapter:
-    """A part of the report; `text` says what it is and how it is to be read."""
+    """A part of the report; `text` explains what it shows and how to read it."""
 
     title: str
     text: str

@@ -88,10 +88,11 @@ def sharpness_of(law: Law, parameters: NDArray[np.float64], peak: float) -> floa
 def shapes_with_peak_at(
     law: Law, peak: float, sharpness: NDArray[np.float64], n: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The law without its factor g or k at sizes n, one row per sharpness, N* > 1 held.
+    """Return the law at sizes n without its factor (g or k), for a fixed peak N* > 1.
 
-    With N* held one parameter is left besides the factor. Any real sharpness gives a curve that is
-    positive throughout; the larger, the steeper it falls off on both sides of N*.
+    With a fixed peak one parameter is left besides the factor: the sharpness, any real number. The
+    larger it is, the more steeply the curve falls on both sides of N*; it is always positive. The
+    result has one row for each sharpness.
     """
     if law == "usl":
         # a = 1 - b N*^2; below this b the denominator has no zero

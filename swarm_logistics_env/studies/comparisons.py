@@ -116,7 +116,7 @@ class Comparison:
 
     @property
     def question(self) -> Question:
-        """The comparison without its policy."""
+        """What is compared, apart from the policy; it is the same for all policies."""
         return Question(self.indicator, self.original.setting, self.changed.setting, self.threshold)
 
     @property

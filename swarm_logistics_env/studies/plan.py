@@ -83,7 +83,7 @@ class Plan:
         return tuple(by_key.values())
 
     def runs(self) -> Iterator[Run]:
-        """Yield every run, seed by seed, so that a study cut short has whole seeds."""
+        """Yield every run, seed by seed, so that an interrupted study has complete seeds."""
         for seed in self.seeds:
             for condition in self.conditions:
                 yield condition.run(self.code, seed)

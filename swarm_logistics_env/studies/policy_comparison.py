@@ -20,12 +20,13 @@ class CellAgainstBaseline(NamedTuple):
 
     Attributes:
         cell: the policy's row in the table of performances.
-        interquartile_mean, worst_decile: of its P [items].
-        difference: its P less the baseline's, paired by seed, with 95 % interval [items]; None
-            for the baseline itself, or where runs are missing or share no seeds.
-        ratio: its mean P as a multiple of the baseline's, with Fieller's 95 % interval; None as
-            above, and where the baseline delivers nothing.
-        improvement: share of seeds on which it delivers more, ties counting half; None as above.
+        interquartile_mean, worst_decile: these statistics of its P [items].
+        difference: its P minus the baseline's, paired by seed, with 95 % interval [items]; None
+            for the baseline itself, or if runs are missing or share no seeds.
+        ratio: its mean P as a multiple of the baseline's, with Fieller's 95 % interval; None in
+            the same cases, or if the baseline delivers nothing.
+        improvement: the share of seeds on which it delivers more, ties counting half; None in the
+            same cases as `difference`.
     """
 
     cell: Row

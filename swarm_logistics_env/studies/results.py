@@ -59,7 +59,7 @@ class StudyResults:
         return _by_arm(self.performance)
 
     def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...] | None:
-        """Return an arm's outcomes by seed; None where one failed, is missing or has no times."""
+        """Return an arm's outcomes by seed, or None if one failed, is missing or has no times."""
         runs = (arm.condition.run(self.plan.code, seed) for seed in self.plan.seeds)
         found = [self.outcomes.get(run.key) for run in runs]
         if not self.plan.paired:  # such results need not be equally many everywhere

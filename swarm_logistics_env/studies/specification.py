@@ -66,10 +66,10 @@ def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 class Factor(_Part):
-    """One thing that a study varies, and the scenario in which it does.
+    """A factor that a study varies, and the scenario in which it is varied.
 
     Args:
-        title: heading in the report; empty: made from the factor.
+        title: the heading in the report; an empty one is made from the factor.
         scenario: fields that differ from the study's base scenario.
     """
 
@@ -78,11 +78,11 @@ class Factor(_Part):
 
 
 class Sizes(Factor):
-    """Swarm sizes N, ascending: scalability S of every step.
+    """Swarm sizes N, ascending; every step from one to the next gives a scalability S.
 
     Args:
-        values: swarm sizes [robots].
-        superlinear: steps (N, N + m) of which S > 1 is asked as well.
+        values: the swarm sizes [robots].
+        superlinear: steps (N, N + m) that are also tested for S > 1.
     """
 
     values: Annotated[tuple[PositiveInt, ...], Field(min_length=2)]
@@ -97,13 +97,13 @@ class Sizes(Factor):
 
 
 class Faults(Factor):
-    """Failure modes x numbers of faulty robots x onsets: fault tolerance FT and robustness R.
+    """Failure modes, numbers of faulty robots and onsets; all combinations give FT and R.
 
     Args:
         modes: failure modes of the task other than "removed", which is the reference P_S.
         robots: numbers m of faulty robots, each below the swarm size.
-        onsets: when they fail [s].
-        duration: for how long [s]; None: for good.
+        onsets: the times at which robots fail [s].
+        duration: how long a failure lasts [s]; without it, until the end of the episode.
     """
 
     modes: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -118,11 +118,11 @@ class Faults(Factor):
 
 
 class Parameter(Factor):
-    """Values of one field of the scenario: adaptability A from the first value to each other.
+    """Values of one field of the scenario; the change from the first to each other gives an A.
 
     Args:
         name: a numeric field of the task's scenario.
-        values: x_o first, above 0, then every x_new, in the field's unit.
+        values: first x_o, which is above 0, then every x_new, in the field's unit.
     """
 
     name: str
@@ -137,11 +137,11 @@ class Parameter(Factor):
 
 
 class Ablation(Factor):
-    """A second policy that lacks a part of the studied one: does P fall without it?
+    """A second policy that lacks a part of the studied one, to test whether P falls without it.
 
     Args:
         policy: the policy without the part.
-        fall: P is claimed to fall by more than this share of P, in [0, 1).
+        fall: the claim is that P falls by more than this share of P, in [0, 1).
     """
 
     policy: PolicySource
@@ -152,23 +152,23 @@ class Specification(_Part):
     """All that a study asks: which policies, under which conditions, over how many seeds.
 
     Args:
-        name: of the study.
-        task: what is played: "warehouse", another name that the package knows, or the import path
-            "package.module:OBJECT" of a `tasks.Task`; in Python the object itself as well.
+        name: the study's name.
+        task: the task to play: "warehouse", another name that the package knows, or the import path
+            "package.module:OBJECT" of a `tasks.Task`; in Python also the object itself.
         policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
             `act`.
         seeds: number of seeds, the same for every condition.
         first_seed: the smallest seed, 0 or more; the others follow it one by one.
-        scenario: the base, as a table of the fields in which it differs from the task's default;
-            "preset" is a field of the warehouse.
-        sizes, faults, parameters, ablations: what is varied.
-        indicators: which of them are asked; conditions that only others need are not run.
-        looks: numbers of seeds, rising, at which the study is going to be judged; declared before
-            its first run they keep the error over all looks at 5 % (O'Brien-Fleming spending).
-        reference: published results that the report sets beside ours.
+        scenario: the base scenario, as a table of the fields in which it differs from the task's
+            default; "preset" is a field of the warehouse.
+        sizes, faults, parameters, ablations: the factors that the study varies.
+        indicators: the indicators to test; conditions that only others need are not run.
+        looks: rising numbers of seeds at which the study will be judged. If they are declared
+            before the first run, the error over all looks stays at 5 % (O'Brien-Fleming spending).
+        reference: published results, which the report shows beside those of the study.
 
     Raises:
-        StudyError: an unknown field or a value that cannot be, each named.
+        StudyError: a field is unknown, or its value is not allowed; the message names each.
     """
 
     name: str = "study"

@@ -54,12 +54,12 @@ class Study:
     """A study of how a swarm copes: conditions, paired seeds, indicators with their verdicts.
 
     Args:
-        out: directory of the store and the report; None: kept in memory.
-        fields: those of `Specification`, e.g. `task="warehouse"`, `policies=["swarm-dt"]`,
+        out: directory of the store and the report; None keeps the results in memory.
+        fields: the fields of `Specification`, e.g. `task="warehouse"`, `policies=["swarm-dt"]`,
             `seeds=20`, `faults=[{"modes": ["FM1"], "robots": [1, 2]}]`.
 
     Raises:
-        StudyError: a field is unknown or cannot be.
+        StudyError: a field is unknown, or its value is not allowed.
 
     Example:
         >>> study = Study(

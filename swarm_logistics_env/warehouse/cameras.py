@@ -93,7 +93,7 @@ def choose_neighbours(me: int, world: World, step: int, n_found: int) -> int:
 
 @inlined_kernel
 def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: NDArray[np.float32]) -> None:
-    """Fill the blocks of neighbours and of their messages in a row from those chosen."""
+    """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
     robots, parameters = world.robots, world.parameters
     nearby, width = world.nearby, world.robots.message.shape[1]
     for place in range(rank_nearest(nearby, n_chosen, _N_NEIGHBOURS)):
