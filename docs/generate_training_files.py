@@ -7,7 +7,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from record_tables import fields, summary
-from swarm_logistics_env.train.preset_files import load_training, preset_names
 
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.train.settings import (
@@ -18,7 +17,7 @@ from swarm_logistics_env.train.settings import (
     Scores,
     WorldKind,
 )
-from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.train.training import Training, load_training, preset_names
 
 PAGE = Path(__file__).parent / "training_files.md"
 TABLES = {
