@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.adapters.worlds import RowsStep, World, Worlds, checked_count, maker
-from swarm_logistics_env.environment.reset_options import checked_seed
+from swarm_logistics_env.adapters.worlds import RowsStep, World, Worlds, layers_of, maker
+from swarm_logistics_env.environment.reset_options import checked_count, checked_seed
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
@@ -207,7 +207,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         """Set an attribute of the worlds of these rows, on the wrapper that has it."""
 
         def set_it(env: World) -> None:
-            layers = _layers(env)
+            layers = layers_of(env)
             holders = (e for e in layers if attr_name in vars(e) or hasattr(type(e), attr_name))
             setattr(next(holders, env), attr_name, value)
 
@@ -230,7 +230,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     ) -> list[bool]:
         """Return by row whether its world has such a wrapper around it."""
         return self._of_rows(
-            lambda env: any(isinstance(layer, wrapper_class) for layer in _layers(env)), indices
+            lambda env: any(isinstance(layer, wrapper_class) for layer in layers_of(env)), indices
         )
 
     def get_images(self) -> list[NDArray[np.uint8]]:
@@ -296,13 +296,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         else:
             self._worlds.note_present(world)
         self._note(world)
-
-
-def _layers(env: World) -> list[Any]:
-    layers: list[Any] = [env]
-    while layers[-1] is not env.unwrapped:
-        layers.append(layers[-1].env)
-    return layers
 
 
 def _each(indices: int | Iterable[int]) -> Iterable[int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
@@ -71,11 +70,11 @@ class Worlds:
         self._n_robots = [0] * n_worlds
         self.told: list[int] = []
         self._commands = np.zeros((self.n_rows, *self.command_space.shape))
-        self._layers = [_layers(env) for env in self.envs]
+        self._layers = [layers_of(env) for env in self.envs]
         # The largest worlds are stepped first, so that all threads end at about the same time.
         order = sorted(range(n_worlds), key=lambda world: -sizes[world])
-        self._shared_out = [world for world in order if self._layers[world]]
-        self._alone = [world for world in order if not self._layers[world]]
+        self._shared_out = [w for w in order if _can_be_shared_out(self._layers[w])]
+        self._alone = [world for world in order if world not in self._shared_out]
         # The thread that asks for a step works as well.
         self._n_helpers = max(min(threads, len(self._shared_out)) - 1, 0)
         self._begin_work()
@@ -212,14 +211,18 @@ class Worlds:
         self._begin_work()
 
 
-def _layers(env: World) -> list[Any]:
-    """Return the wrappers, outermost first, and the environment; nothing if it steps alone."""
+def layers_of(env: World) -> list[Any]:
+    """Return the wrappers, outermost first, and the environment."""
     layers: list[Any] = [env]
-    while isinstance(layers[-1], Wrapper):
+    while layers[-1] is not env.unwrapped:
         layers.append(layers[-1].env)
-    core = layers[-1]
-    steps = [type(wrapper).step_arrays is Wrapper.step_arrays for wrapper in layers[:-1]]
-    return layers if type(core) is SwarmLogisticsEnv and all(steps) else []
+    return layers
+
+
+def _can_be_shared_out(layers: list[Any]) -> bool:
+    *wrappers, core = layers
+    is_plain = all(type(wrapper).step_arrays is Wrapper.step_arrays for wrapper in wrappers)
+    return type(core) is SwarmLogisticsEnv and is_plain
 
 
 def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
@@ -270,18 +273,3 @@ def maker(
         return SwarmLogisticsEnv(scenario, **sized, **fields)
 
     return make_env
-
-
-def checked_count(name: str, value: int) -> int:
-    """Return the value as an int of at least 1.
-
-    Raises:
-        SetupError: it is none.
-    """
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = 0
-    if number < 1:
-        raise SetupError(f"{name} = {value!r}: should be an integer of at least 1")
-    return number

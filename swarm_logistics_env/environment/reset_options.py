@@ -38,6 +38,21 @@ def checked_seed(seed: int) -> int:
         raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
 
 
+def checked_count(name: str, value: Any, least: int = 1) -> int:
+    """Return the value as an int of at least `least`.
+
+    Raises:
+        SetupError: it is none.
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if number < least:
+        raise SetupError(f"{name} = {value!r}: should be a whole number of at least {least}")
+    return number
+
+
 def scenario_fields(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of the scenario that the options replace.
 

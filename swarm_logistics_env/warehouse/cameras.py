@@ -48,13 +48,11 @@ def view_square(view_range: float) -> float:
 
 
 @inlined_kernel
-def see_items(
-    me: int, pose: Pose, world: World, step: int, n_found: int, out: NDArray[np.float32]
-) -> None:
+def see_items(me: int, pose: Pose, world: World, n_found: int, out: NDArray[np.float32]) -> None:
     """Fill the block of items in a row from the free items nearby."""
     robots, grid, nearby = world.robots, world.item_grid, world.nearby
     limit, dropout = view_square(world.able.view_range[me]), world.parameters.sensor_dropout
-    n_seen = 0
+    n_seen, step = 0, world.progress.step[0]
     for index in range(n_found):
         item, square = grid.members[nearby.place[index]], nearby.square[index]
         is_seen = square <= limit
@@ -75,11 +73,11 @@ def see_items(
 
 
 @inlined_kernel
-def choose_neighbours(me: int, world: World, step: int, n_found: int) -> int:
+def choose_neighbours(me: int, world: World, n_found: int) -> int:
     """List in `nearby.chosen` the robots that `me` sees or hears; returns how many."""
     robots, nearby, grid = world.robots, world.nearby, world.robot_grid
     limit = view_square(world.able.view_range[me])
-    dropout, n_chosen = world.parameters.sensor_dropout, 0
+    dropout, n_chosen, step = world.parameters.sensor_dropout, 0, world.progress.step[0]
     for index in range(n_found):
         other, square = grid.members[nearby.place[index]], nearby.square[index]
         is_heard, is_seen = nearby.is_heard[index], square <= limit

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.rangers import Pose
-from swarm_logistics_env.warehouse.structs import (
-    Grid,
-    Items,
-    Nearby,
-    Numbers,
-    Parameters,
-    Robots,
-)
+from swarm_logistics_env.warehouse.structs import World
 
 GAP = 0.01  # [m], gap below which two things touch
 
 
 @inlined_kernel
-def touches_solid(pose: Pose, parameters: Parameters, obstacles: Numbers) -> bool:
+def touches_solid(pose: Pose, world: World) -> bool:
     """Return whether a robot touches a wall or an obstacle."""
+    parameters, obstacles = world.parameters, world.obstacles
     reach = parameters.robot_radius + GAP
     away_x = min(pose.x, parameters.warehouse_width - pose.x)
     away_y = min(pose.y, parameters.warehouse_height - pose.y)
@@ -31,28 +25,26 @@ def touches_solid(pose: Pose, parameters: Parameters, obstacles: Numbers) -> boo
 
 
 @inlined_kernel
-def touches_robots(
-    me: int, robots: Robots, parameters: Parameters, grid: Grid, nearby: Nearby, n_found: int
-) -> tuple[bool, bool]:
+def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
     """Return whether `me` touches a robot, and whether it is sound and touches one that failed."""
-    limit = (2.0 * parameters.robot_radius + GAP) ** 2
+    limit = (2.0 * world.parameters.robot_radius + GAP) ** 2
+    failed = world.robots.failed
     touches = is_anchored = False
     for index in range(n_found):
-        if nearby.square[index] < limit:
-            other = grid.members[nearby.place[index]]
+        if world.nearby.square[index] < limit:
+            other = world.robot_grid.members[world.nearby.place[index]]
             touches = True
-            is_anchored |= robots.failed[other] and not robots.failed[me]
+            is_anchored |= failed[other] and not failed[me]
     return touches, is_anchored
 
 
 @inlined_kernel
-def touches_items(
-    parameters: Parameters, items: Items, grid: Grid, nearby: Nearby, n_found: int
-) -> bool:
+def touches_items(world: World, n_found: int) -> bool:
     """Return whether a laden robot touches an item that is in its way."""
-    limit = (parameters.robot_radius + GAP + parameters.item_radius) ** 2
+    limit = (world.parameters.robot_radius + GAP + world.parameters.item_radius) ** 2
     touches = False
     for index in range(n_found):
-        if nearby.square[index] < limit:
-            touches |= items.covered[grid.members[nearby.place[index]]] == 0
+        if world.nearby.square[index] < limit:
+            item = world.item_grid.members[world.nearby.place[index]]
+            touches |= world.items.covered[item] == 0
     return touches

@@ -7,43 +7,38 @@ there are, as far as the places of those before them leave room.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, pair_key, uniform
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.warehouse.structs import STORED, Integers, Keys, World
+from swarm_logistics_env.warehouse.structs import STORED, Integers, Keys, Numbers, World
 
 _ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
 _ATTEMPTS = 5_000  # to place a disc among those that stand
 _NO_DISCS = np.zeros((0, 2))
 
 
-def place_obstacles(scenario: Scenario, seed: int) -> NDArray[np.float64]:
+def place_obstacles(scenario: Scenario, seed: int) -> Numbers:
     """Return obstacle centres in the storage [m], shape (n_obstacles, 2)."""
     return _strewn(
         scenario, seed, "obstacles", scenario.n_obstacles, scenario.obstacle_radius, _NO_DISCS
     )
 
 
-def place_items(
-    scenario: Scenario, seed: int, obstacles: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def place_items(scenario: Scenario, seed: int, obstacles: Numbers) -> Numbers:
     """Return item centres in the storage [m], shape (n_items, 2), clear of each other."""
     return _strewn(scenario, seed, "items", scenario.n_items, scenario.item_radius, obstacles)
 
 
-def place_robots(
-    scenario: Scenario, seed: int, obstacles: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def place_robots(scenario: Scenario, seed: int, obstacles: Numbers) -> tuple[Numbers, Numbers]:
     """Return start centres [m] (N, 2), clear of each other, and headings [rad] (N,)."""
     n = scenario.n_robots
     centres = _strewn(scenario, seed, "robots", n, scenario.robot_radius, obstacles)
     return centres, (_first_draws(row_keys(seed, "headings", n)) * 2.0 - 1.0) * np.pi
 
 
-def heading_drifts(scenario: Scenario, seed: int) -> NDArray[np.float64]:
+def heading_drifts(scenario: Scenario, seed: int) -> Numbers:
     """Return at which rate each robot's body turns unasked [rad/s], shape (N,)."""
     return scenario.heading_drift * _normal_draws(row_keys(seed, "drift", scenario.n_robots))
 
@@ -90,18 +85,16 @@ def place_restocked(world: World, item: int) -> bool:
 
 
 def _strewn(
-    scenario: Scenario,
-    seed: int,
-    what: str,
-    count: int,
-    radius: float,
-    obstacles: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    scenario: Scenario, seed: int, what: str, count: int, radius: float, obstacles: Numbers
+) -> Numbers:
     centres = np.zeros((count, 2))
+    low = np.array([radius, radius])
+    high = np.array([scenario.storage_width - radius, scenario.warehouse_height - radius])
+    reach = scenario.obstacle_radius + radius
     for arrangement in range(_ARRANGEMENTS):
         again = f" {arrangement}" if arrangement else ""
         keys = row_keys(seed, f"places of {what}{again}", count)
-        if _place(scenario, keys, radius, centres, obstacles):
+        if strew(keys, centres, low, high, 2.0 * radius, obstacles, reach):
             return centres
     raise ScenarioError(
         f"no room for {count} {what} of radius {radius} m: should be fewer {what}, fewer "
@@ -109,43 +102,29 @@ def _strewn(
     )
 
 
-def _place(
-    scenario: Scenario,
-    keys: NDArray[np.uint64],
-    radius: float,
-    centres: NDArray[np.float64],
-    obstacles: NDArray[np.float64],
-) -> bool:
-    low = np.array([radius, radius])
-    high = np.array([scenario.storage_width - radius, scenario.warehouse_height - radius])
-    reach = scenario.obstacle_radius + radius
-    return strew(keys, centres, low, high, 2.0 * radius, obstacles, reach)
-
-
 @kernel
 def strew(
-    keys: NDArray[np.uint64],
-    centres: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
+    keys: Keys,
+    centres: Numbers,
+    low: Numbers,
+    high: Numbers,
     spacing: float,
-    obstacles: NDArray[np.float64],
+    obstacles: Numbers,
     obstacle_spacing: float,
 ) -> bool:
-    """Fill the last rows of `centres`, one per key, uniformly in the box, by rejection.
+    """Fill the rows of `centres`, one per key, uniformly in the box, by rejection.
 
     Returns whether there was room for all.
     """
-    first = centres.shape[0] - keys.shape[0]
-    for disc in range(keys.shape[0]):
+    for disc in range(len(keys)):
         for attempt in range(_ATTEMPTS):
             x = low[0] + (high[0] - low[0]) * uniform(keys[disc], 2 * attempt)
             y = low[1] + (high[1] - low[1]) * uniform(keys[disc], 2 * attempt + 1)
-            if is_clear(x, y, centres[: first + disc], spacing) and is_clear(
+            if is_clear(x, y, centres[:disc], spacing) and is_clear(
                 x, y, obstacles, obstacle_spacing
             ):
-                centres[first + disc, 0] = x
-                centres[first + disc, 1] = y
+                centres[disc, 0] = x
+                centres[disc, 1] = y
                 break
         else:
             return False
@@ -153,7 +132,7 @@ def strew(
 
 
 @kernel
-def is_clear(x: float, y: float, centres: NDArray[np.float64], spacing: float) -> bool:
+def is_clear(x: float, y: float, centres: Numbers, spacing: float) -> bool:
     """Return whether no centre is nearer than `spacing` to (x, y)."""
     for other in range(centres.shape[0]):
         dx = centres[other, 0] - x
@@ -164,7 +143,7 @@ def is_clear(x: float, y: float, centres: NDArray[np.float64], spacing: float) -
 
 
 @kernel
-def _first_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
+def _first_draws(keys: Keys) -> Numbers:
     draws = np.empty(keys.shape[0])
     for row in range(keys.shape[0]):
         draws[row] = uniform(keys[row], 0)
@@ -172,7 +151,7 @@ def _first_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
 
 
 @kernel
-def _normal_draws(keys: NDArray[np.uint64]) -> NDArray[np.float64]:
+def _normal_draws(keys: Keys) -> Numbers:
     draws = np.empty(keys.shape[0])
     for row in range(keys.shape[0]):
         draws[row] = gaussian(keys[row], 0)

@@ -10,24 +10,18 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.rangers import Pose
-from swarm_logistics_env.warehouse.structs import NOBODY, Parameters, Robots
+from swarm_logistics_env.warehouse.structs import NOBODY, World
 
 
 @inlined_kernel
-def feel_itself(
-    me: int,
-    pose: Pose,
-    robots: Robots,
-    parameters: Parameters,
-    requested: int,
-    out: NDArray[np.float32],
-) -> None:
+def feel_itself(me: int, pose: Pose, world: World, out: NDArray[np.float32]) -> None:
     """Fill the end of a row: load, delivery area, timer, velocity and contact."""
+    robots, parameters = world.robots, world.parameters
     velocity_x, velocity_y = robots.velocity[me, 0], robots.velocity[me, 1]
     forward = velocity_x * pose.cosine + velocity_y * pose.sine
     left = velocity_y * pose.cosine - velocity_x * pose.sine
     limit = parameters.max_speed
-    carried, timer = robots.item[me], robots.timer[me]
+    carried, timer, requested = robots.item[me], robots.timer[me], world.progress.requested[0]
     runs = not math.isnan(timer)
     out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
     out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and carried == requested else 0.0

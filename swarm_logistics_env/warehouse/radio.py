@@ -8,16 +8,7 @@ import numpy as np
 
 from swarm_logistics_env.kernels import inlined_kernel, pair_key, uniform
 from swarm_logistics_env.warehouse.kinematics import MESSAGE
-from swarm_logistics_env.warehouse.structs import (
-    NOBODY,
-    Capabilities,
-    Grid,
-    Nearby,
-    Numbers,
-    Parameters,
-    Robots,
-    World,
-)
+from swarm_logistics_env.warehouse.structs import NOBODY, Numbers, World
 
 # Purposes of the streams between a robot and another thing: numbers of one step.
 RADIO, ROBOT_SEEN, ITEM_SEEN, N_PURPOSES = range(4)
@@ -32,8 +23,9 @@ def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: 
 
 
 @inlined_kernel
-def send_messages(commands: Numbers, robots: Robots, able: Capabilities, step: int) -> None:
+def send_messages(world: World, commands: Numbers) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
+    robots, able, step = world.robots, world.able, world.progress.step[0]
     message, before = robots.message, robots.message_before
     n, n_kept = len(message), len(robots.told_before)
     for robot in range(n):
@@ -49,13 +41,15 @@ def send_messages(commands: Numbers, robots: Robots, able: Capabilities, step: i
 
 
 @inlined_kernel
-def run_timers(robots: Robots, able: Capabilities, parameters: Parameters, step: int) -> None:
+def run_timers(world: World) -> None:
     """Advance every robot's timer and what it tells (NaN: silent) [s].
 
     Counted in steps, so that rounding never adds up. With gossip a robot tells the lowest of its
     own timer and of what it heard one period ago, aged. Where the radio is delayed, what is told
     comes late. One that is not honest tells 0.
     """
+    robots, able, step = world.robots, world.able, world.progress.step[0]
+    parameters = world.parameters
     period, limit = parameters.control_period, parameters.timer_limit - 1e-9
     n_kept = len(robots.told_before)
     for robot in range(len(robots.timer)):
@@ -80,10 +74,11 @@ def run_timers(robots: Robots, able: Capabilities, parameters: Parameters, step:
 
 
 @inlined_kernel
-def listen(me: int, world: World, step: int, n_found: int) -> None:
+def listen(me: int, world: World, n_found: int) -> None:
     """Note in `nearby.is_heard` which of the robots found nearby `me` hears."""
     robots, able, nearby = world.robots, world.able, world.nearby
     limit, loss = world.parameters.radio_range**2, world.parameters.radio_loss
+    step = world.progress.step[0]
     for index in range(n_found):
         other = world.robot_grid.members[nearby.place[index]]
         is_heard = (nearby.square[index] <= limit) & able.sends[other] & able.hears[me]
@@ -93,13 +88,12 @@ def listen(me: int, world: World, step: int, n_found: int) -> None:
 
 
 @inlined_kernel
-def lowest_timer_heard(
-    robots: Robots, grid: Grid, nearby: Nearby, n_found: int
-) -> tuple[int, float]:
+def lowest_timer_heard(world: World, n_found: int) -> tuple[int, float]:
     """Return who tells the lowest timer of those nearby that are heard, or NOBODY, and it [s].
 
     Of several that tell the same it is the nearest.
     """
+    robots, grid, nearby = world.robots, world.robot_grid, world.nearby
     lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
     # Without branches, as what they hang on cannot be predicted.
     for index in range(n_found):

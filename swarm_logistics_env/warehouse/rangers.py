@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.structs import Grid, Nearby, Numbers, Parameters
+from swarm_logistics_env.warehouse.structs import Grid, Nearby, World
 
 _N_BEAMS = row.N_BEAMS
 _BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
@@ -108,14 +108,9 @@ def scan_walls(pose: Pose, width: float, height: float, scan: NDArray[np.float32
 
 
 @inlined_kernel
-def scan_solids(
-    pose: Pose,
-    reach: float,
-    parameters: Parameters,
-    obstacles: Numbers,
-    scan: NDArray[np.float32],
-) -> None:
+def scan_solids(pose: Pose, reach: float, world: World, scan: NDArray[np.float32]) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""
+    parameters, obstacles = world.parameters, world.obstacles
     scan_walls(pose, parameters.warehouse_width, parameters.warehouse_height, scan)
     radius = parameters.obstacle_radius
     for obstacle in range(len(obstacles)):

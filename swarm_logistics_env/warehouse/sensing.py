@@ -31,14 +31,14 @@ _ROBOTS, _WALLS, _ITEMS, _LOWEST = (
 
 
 @inlined_kernel
-def sense(world: World, step: int, rows: NDArray[np.float32]) -> int:
+def sense(world: World, rows: NDArray[np.float32]) -> int:
     """Fill the observation rows (N, D), who touches what, and what was heard.
 
     Returns how many robots that have not failed touch one that has.
     """
     robots, n_anchored = world.robots, 0
-    rows[:, :] = 0.0
     for me in range(len(rows)):
+        rows[me, :] = 0.0
         robots.contact[me] = False
         robots.heard[me] = math.nan
         if not robots.present[me]:
@@ -52,18 +52,17 @@ def sense(world: World, step: int, rows: NDArray[np.float32]) -> int:
         scans[:] = reach if reach > 0.0 else world.parameters.ranger_range
         if reach > 0.0:
             scan = rows[me, _WALLS : _WALLS + _N_BEAMS]
-            rangers.scan_solids(pose, reach, world.parameters, world.obstacles, scan)
-        n_anchored += int(sense_robots(me, pose, world, step, rows[me]))
-        sense_items(me, pose, world, step, rows[me])
-        if contact.touches_solid(pose, world.parameters, world.obstacles):
+            rangers.scan_solids(pose, reach, world, scan)
+        n_anchored += int(sense_robots(me, pose, world, rows[me]))
+        sense_items(me, pose, world, rows[me])
+        if contact.touches_solid(pose, world):
             robots.contact[me] = True
-        requested = world.progress.requested[0]
-        feel_itself(me, pose, robots, world.parameters, requested, rows[me])
+        feel_itself(me, pose, world, rows[me])
     return n_anchored
 
 
 @inlined_kernel
-def sense_robots(me: int, pose: Pose, world: World, step: int, out: NDArray[np.float32]) -> bool:
+def sense_robots(me: int, pose: Pose, world: World, out: NDArray[np.float32]) -> bool:
     """Sense robots: by touch, in the beams, heard on the radio, in view.
 
     Returns whether `me` is sound and touches one that failed.
@@ -75,13 +74,13 @@ def sense_robots(me: int, pose: Pose, world: World, step: int, out: NDArray[np.f
         ranger_range + radius, view_range, parameters.radio_range, 2.0 * radius + contact.GAP
     )
     n_found = look_around(grid, pose.x, pose.y, reach, me, nearby)
-    touches, is_anchored = contact.touches_robots(me, robots, parameters, grid, nearby, n_found)
+    touches, is_anchored = contact.touches_robots(me, world, n_found)
     robots.contact[me] |= touches
     if ranger_range > 0.0:
         scan = out[_ROBOTS : _ROBOTS + _N_BEAMS]
         rangers.scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
-    listen(me, world, step, n_found)
-    lowest, timer = lowest_timer_heard(robots, grid, nearby, n_found)
+    listen(me, world, n_found)
+    lowest, timer = lowest_timer_heard(world, n_found)
     if lowest != NOBODY:
         robots.heard[me] = timer
         forward, left = rangers.in_frame(
@@ -91,13 +90,13 @@ def sense_robots(me: int, pose: Pose, world: World, step: int, out: NDArray[np.f
         out[_LOWEST + 1] = forward
         out[_LOWEST + 2] = left
         out[_LOWEST + 3] = timer
-    n_chosen = choose_neighbours(me, world, step, n_found)
+    n_chosen = choose_neighbours(me, world, n_found)
     tell_of_neighbours(pose, world, n_chosen, out)
     return is_anchored
 
 
 @inlined_kernel
-def sense_items(me: int, pose: Pose, world: World, step: int, out: NDArray[np.float32]) -> None:
+def sense_items(me: int, pose: Pose, world: World, out: NDArray[np.float32]) -> None:
     """Sense free items: in the beams, in view, and by touch when laden."""
     parameters, grid, nearby = world.parameters, world.item_grid, world.nearby
     radius = parameters.item_radius
@@ -109,6 +108,5 @@ def sense_items(me: int, pose: Pose, world: World, step: int, out: NDArray[np.fl
         scan = out[_ITEMS : _ITEMS + _N_BEAMS]
         rangers.scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     if world.robots.item[me] != NOBODY:
-        touches = contact.touches_items(parameters, world.items, grid, nearby, n_found)
-        world.robots.contact[me] |= touches
-    see_items(me, pose, world, step, n_found, out)
+        world.robots.contact[me] |= contact.touches_items(world, n_found)
+    see_items(me, pose, world, n_found, out)

@@ -18,9 +18,8 @@ from swarm_logistics_env.warehouse.logistics import (
 )
 from swarm_logistics_env.warehouse.packing import unpacked_at
 from swarm_logistics_env.warehouse.radio import run_timers, send_messages
-from swarm_logistics_env.warehouse.ranger_faults import fail_rangers
 from swarm_logistics_env.warehouse.sensing import sense
-from swarm_logistics_env.warehouse.sensor_noise import disturb
+from swarm_logistics_env.warehouse.sensor_errors import disturb, fail_rangers
 from swarm_logistics_env.warehouse.structs import (
     NOBODY,
     STORED,
@@ -35,13 +34,12 @@ def perceive(address: int, rows: NDArray[np.float32]) -> None:
     """Run the timers and fill the observation rows (N, D) of the world at `address`."""
     world = unpacked_at(World, address)
     robots, items, progress = world.robots, world.items, world.progress
-    step = progress.step[0]
-    run_timers(robots, world.able, world.parameters, step)
+    run_timers(world)
     fill(world.robot_grid, robots.position, robots.present)
     fill(world.item_grid, items.position, items.status == STORED)
-    n_anchored = sense(world, step, rows)
-    disturb(robots, world.able, world.parameters, step, rows)
-    fail_rangers(robots, world.able, world.parameters, rows)
+    n_anchored = sense(world, rows)
+    disturb(world, rows)
+    fail_rangers(world, rows)
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
 
 
@@ -71,7 +69,7 @@ def take_step(address: int, rows: NDArray[np.float32]) -> bool:
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * world.parameters.control_period
     move(world, commands.now)
-    send_messages(commands.now, world.robots, world.able, progress.step[0])
+    send_messages(world, commands.now)
     n_delivered, is_room = handle_items(world, commands.now)
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:

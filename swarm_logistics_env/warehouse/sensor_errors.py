@@ -1,13 +1,15 @@
-"""Sensor noise: what turns a true observation row into a measured one."""
+"""Sensor errors: noise, rangers that fail, and what else turns a true row into a measured one."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import gaussian, inlined_kernel, uniform
-from swarm_logistics_env.warehouse.structs import Capabilities, Parameters, Robots
+from swarm_logistics_env.warehouse.structs import Parameters, World
 
 _N_BEAMS = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
 _ITEM_WIDTH, _NEIGHBOUR_WIDTH = len(row.ITEM_FEATURES), len(row.NEIGHBOUR_FEATURES)
@@ -18,19 +20,18 @@ _DROPPED, _PLACES, _DRAWS = _N_BEAMS, 2 * _N_BEAMS, 2 * _N_BEAMS + 2 * _N_THINGS
 
 
 @inlined_kernel
-def disturb(
-    robots: Robots, able: Capabilities, parameters: Parameters, step: int, rows: NDArray[np.float32]
-) -> None:
+def disturb(world: World, rows: NDArray[np.float32]) -> None:
     """Add the scenario's noise to rows (N, D) and drop beams, in place.
 
     What is measured stays within the column's range.
     """
+    robots, able, parameters = world.robots, world.able, world.parameters
     is_exact = parameters.ranger_noise == 0.0 and parameters.position_noise == 0.0
     if is_exact and parameters.sensor_dropout == 0.0:
         return
     for robot in range(len(rows)):
         if robots.present[robot]:
-            key, first = robots.sensor_key[robot], step * _DRAWS
+            key, first = robots.sensor_key[robot], world.progress.step[0] * _DRAWS
             own_range = able.ranger_range[robot]
             reach = own_range if own_range > 0.0 else parameters.ranger_range
             disturb_beams(key, first, reach, parameters, rows[robot])
@@ -71,3 +72,31 @@ def disturb_places(
             for axis in range(2):
                 error = parameters.position_noise * gaussian(key, first + 2 * thing + axis)
                 out[column + 1 + axis] = min(max(out[column + 1 + axis] + error, -limit), limit)
+
+
+@inlined_kernel
+def fail_rangers(world: World, rows: NDArray[np.float32]) -> None:
+    """Make of the beams in rows (N, D) what rangers that have failed report, in place."""
+    robots, able = world.robots, world.able
+    for robot in range(len(rows)):
+        if not robots.present[robot]:
+            continue
+        beams, frozen = rows[robot, :_N_BEAMS], robots.frozen_beams[robot]
+        if able.ranger_bias[robot] != 0.0:
+            own = able.ranger_range[robot]
+            reach = own if own > 0.0 else world.parameters.ranger_range
+            add_bias(beams, able.ranger_bias[robot], reach)
+        if able.rangers_refresh[robot]:
+            frozen[0] = math.nan
+        elif math.isnan(frozen[0]):
+            frozen[:] = beams
+        else:
+            beams[:] = frozen.astype(np.float32)
+
+
+@inlined_kernel
+def add_bias(beams: NDArray[np.float32], bias: float, reach: float) -> None:
+    """Lengthen the beams that meet something by `bias` [m], at most to `reach` [m]."""
+    for beam in range(len(beams)):
+        if beams[beam] < np.float32(reach):
+            beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
