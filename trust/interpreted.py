@@ -108,7 +108,7 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError("trust.interpreted needs NUMBA_DISABLE_JIT=1")
     for module in (building, engine):
         vars(module).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
-    for module in (building, stepping):
+    for module in (building, stepping, thread_pool):
         vars(module).update(unpacked_at=_unpacked_at)
     vars(thread_pool).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
     # A look takes a thousand times as long.

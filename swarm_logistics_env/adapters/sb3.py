@@ -103,6 +103,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             )
         self._worlds = Worlds(make_env, n_worlds, threads)
         self.worlds = self._worlds.envs
+        # What the next infos say of each row, unless its world has something to tell.
+        self._abouts: Infos = [{} for _ in range(self._worlds.n_rows)]
         n_rows = self._worlds.n_rows
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
         if seed is not None:
@@ -154,7 +156,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         for world, rows in enumerate(self._worlds.rows):
             options = self._options[rows.start] or None
             self._worlds.begin(world, observations, self._seeds[rows.start], options)
-        self.reset_infos = self._infos()
+            self._note(world)
+        self.reset_infos = list(map(dict.copy, self._abouts))
         self._reset_seeds()
         self._reset_options()
         return observations
@@ -166,7 +169,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             CommandError: wrong shape, not readable or not finite; nothing has happened in any
                 world then.
         """
-        self._actions = self._worlds.checked(actions)
+        self._worlds.give(actions)
 
     def step_wait(
         self,
@@ -175,14 +178,16 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
         The arrays and dicts are the caller's own.
         """
-        step = self._worlds.step(self._actions)
-        dones = step.terminated | step.truncated
-        infos = self._infos()
+        step = self._worlds.step()
         # In the order of the worlds, so that what episodes share does not depend on the threads.
-        if dones.any() or any(self._worlds.is_over):
-            for world, rows in enumerate(self._worlds.rows):
-                if self._worlds.is_over[world] or dones[rows].any():
-                    self._end(world, step, dones, infos)
+        told = sorted(self._worlds.told)
+        for world in told:
+            self._note(world)
+        infos = list(map(dict.copy, self._abouts))
+        dones = step.terminated | step.truncated
+        for world in told:
+            if self._worlds.is_over[world] or dones[self._worlds.rows[world]].any():
+                self._end(world, step, dones, infos)
         return step.observations, step.rewards, dones, infos
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
@@ -250,26 +255,25 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         answers = {world: answer(self.worlds[world]) for world in dict.fromkeys(worlds)}
         return [answers[world] for world in worlds]
 
-    def _infos(self) -> Infos:
-        """Return what there is to say of each row's robot and of its world."""
-        infos: Infos = []
-        for world, env in enumerate(self.worlds):
-            state, rows = env.warehouse.state, self._worlds.rows[world]
-            about: dict[str, Any] = {
-                "TimeLimit.truncated": False,
-                "padding": False,
-                "failed": 0,
-                "world": world,
-                "n_robots": state.n_robots,
-                **env.episode_info,
-            }
-            infos += [about.copy() for _ in range(rows.start, rows.stop)]
-            for robot, modes in enumerate(state.failure_modes):
-                if modes:
-                    infos[rows.start + robot]["failed"] = 1
-        for row in np.flatnonzero(~self._worlds.present).tolist():
-            infos[row]["padding"] = True
-        return infos
+    def _note(self, world: int) -> None:
+        """Note what there is to say of a world's rows, until it has something to tell again."""
+        env, rows = self.worlds[world], self._worlds.rows[world]
+        state = env.warehouse.state
+        about = {
+            "TimeLimit.truncated": False,
+            "padding": False,
+            "failed": 0,
+            "world": world,
+            "n_robots": state.n_robots,
+            **env.episode_info,
+        }
+        abouts: Infos = [about.copy() for _ in range(rows.start, rows.stop)]
+        for robot, modes in enumerate(state.failure_modes):
+            if modes:
+                abouts[robot]["failed"] = 1
+        for row in np.flatnonzero(~self._worlds.present[rows]).tolist():
+            abouts[row]["padding"] = True
+        self._abouts[rows] = abouts
 
     def _end(self, world: int, step: RowsStep, dones: NDArray[np.bool_], infos: Infos) -> None:
         """Complete the infos of rows that are done; begin the next episode if the world is over."""
@@ -284,6 +288,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             self._worlds.begin(world, step.observations)
         else:
             self._worlds.note_present(world)
+        self._note(world)
 
 
 def _layers(env: World) -> list[Any]:

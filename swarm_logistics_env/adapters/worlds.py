@@ -48,6 +48,8 @@ class Worlds:
         world_of: (R,) the world of each row.
         is_over: of each world, whether its episode is.
         present: (R,) which rows of the latest observations are a robot's.
+        told: the worlds whose latest step had more to tell than observations; rewards and ends of
+            all others are zeros.
         observation_space, command_space: of every row.
 
     Raises:
@@ -65,7 +67,8 @@ class Worlds:
         self.is_over = [False] * n_worlds
         self.present = np.zeros(self.n_rows, np.bool_)
         self._n_robots = [0] * n_worlds
-        self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
+        self.told: list[int] = []
+        self._commands = np.zeros((self.n_rows, *self.command_space.shape))
         self._layers = [_layers(env) for env in self.envs]
         # The largest worlds are stepped first, so that all threads end at about the same time.
         order = sorted(range(n_worlds), key=lambda world: -sizes[world])
@@ -73,7 +76,15 @@ class Worlds:
         self._alone = [world for world in order if not self._layers[world]]
         # The thread that asks for a step works as well.
         self._n_helpers = max(min(threads, len(self._shared_out)) - 1, 0)
-        self._pool = WorldThreadPool(len(self._shared_out), self._n_helpers)
+        self._begin_work()
+
+    def _begin_work(self) -> None:
+        self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
+        self._pool = WorldThreadPool(
+            [self._layers[world][-1].warehouse for world in self._shared_out],
+            [self.rows[world].start for world in self._shared_out],
+            self._n_helpers,
+        )
 
     def blank(self) -> NDArray[np.float32]:
         """Return zeros for the observations of all rows, (R, D)."""
@@ -100,8 +111,8 @@ class Worlds:
         self.present[rows] = False
         self.present[rows.start : rows.start + len(there)] = there
 
-    def checked(self, commands: ArrayLike) -> NDArray[Any]:
-        """Return commands (R, 4) as an array.
+    def give(self, commands: ArrayLike) -> None:
+        """Take the commands (R, 4) of the next step.
 
         Raises:
             CommandError: wrong shape, not readable or not finite.
@@ -109,23 +120,22 @@ class Worlds:
         """
         if not any(self._n_robots):
             raise SetupError("step before reset: call reset() first")
-        given = as_array(commands, "actions")
-        wanted = (self.n_rows, *self.command_space.shape)
+        given, wanted = as_array(commands, "actions"), self._commands.shape
         if given.shape != wanted or given.dtype.kind not in "fiub":
             raise CommandError(
                 f"actions of shape {given.shape} and type {given.dtype}: should be {wanted} numbers"
             )
-        if not np.isfinite(given).all():
+        self._commands[:] = given
+        if not np.isfinite(self._commands).all():
             row = int(np.argwhere(~np.isfinite(given))[0, 0])
             world = int(self.world_of[row])
             raise CommandError(
                 f"actions[{row}] = {given[row]} (world {world}, robot_"
                 f"{row - self.rows[world].start}): should be finite"
             )
-        return given
 
-    def step(self, commands: NDArray[Any]) -> RowsStep:
-        """Take one control period in every world, with `checked` commands (R, 4)."""
+    def step(self) -> RowsStep:
+        """Take one control period in every world, with the commands that were given."""
         # New arrays, because the caller may still hold those of the step before.
         outcome = RowsStep(
             self.blank() if self._has_padding() else self._buffers.used(),
@@ -133,12 +143,13 @@ class Worlds:
             np.zeros(self.n_rows, np.bool_),
             np.zeros(self.n_rows, np.bool_),
         )
+        self.told = []
         if self._shared_out:
-            outcome = self._step_together(commands, outcome)
+            outcome = self._step_together(outcome)
         for world in self._alone:
-            given = commands[self._robots(world)]
-            step = self.envs[world].step_arrays(given)
-            outcome.observations[self._robots(world)] = step[0]
+            robots = self._robots(world)
+            step = self.envs[world].step_arrays(self._commands[robots].copy())
+            outcome.observations[robots] = step[0]
             self._take(world, step, outcome)
         return outcome
 
@@ -148,22 +159,19 @@ class Worlds:
         for env in self.envs:
             env.close()
 
-    def _step_together(self, commands: NDArray[Any], outcome: RowsStep) -> RowsStep:
-        given = np.array(commands, np.float64, order="C")
-        for world in self._shared_out:
-            for wrapper in self._layers[world][:-1]:
+    def _step_together(self, outcome: RowsStep) -> RowsStep:
+        for place, world in enumerate(self._shared_out):
+            *wrappers, core = self._layers[world]
+            self._pool.is_watched[place] = bool(wrappers) or core.is_watched
+            for wrapper in wrappers:
                 robots = self._robots(world)
-                given[robots] = wrapper.before_step(given[robots])
-        warehouses = [self._layers[world][-1].warehouse for world in self._shared_out]
-        firsts = [self.rows[world].start for world in self._shared_out]
+                self._commands[robots] = wrapper.before_step(self._commands[robots].copy())
         # The worlds keep what they sensed, whatever the wrappers make of it.
         changed: dict[int, NDArray[np.float32]] = {}
 
-        def arrived(place: int, sensed: NDArray[np.float32], is_eventful: bool) -> None:
+        def arrived(place: int, sensed: NDArray[np.float32]) -> None:
             world = self._shared_out[place]
             *wrappers, core = self._layers[world]
-            if not wrappers and core.is_uneventful(is_eventful):
-                return  # everything else is zeros
             step = core.outcome(sensed)
             for wrapper in reversed(wrappers):
                 step = wrapper.after_step(step)
@@ -171,7 +179,7 @@ class Worlds:
                 changed[world] = step[0]
             self._take(world, step, outcome)
 
-        self._pool.step(warehouses, firsts, given, outcome.observations, arrived)
+        self._pool.step(self._commands, outcome.observations, arrived)
         if changed:
             outcome = outcome._replace(observations=outcome.observations.copy())
             for world, rows in changed.items():
@@ -184,6 +192,7 @@ class Worlds:
         outcome.rewards[robots] = rewards
         outcome.terminated[robots], outcome.truncated[robots] = terminated, truncated
         self.is_over[world] = not self.envs[world].agents
+        self.told.append(world)
 
     def _has_padding(self) -> bool:
         """Return whether there are rows that no world fills in a step."""
@@ -198,8 +207,7 @@ class Worlds:
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self.__dict__.update(saved)
-        self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
-        self._pool = WorldThreadPool(len(self._shared_out), self._n_helpers)
+        self._begin_work()
 
 
 def _layers(env: World) -> list[Any]:
@@ -209,8 +217,7 @@ def _layers(env: World) -> list[Any]:
         layers.append(layers[-1].env)
     core = layers[-1]
     steps = [type(wrapper).step_arrays is Wrapper.step_arrays for wrapper in layers[:-1]]
-    is_plain = getattr(type(core), "step_arrays", None) is SwarmLogisticsEnv.step_arrays
-    return layers if is_plain and all(steps) else []
+    return layers if type(core) is SwarmLogisticsEnv and all(steps) else []
 
 
 def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:

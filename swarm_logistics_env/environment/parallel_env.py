@@ -199,30 +199,23 @@ class SwarmLogisticsEnv(DictView):
             commands = as_array(commands, "commands")
         return self.outcome(self.warehouse.step(commands))
 
-    def is_uneventful(self, was_eventful: bool) -> bool:
-        """Return whether the step that the warehouse has just taken pays nobody and ends nothing.
-
-        `outcome` gives zeros then and need not be asked.
-
-        Args:
-            was_eventful: what `warehouse.stepping.step` returned.
-        """
-        if was_eventful or not self.agents or self._rewards.pays_steadily:
-            return False
-        world = self.warehouse
-        is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
-        return not (is_cut or world.is_over_time)
+    @property
+    def is_watched(self) -> bool:
+        """Whether a step may pay or end something though its warehouse has nothing to tell."""
+        return self._rewards.pays_steadily or self.max_cycles is not None
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
         """Return what `step_arrays` does of the step that the warehouse has just taken."""
         world, was_present = self.warehouse, self._present
+        n = len(was_present)
+        terminations, truncations = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+        if not (world.is_eventful or self.is_watched):
+            return observations, np.zeros(n), terminations, truncations
         rewards = self._rewards.pay(world)
-        if len(self.agents) < len(was_present):
+        if len(self.agents) < n:
             rewards *= was_present
-        terminations, truncations = np.zeros((2, len(was_present)), np.bool_)
         is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
         is_over_time = is_cut or world.is_over_time
-        # These cases are rare; the other steps save the work.
         if is_over_time or world.all_delivered or world.n_removed != self._n_removed:
             self._n_removed = world.n_removed
             self._present = world.state.robot_present.copy()

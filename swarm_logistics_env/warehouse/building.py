@@ -112,8 +112,8 @@ def new_circle(engine: Engine, body: int, radius: float, x: float, y: float) -> 
 
 @kernel
 def free(address: int) -> None:
-    """Free everything that `build` made."""
-    engine = unpacked_at(World, address).engine
+    """Free everything that `build` made for the engine at `address`."""
+    engine = unpacked_at(Engine, address)
     call = engine.functions
     call_at(call.free_space, (engine.space[0],))
     for shapes in (engine.robot_shapes, engine.item_shapes, engine.solid_shapes):

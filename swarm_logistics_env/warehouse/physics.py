@@ -21,6 +21,7 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.building import N_WALLS, build, free
 from swarm_logistics_env.warehouse.engine import EMPTY_ROBOT, NO_ONE, collide_with, move
+from swarm_logistics_env.warehouse.packing import packed
 from swarm_logistics_env.warehouse.structs import Batch, Engine, Functions
 
 _FUNCTIONS = {
@@ -85,10 +86,9 @@ class Physics:
 
     def begin(self, world: NDArray[np.int64]) -> None:
         """Make the bodies of a world, given by its words, as its arrays have them now."""
-        address = world.ctypes.data
-        build(address)
+        build(world.ctypes.data)
         # Not at the end of the process, which frees everything anyway.
-        finalize(self, _free, world, self.engine, self._kept).atexit = False
+        finalize(self, _free, packed(self.engine), self.engine, self._kept).atexit = False
 
     def release(self, robot: int, item: int, x: float, y: float) -> None:
         """Put `item` to (x, y) [m], masked, and make `robot` an unladen one."""
@@ -101,8 +101,8 @@ class Physics:
         collide_with(self.engine, int(self.engine.robot_shapes[robot]), NO_ONE)
 
 
-def _free(world: NDArray[np.int64], *kept: object) -> None:
-    free(world.ctypes.data)
+def _free(engine: NDArray[np.int64], *kept: object) -> None:
+    free(engine.ctypes.data)
 
 
 class _Memory:

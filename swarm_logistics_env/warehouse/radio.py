@@ -36,9 +36,8 @@ def send_messages(commands: NumberRows, robots: Robots, able: Capabilities, step
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
     message, before = robots.message, robots.message_before
     n, n_kept = len(message), len(robots.told_before)
-    is_given = commands.shape[1] == MESSAGE + message.shape[1]
     for robot in range(n):
-        sends = is_given and robots.present[robot] and able.obeys[robot]
+        sends = robots.present[robot] and able.obeys[robot]
         for place in range(message.shape[1]):
             given = commands[robot, MESSAGE + place] if sends else 0.0
             given = min(max(given, -1.0), 1.0)

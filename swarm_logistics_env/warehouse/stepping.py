@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,28 +24,10 @@ from swarm_logistics_env.warehouse.sensor_noise import disturb
 from swarm_logistics_env.warehouse.structs import (
     NOBODY,
     STORED,
+    Commands,
     NumberRows,
-    Outcome,
     World,
 )
-
-
-class StepResult(NamedTuple):
-    """What a control step has to tell beside the state: the fields of `Outcome`."""
-
-    refused: int
-    n_delivered: int
-    is_paused: bool
-    is_room: bool
-
-
-UNEVENTFUL = StepResult(refused=NOBODY, n_delivered=0, is_paused=False, is_room=True)
-
-
-def result_of(outcome: Outcome) -> StepResult:
-    """Return what the last step has to tell."""
-    told: Any = (part.item() for part in outcome)
-    return StepResult(*told)
 
 
 @kernel
@@ -66,31 +46,54 @@ def perceive(address: int, rows: NDArray[np.float32]) -> None:
 
 
 @kernel
-def step(address: int, commands: NumberRows, rows: NDArray[np.float32]) -> bool:
+def step(address: int, rows: NDArray[np.float32]) -> bool:
     """Take a control step in the world at `address` and fill the observation rows (N, D).
 
-    If a command is refused, the world is as it was.
-
-    Returns whether its `Outcome` was eventful: something to tell takes time to be told.
+    Returns whether there is something to tell, see `take_step`; a command that is refused is, and
+    the world is as it was.
     """
     world = unpacked_at(World, address)
-    progress, outcome, parameters = world.progress, world.outcome, world.parameters
-    refused = refused_command(commands, world.robots, world.able)
-    outcome.refused[0] = refused
-    if refused != NOBODY:
-        return True
+    refused = refused_command(world.commands.now, world.robots, world.able)
+    world.outcome.refused[0] = refused
+    return refused != NOBODY or take_step(address, rows)
+
+
+@kernel
+def take_step(address: int, rows: NDArray[np.float32]) -> bool:
+    """Take a control step by commands that are finite.
+
+    Returns whether there is something to tell: a delivery, faults that begin or end, no room for
+    an item, a full log, the end of the time or of the requests, or a change before the step.
+    """
+    world = unpacked_at(World, address)
+    commands, progress, outcome = world.commands, world.progress, world.outcome
+    log_command(commands)
     progress.step[0] += 1
-    progress.time[0] = progress.step[0] * parameters.control_period
-    move(world, commands)
-    send_messages(commands, world.robots, world.able, progress.step[0])
-    n_delivered, is_room = handle_items(world, commands)
+    progress.time[0] = progress.step[0] * world.parameters.control_period
+    move(world, commands.now)
+    send_messages(commands.now, world.robots, world.able, progress.step[0])
+    n_delivered, is_room = handle_items(world, commands.now)
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:
         perceive(address, rows)
     outcome.n_delivered[0] = n_delivered
     outcome.is_paused[0] = is_paused
     outcome.is_room[0] = is_room
-    return n_delivered > 0 or is_paused or not is_room
+    is_over = progress.step[0] >= progress.last_step[0] or progress.requested[0] == NOBODY
+    is_full = commands.n_logged[0] * len(commands.now) == len(commands.log)
+    is_changed = progress.is_changed[0]
+    progress.is_changed[0] = False
+    return n_delivered > 0 or is_paused or not is_room or is_over or is_full or is_changed
+
+
+@inlined_kernel
+def log_command(commands: Commands) -> None:
+    """Append the commands of this step to those that a pickle replays."""
+    first = commands.n_logged[0] * len(commands.now)
+    for robot in range(len(commands.now)):
+        for column in range(commands.now.shape[1]):
+            commands.log[first + robot, column] = commands.now[robot, column]
+    commands.n_logged[0] += 1
 
 
 @inlined_kernel

@@ -119,7 +119,9 @@ class Progress(NamedTuple):
     n_asked: Integers  # requests before this one
     n_delivered: Integers  # items delivered
     anchoring_seconds: Numbers  # robot-seconds of working robots touching failed ones
+    last_step: Integers  # the step in which the time is up
     pause_step: Integers  # the step that ends before anything is sensed, as faults begin or end
+    is_changed: Flags  # faults or conditions changed since the step before
 
 
 class Grid(NamedTuple):
@@ -210,6 +212,14 @@ class Engine(NamedTuple):
     wanted_velocity: NumberRows  # (N, 2) [m/s] what the drives aim at
 
 
+class Commands(NamedTuple):
+    """The commands of the next step, and of those that a pickle replays; C columns."""
+
+    now: NumberRows  # (N, C)
+    log: NumberRows  # (L N, C) of the last steps, step after step
+    n_logged: Integers  # (1,) steps in `log`
+
+
 class Outcome(NamedTuple):
     """What the last step has to tell beside the state; each an array of one."""
 
@@ -223,6 +233,7 @@ class World(NamedTuple):
     """Everything that a step reads and writes."""
 
     parameters: Parameters
+    commands: Commands
     robots: Robots
     able: Capabilities
     items: Items
@@ -312,7 +323,9 @@ def blank_progress() -> Progress:
         n_asked=np.zeros(1, np.int64),
         n_delivered=np.zeros(1, np.int64),
         anchoring_seconds=np.zeros(1),
+        last_step=np.zeros(1, np.int64),
         pause_step=np.full(1, NOBODY),
+        is_changed=np.zeros(1, np.bool_),
     )
 
 

@@ -24,7 +24,10 @@ from swarm_logistics_env.errors import CommandError, ScenarioError
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 from swarm_logistics_env.warehouse import stepping
 from swarm_logistics_env.warehouse.atomic import add, exchange, load, replace
+from swarm_logistics_env.warehouse.kinematics import refused_command
 from swarm_logistics_env.warehouse.native import pointer_at
+from swarm_logistics_env.warehouse.packing import unpacked_at
+from swarm_logistics_env.warehouse.structs import NOBODY, NumberRows, World
 from swarm_logistics_env.warehouse.warehouse import Warehouse
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
@@ -32,14 +35,12 @@ carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]
 _WORD = 8  # bytes
 # Words of the queue. Jobs are taken and given in turn, counted without end, so that a helper who
 # comes late finds nothing to take rather than something that is not ready.
-TAKEN, GIVEN, ASLEEP, IS_CLOSED, N_JOBS, FIRST_JOB = range(6)
+TAKEN, GIVEN, ASLEEP, IS_CLOSED, N_JOBS, ROWS, ROW_COLUMNS, FIRST_JOB = range(8)
 # Words of a job, one per world, behind them.
-(
-    WORLD, N_ROBOTS, COMMANDS, COMMAND_COLUMNS, ROWS, ROW_COLUMNS, IS_DONE, IS_EVENTFUL,
-    JOB_LENGTH,
-) = range(9)  # fmt: skip
-# How often a helper looks for work before it goes to sleep: 0.3 ms, what ten wakings take.
+WORLD, FIRST_ROW, IS_DONE, IS_EVENTFUL, IS_WATCHED, JOB_LENGTH = range(6)
+# How often a thread looks for work before it goes to sleep: 0.3 ms, what ten wakings take.
 _PATIENCE = 400_000
+_NOT_YET = -1
 
 
 class WorldThreadPool:
@@ -48,37 +49,41 @@ class WorldThreadPool:
     A process that was forked has threads of its own, from its first step on.
 
     Args:
-        n_worlds: how many warehouses a step has.
+        worlds: the warehouses, each begun before the first step.
+        firsts: of each, the first of its N rows.
         n_helpers: how many threads there are beside the caller's.
 
     Attributes:
+        is_watched: (worlds,) of each, whether a step calls `arrived` even if it is not eventful.
         close: ends the helpers; harmless when called twice. Steps that are asked for afterwards
             the caller takes alone.
     """
 
     close: Callable[[], object]
 
-    def __init__(self, n_worlds: int, n_helpers: int) -> None:
-        self._n_worlds, self._n_helpers = n_worlds, n_helpers
+    def __init__(self, worlds: Sequence[Warehouse], firsts: Sequence[int], n_helpers: int) -> None:
+        self._worlds, self._firsts, self._n_helpers = worlds, firsts, n_helpers
+        self.is_watched = np.zeros(len(worlds), np.int64)
         self._start()
 
     def _start(self) -> None:
-        self._process = os.getpid()
-        self._queue = queue = np.zeros(FIRST_JOB + self._n_worlds * JOB_LENGTH, np.int64)
-        queue[N_JOBS] = self._n_worlds
-        jobs = queue[FIRST_JOB:].reshape(-1, JOB_LENGTH)
-        jobs[:, IS_DONE], self._is_eventful = 1, jobs[:, IS_EVENTFUL]
+        self._process, n_worlds = os.getpid(), len(self._worlds)
+        self._queue = queue = np.zeros(FIRST_JOB + n_worlds * JOB_LENGTH, np.int64)
+        queue[N_JOBS] = n_worlds
+        self._jobs = jobs = queue[FIRST_JOB:].reshape(-1, JOB_LENGTH)
+        jobs[:, FIRST_ROW], jobs[:, IS_DONE] = self._firsts, 1
+        jobs[:, IS_WATCHED], self.is_watched = self.is_watched, jobs[:, IS_WATCHED]
         self._address: int = queue.ctypes.data
         # Not a semaphore, whose lock another thread may hold at a fork or when a finalizer comes.
         self._wake: SimpleQueue[None] = SimpleQueue()
         # Compiled before helpers are many and in the way of the caller, and so that no Ctrl-C
         # finds them half compiled.
-        nothing = np.zeros((0, 3), np.int64), np.zeros((0, 0)), np.zeros((0, 0), np.float32)
-        submit(self._address, *nothing)
-        help_out(self._address, 0)
-        take_sleepers(self._address)
-        finished_from(self._address, 0, 0)
-        finish(self._address)
+        compiling = np.zeros(FIRST_JOB, np.int64).ctypes.data
+        submit(compiling, np.zeros((0, 0)), np.zeros((0, 0), np.float32))
+        help_out(compiling, 0)
+        take_sleepers(compiling)
+        next_told(compiling, 0, 0)
+        finish(compiling)
         self.close = weakref.finalize(self, _close, queue, self._wake, self._n_helpers)
         for _ in range(self._n_helpers):
             threading.Thread(
@@ -87,75 +92,62 @@ class WorldThreadPool:
 
     def step(
         self,
-        worlds: Sequence[Warehouse],
-        firsts: Sequence[int],
         commands: NDArray[np.float64],
         rows: NDArray[np.float32],
-        arrived: Callable[[int, NDArray[np.float32], bool], None],
+        arrived: Callable[[int, NDArray[np.float32]], None],
     ) -> None:
         """Take one control period in every world.
 
         Args:
-            worlds: as many as announced, each begun.
-            firsts: of each, the first of its N rows.
-            commands: (R, C) of all; the worlds keep them for their pickles.
+            commands: (R, C) of all.
             rows: (R, D) for the observations of all.
-            arrived: called with the place of each world, in their order and in the caller's
-                thread, its observations, a part of `rows`, and whether the step was eventful (see
-                `stepping.step`), while others may be under way.
+            arrived: called with the place of each world whose step was eventful or that is
+                watched, in their order and in the caller's thread, and with its observations, a
+                part of `rows`, while others may be under way.
 
         Raises:
-            CommandError: a robot's command is not finite; its world is as it was.
+            CommandError: a robot's command is not finite; all worlds are as they were.
             ScenarioError: an item that came back to a storage found no room.
             SetupError: a world was never reset.
         """
-        jobs = [
-            (world.address, first, world.scenario.n_robots) for world, first in zip(worlds, firsts)
-        ]
         if self._process != os.getpid():
             self._start()
-        place = n_finished = 0
+        self._jobs[:, WORLD] = [world.address for world in self._worlds]
+        place, n_worlds = 0, len(self._worlds)
         try:
             # One call for all, and one that ends what is left: Ctrl-C comes between calls.
-            submit(self._address, np.array(jobs, np.int64), commands, rows)
+            refused = submit(self._address, commands, rows)
+            if refused != NOBODY:
+                place = n_worlds
+                row, column = divmod(refused, commands.shape[1])
+                raise CommandError(
+                    f"commands[{row}, {column}] = {commands[row, column]}: should be finite"
+                )
             for _ in range(take_sleepers(self._address)):
                 self._wake.put(None)
-            if self._n_helpers == 0:
-                run_jobs(self._address)
-            while place < len(worlds):
-                # Not more than one at a time: what helpers have done meanwhile can be seen to
-                # while they go on.
-                if self._n_helpers > 0 and not run_next_job(self._address):
-                    self._wait_for(place)
-                n_finished = finished_from(self._address, place, 1)
-                while place < n_finished:
+            while place < n_worlds:
+                told = next_told(self._address, place, _PATIENCE)
+                if told == _NOT_YET:
+                    time.sleep(0)  # a thread that works may be waiting for this one's core
+                    continue
+                while place < n_worlds and place <= told:
                     place += 1
-                    arrived(place - 1, *self._take(place - 1, worlds, firsts, commands, rows))
+                    sensed = self._take(place - 1, rows)
+                if told < n_worlds:
+                    arrived(told, sensed)
         finally:
-            if place < len(worlds):
+            if place < n_worlds:
                 finish(self._address)
-            for left in range(place, len(worlds)):
+            for left in range(place, n_worlds):
                 # One is raised already.
-                with contextlib.suppress(CommandError, ScenarioError):
-                    self._take(left, worlds, firsts, commands, rows)
+                with contextlib.suppress(ScenarioError):
+                    self._take(left, rows)
 
-    def _take(
-        self,
-        place: int,
-        worlds: Sequence[Warehouse],
-        firsts: Sequence[int],
-        commands: NDArray[np.float64],
-        rows: NDArray[np.float32],
-    ) -> tuple[NDArray[np.float32], bool]:
-        world, first = worlds[place], firsts[place]
-        own = slice(first, first + world.scenario.n_robots)
-        sensed, is_eventful = rows[own], bool(self._is_eventful[place])
-        world.take(commands[own], sensed, is_eventful)
-        return sensed, is_eventful
-
-    def _wait_for(self, place: int) -> None:
-        while finished_from(self._address, place, _PATIENCE) == place:
-            time.sleep(0)  # its thread may be waiting for this one's core
+    def _take(self, place: int, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        world, first = self._worlds[place], self._firsts[place]
+        sensed = rows[first : first + world.scenario.n_robots]
+        world.take(sensed, bool(self._jobs[place, IS_EVENTFUL]))
+        return sensed
 
 
 def _help(queue: NDArray[np.int64], wake: SimpleQueue[None]) -> None:
@@ -176,43 +168,38 @@ def job_at(queue: int, place: int) -> int:
 
 
 @kernel
-def submit(
-    queue: int, jobs: NDArray[np.int64], commands: NDArray[np.float64], rows: NDArray[np.float32]
-) -> None:
-    """Give out the next jobs, all of a step.
+def submit(queue: int, commands: NumberRows, rows: NDArray[np.float32]) -> int:
+    """Give out the jobs of a step, but none if a command is refused.
 
     Args:
         queue: its address.
-        jobs: (n, 3): each world's address, first row and number of robots.
         commands: (R, C) of all.
         rows: (R, D) for the observations of all.
+
+    Returns:
+        The place, row by row, of the first command that is not finite; NOBODY if all are.
     """
-    n_columns, width = commands.shape[1], rows.shape[1]
-    given = load(queue + _WORD * GIVEN)
-    for place in range(len(jobs)):
-        job = job_at(queue, (given + place) % load(queue + _WORD * N_JOBS))
-        first = jobs[place, 1]
-        exchange(job + _WORD * WORLD, jobs[place, 0])
-        exchange(job + _WORD * N_ROBOTS, jobs[place, 2])
-        exchange(job + _WORD * COMMANDS, commands.ctypes.data + _WORD * first * n_columns)
-        exchange(job + _WORD * COMMAND_COLUMNS, n_columns)
-        exchange(job + _WORD * ROWS, rows.ctypes.data + 4 * first * width)
-        exchange(job + _WORD * ROW_COLUMNS, width)
-        exchange(job + _WORD * IS_DONE, 0)
-        exchange(queue + _WORD * GIVEN, given + place + 1)
+    n_jobs = load(queue + _WORD * N_JOBS)
+    for place in range(n_jobs):
+        job = job_at(queue, place)
+        world, first = unpacked_at(World, load(job + _WORD * WORLD)), load(job + _WORD * FIRST_ROW)
+        now = world.commands.now
+        now[:, :] = commands[first : first + len(now)]
+        refused = refused_command(now, world.robots, world.able)
+        if refused != NOBODY:
+            return int(first * commands.shape[1] + refused)
+    for place in range(n_jobs):
+        exchange(job_at(queue, place) + _WORD * IS_DONE, 0)
+    exchange(queue + _WORD * ROWS, rows.ctypes.data)
+    exchange(queue + _WORD * ROW_COLUMNS, rows.shape[1])
+    add(queue + _WORD * GIVEN, n_jobs)
+    return NOBODY
 
 
 @kernel
 def take_sleepers(queue: int) -> int:
     """Return how many helpers went to sleep and were not yet called."""
     return exchange(queue + _WORD * ASLEEP, 0)
-
-
-@kernel
-def run_jobs(queue: int) -> None:
-    """Step worlds until none is left to take."""
-    while run_next_job(queue):
-        pass
 
 
 @kernel
@@ -225,38 +212,46 @@ def run_next_job(queue: int) -> bool:
         if replace(queue + _WORD * TAKEN, taken, taken + 1):
             break
     job = job_at(queue, taken % load(queue + _WORD * N_JOBS))
-    n_robots, n_columns = load(job + _WORD * N_ROBOTS), load(job + _WORD * COMMAND_COLUMNS)
-    shape = (n_robots, load(job + _WORD * ROW_COLUMNS))
-    commands = carray(pointer_at(load(job + _WORD * COMMANDS)), (n_robots, n_columns), np.float64)
-    rows = carray(pointer_at(load(job + _WORD * ROWS)), shape, np.float32)
-    is_eventful = stepping.step(load(job + _WORD * WORLD), commands, rows)
+    address, first = load(job + _WORD * WORLD), load(job + _WORD * FIRST_ROW)
+    n_robots = len(unpacked_at(World, address).robots.item)
+    n_columns = load(queue + _WORD * ROW_COLUMNS)
+    own = load(queue + _WORD * ROWS) + 4 * first * n_columns
+    rows = carray(pointer_at(own), (n_robots, n_columns), np.float32)
+    is_eventful = stepping.take_step(address, rows)
     exchange(job + _WORD * IS_EVENTFUL, int(is_eventful))
     exchange(job + _WORD * IS_DONE, 1)
     return True
 
 
 @kernel
-def finish(queue: int) -> None:
-    """Step all worlds that are left and wait for those that others step."""
-    run_jobs(queue)
-    for place in range(load(queue + _WORD * N_JOBS)):
-        while load(job_at(queue, place) + _WORD * IS_DONE) == 0:
-            pass
+def next_told(queue: int, place: int, patience: int) -> int:
+    """Step worlds until one, from `place` on, is done that the caller has to be told of.
+
+    Returns its place; the number of worlds if all are done and none is; _NOT_YET if others still
+    step it after `patience` looks.
+    """
+    n_jobs, looks = load(queue + _WORD * N_JOBS), 0
+    while place < n_jobs:
+        job = job_at(queue, place)
+        if load(job + _WORD * IS_DONE) != 0:
+            if load(job + _WORD * IS_EVENTFUL) != 0 or load(job + _WORD * IS_WATCHED) != 0:
+                return place
+            place += 1
+        elif not run_next_job(queue):
+            looks += 1
+            if looks > patience:
+                return _NOT_YET
+    return place
 
 
 @kernel
-def finished_from(queue: int, place: int, patience: int) -> int:
-    """Return where the next job that is not done stands, from `place` on.
-
-    If that is `place` itself, it looks `patience` times.
-    """
-    n_jobs, first = load(queue + _WORD * N_JOBS), place
-    for _ in range(patience):
-        while place < n_jobs and load(job_at(queue, place) + _WORD * IS_DONE) != 0:
-            place += 1
-        if place > first:
-            break
-    return place
+def finish(queue: int) -> None:
+    """Step all worlds that are left and wait for those that others step."""
+    while run_next_job(queue):
+        pass
+    for place in range(load(queue + _WORD * N_JOBS)):
+        while load(job_at(queue, place) + _WORD * IS_DONE) == 0:
+            pass
 
 
 @kernel
@@ -266,12 +261,10 @@ def help_out(queue: int, patience: int) -> bool:
     while looks < patience:
         if load(queue + _WORD * IS_CLOSED) != 0:
             return True
-        if load(queue + _WORD * TAKEN) < load(queue + _WORD * GIVEN):
-            run_jobs(queue)
-            looks = 0
-        looks += 1
+        looks = 0 if run_next_job(queue) else looks + 1
     # Asleep first, then one more look: whoever gave before it must be seen, whoever gives
     # after it sees the sleeper.
     add(queue + _WORD * ASLEEP, 1)
-    run_jobs(queue)
+    while run_next_job(queue):
+        pass
     return load(queue + _WORD * IS_CLOSED) != 0

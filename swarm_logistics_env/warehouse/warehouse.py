@@ -20,8 +20,8 @@ from swarm_logistics_env.warehouse.grid import blank_grid
 from swarm_logistics_env.warehouse.packing import packed
 from swarm_logistics_env.warehouse.physics import Physics
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
-from swarm_logistics_env.warehouse.stepping import UNEVENTFUL, result_of
 from swarm_logistics_env.warehouse.structs import (
+    Commands,
     World,
     blank_claims,
     blank_nearby,
@@ -32,7 +32,7 @@ from swarm_logistics_env.warehouse.structs import (
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
-_NOT_KEPT = ("_physics", "_world", "_words", "_memory", "_log")
+_NOT_KEPT = ("_physics", "_world", "_words", "_address", "_memory")
 
 
 class Warehouse:
@@ -45,6 +45,8 @@ class Warehouse:
         state: what is true now, see `WarehouseState`.
         faults: what affects whom in this episode.
         n_removed: how many robots were taken out of the arena so far.
+        is_eventful: whether the last step has more to tell than observations, see
+            `stepping.take_step`.
 
     Example:
         >>> world = Warehouse(Scenario(n_robots=3))
@@ -60,9 +62,10 @@ class Warehouse:
         self.faults: tuple[Fault, ...] = ()
         self._occurrences: list[Occurrence] = []
         self.n_removed = 0
-        self._n_steps = self.scenario.n_steps
+        self.is_eventful = False
         self._seed: int | None = None
-        self._log: list[NDArray[np.float64]] = []
+        self._command_shape = (-1, -1)  # no commands have it before a reset
+        self._words = np.zeros(0, np.int64)
 
     def reset(
         self,
@@ -112,42 +115,48 @@ class Warehouse:
             CommandError: wrong shape, not numbers, or not finite; the world is as it was.
             SetupError: the world was never reset.
         """
-        given, rows = self._checked(commands), self._blank_rows()
-        self.take(given, rows, stepping.step(self._address, given, rows))
+        if not (
+            isinstance(commands, np.ndarray)
+            and commands.shape == self._command_shape
+            and commands.dtype.kind in "fiub"
+        ):
+            commands = self._checked(commands)
+        self._world.commands.now[...] = commands
+        rows = self._blank_rows()
+        self.take(rows, stepping.step(self._address, rows))
         return rows
 
-    def take(
-        self, commands: NDArray[np.float64], rows: NDArray[np.float32], is_eventful: bool
-    ) -> None:
-        """Take over a step that compiled code took: what became of `commands` and `rows`.
+    def take(self, rows: NDArray[np.float32], is_eventful: bool) -> None:
+        """Take over a step that compiled code took.
 
         Args:
-            commands: (N, C), kept for pickles.
             rows: (N, D) what was sensed.
-            is_eventful: whether the world has more to tell, as `stepping.step` returned.
+            is_eventful: whether there is more to tell, as `stepping.step` returned.
 
         Raises:
             CommandError: a robot's command is not finite; the world is as it was.
             ScenarioError: an item that came back to the storage found no room.
         """
-        result = result_of(self._world.outcome) if is_eventful else UNEVENTFUL
-        if result.refused != NOBODY:
-            robot, column = divmod(result.refused, commands.shape[1])
+        self.is_eventful = is_eventful
+        if not is_eventful:
+            self._rows = rows
+            return
+        outcome, state = self._world.outcome, self.state
+        if outcome.refused[0] != NOBODY:
+            given = self._world.commands.now
+            robot, column = divmod(outcome.refused.item(), given.shape[1])
             raise CommandError(
-                f"commands[{robot}, {column}] = {commands[robot, column]}: should be finite"
+                f"commands[{robot}, {column}] = {given[robot, column]}: should be finite"
             )
-        self._log.append(commands)
-        self._rows, state = rows, self.state
-        if result.n_delivered:
-            robots = self._world.claims.delivered_by[: result.n_delivered]
-            state.delivery_times += [state.time] * result.n_delivered
-            state.delivered_by += robots.tolist()
-        if result.is_paused:
+        self._rows, n_delivered = rows, outcome.n_delivered.item()
+        state.delivery_times += [state.time] * n_delivered
+        state.delivered_by += self._world.claims.delivered_by[:n_delivered].tolist()
+        if outcome.is_paused[0]:
             self._apply_faults()
             stepping.perceive(self._address, rows)
-        if len(self._log) >= self._longest_log:
+        if len(self._logged()) == self._longest_log:
             self._remember()
-        if not result.is_room:
+        if not outcome.is_room[0]:
             raise ScenarioError(
                 f"no room for items that come back (delivery {state.delivered}): should be fewer "
                 "items or robots, or a larger warehouse"
@@ -207,7 +216,7 @@ class Warehouse:
 
     @property
     def address(self) -> int:
-        """Where compiled code finds the world; another place whenever its bodies are made anew.
+        """Where compiled code finds the world, from the first reset on.
 
         Raises:
             SetupError: the world was never reset.
@@ -224,7 +233,7 @@ class Warehouse:
     @property
     def is_over_time(self) -> bool:
         """Whether the scenario's duration has passed."""
-        return self.state.step >= self._n_steps
+        return self.state.step >= self.scenario.n_steps
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
         """Place everything, give it its random streams, and ask for the first item."""
@@ -244,24 +253,20 @@ class Warehouse:
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
         if self._seed is None:
             raise _not_begun("step")
-        if isinstance(commands, np.ndarray) and commands.dtype == np.float64:
-            plain_numbers: NDArray[np.float64] = commands.copy()
-            if plain_numbers.shape == self._command_shape:
-                return plain_numbers
         try:
             if np.iscomplexobj(commands):
                 raise CommandError("commands should be numbers: real ones, not complex")
-            given = np.array(commands, dtype=np.float64, order="C")
+            given = np.array(commands, dtype=np.float64)
         except CommandError:
             raise
         except (TypeError, ValueError) as error:
             raise CommandError(f"commands should be an array of numbers: {error}") from None
-        if given.shape == self._command_shape:
-            return given
-        plain = (self.state.n_robots, len(COMMAND_COLUMNS))
-        full = (plain[0], plain[1] + self.scenario.message_size)
-        if given.shape not in (plain, full):
-            raise CommandError(f"commands of shape {given.shape}: should be {full}")
+        n, n_columns = self._command_shape
+        plain = len(COMMAND_COLUMNS)
+        if given.shape == (n, plain):
+            return np.pad(given, ((0, 0), (0, n_columns - plain)))
+        if given.shape != self._command_shape:
+            raise CommandError(f"commands of shape {given.shape}: should be {self._command_shape}")
         return given
 
     def _make_room_to_work(self) -> None:
@@ -287,22 +292,26 @@ class Warehouse:
         self._build()
         self._save()
 
+    def _logged(self) -> NDArray[np.float64]:
+        """Return the commands since the last such moment, (steps, N, C)."""
+        now, log, n_logged = self._world.commands
+        return log.reshape(-1, *now.shape)[: n_logged.item()]
+
     def _save(self) -> None:
-        self._log = []
         kept = {name: value for name, value in self.__dict__.items() if name not in _NOT_KEPT}
         self._memory = pickle.dumps(kept)
 
     def __getstate__(self) -> dict[str, Any]:
         if self._seed is None:
             return self.__dict__
-        return {"_memory": self._memory, "_log": self._log}
+        return {"_memory": self._memory, "_log": self._logged().copy()}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         if "_memory" not in saved:
             self.__dict__.update(saved)
             return
         self.__dict__.update(pickle.loads(saved["_memory"]))
-        self._memory, self._log = saved["_memory"], []
+        self._memory, self._words = saved["_memory"], np.zeros(0, np.int64)
         self._build()
         for commands in saved["_log"]:
             self.step(commands)
@@ -313,6 +322,7 @@ class Warehouse:
         change = min(
             (each.next_change(now, next_step) for each in self._occurrences), default=math.inf
         )
+        state.progress.is_changed[0] = True
         # The first step that ends when it has come.
         state.progress.pause_step[0] = self._step_of(change)
         gone = apply_faults(state, self.scenario, self._occurrences)
@@ -353,10 +363,16 @@ class Warehouse:
     def _build(self) -> None:
         """Make the bodies, and tell compiled code where everything is."""
         scenario, state = self.scenario, self.state
-        self._n_steps = scenario.n_steps
+        n, n_columns = self._command_shape
+        state.progress.last_step[0] = scenario.n_steps
         self._physics = Physics(scenario)
         self._world = World(
             parameters=parameters_of(scenario),
+            commands=Commands(
+                now=np.zeros(self._command_shape),
+                log=np.empty((self._longest_log * n, n_columns)),
+                n_logged=np.zeros(1, np.int64),
+            ),
             robots=state.robots,
             able=state.able,
             items=state.items,
@@ -369,7 +385,10 @@ class Warehouse:
             claims=blank_claims(scenario),
             engine=self._physics.engine,
         )
-        self._words = packed(self._world)
+        words = packed(self._world)
+        # In the same place as before, so that others need not ask where after each step.
+        self._words = words if len(self._words) == 0 else self._words
+        self._words[:] = words
         self._address: int = self._words.ctypes.data
         self._physics.begin(self._words)
 

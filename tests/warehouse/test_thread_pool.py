@@ -43,26 +43,36 @@ def commands(step: int) -> NDArray[np.float64]:
 FIRSTS = [0, 2, 7, 8]
 
 
+def pool_of(made: list[Warehouse], n_helpers: int) -> WorldThreadPool:
+    return WorldThreadPool(made, FIRSTS, n_helpers)
+
+
 def step(
     pool: WorldThreadPool, made: list[Warehouse], given: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
-    order = []
+    told = []
 
-    def arrived(place: int, sensed: NDArray[np.float32], is_eventful: bool) -> None:
-        order.append(place)
-        assert is_eventful or made[place].state.delivery_times[-1:] != [made[place].state.time]
+    def arrived(place: int, sensed: NDArray[np.float32]) -> None:
+        told.append(place)
         assert np.shares_memory(sensed, rows)
         assert sensed is made[place].observe()
 
-    pool.step(made, FIRSTS, given, rows, arrived)
-    assert order == [0, 1, 2, 3]
+    pool.step(given, rows, arrived)
+    assert told == sorted(told)
+    for place, world in enumerate(made):
+        delivered_now = world.state.delivery_times[-1:] == [world.state.time]
+        is_told = delivered_now or world.is_eventful or pool.is_watched[place]
+        assert (place in told) == is_told
+        assert np.shares_memory(world.observe(), rows)
     return rows
 
 
 @pytest.mark.parametrize("n_helpers", [0, 1, 3])
 def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
-    pool, together, apart = WorldThreadPool(len(SIZES), n_helpers), worlds(), worlds()
+    together, apart = worlds(), worlds()
+    pool = pool_of(together, n_helpers)
+    pool.is_watched[2] = 1
     for number in range(120):
         given = commands(number)
         rows = step(pool, together, given)
@@ -78,7 +88,8 @@ def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
 @pytest.mark.parametrize("is_closed", [True, False])
 def test_helpers_end_with_the_pool(is_closed: bool) -> None:
     before = set(threading.enumerate())
-    pool, made = WorldThreadPool(len(SIZES), 2), worlds()
+    made = worlds()
+    pool = pool_of(made, 2)
     step(pool, made, commands(0))
     helpers = [t for t in set(threading.enumerate()) - before if t.name == "swarm-helper"]
     assert len(helpers) == 2
@@ -94,54 +105,55 @@ def test_helpers_end_with_the_pool(is_closed: bool) -> None:
 
 
 def test_all_worlds_are_taken_over_when_the_caller_fails_at_one() -> None:
-    pool, made = WorldThreadPool(len(SIZES), 1), worlds()
+    made = worlds()
+    pool = pool_of(made, 1)
+    pool.is_watched[:] = 1
     rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
 
-    def arrived(place: int, sensed: NDArray[np.float32], is_eventful: bool) -> None:
+    def arrived(place: int, sensed: NDArray[np.float32]) -> None:
         raise RuntimeError(f"not {place}")
 
     with pytest.raises(RuntimeError, match="not 0"):
-        pool.step(made, FIRSTS, commands(0), rows, arrived)
+        pool.step(commands(0), rows, arrived)
     assert [world.state.step for world in made] == [1, 1, 1, 1]
     step(pool, made, commands(1))
     assert [world.state.step for world in made] == [2, 2, 2, 2]
     pool.close()
 
 
-def test_what_a_world_refuses_is_raised() -> None:
-    pool, made = WorldThreadPool(len(SIZES), 1), worlds()
-    given = commands(0)
+def test_a_command_that_is_refused_is_raised_before_any_world_has_moved() -> None:
+    made = worlds()
+    pool, given = pool_of(made, 1), commands(0)
     given[3, 1] = np.nan
-    with pytest.raises(CommandError, match=r"commands\[1, 1\] = nan"):
+    before = [world.state.robot_position.copy() for world in made]
+    with pytest.raises(CommandError, match=r"commands\[3, 1\] = nan"):
         step(pool, made, given)
-    assert [world.state.step for world in made] == [1, 0, 1, 1]
-
-    unused = Warehouse(Scenario(n_robots=2, **SMALL))
-    with pytest.raises(SetupError, match="reset"):
-        step(pool, [unused, *made[1:]], commands(1))
-    assert [world.state.step for world in made] == [1, 0, 1, 1]
+    assert [world.state.step for world in made] == [0, 0, 0, 0]
+    for world, position in zip(made, before):
+        np.testing.assert_array_equal(world.state.robot_position, position)
+    step(pool, made, commands(0))
+    assert [world.state.step for world in made] == [1, 1, 1, 1]
     pool.close()
 
 
-def test_a_world_that_refuses_keeps_none_of_those_behind_it() -> None:
-    pool, made = WorldThreadPool(len(SIZES), 1), worlds()
-    given = commands(0)
-    given[0, 0] = given[7, 2] = np.inf
-    with pytest.raises(CommandError, match=r"commands\[0, 0\] = inf"):
-        step(pool, made, given)
-    assert [world.state.step for world in made] == [0, 1, 0, 1]
+def test_a_world_that_was_never_reset_is_refused() -> None:
+    made = [Warehouse(Scenario(n_robots=2, **SMALL)), *worlds()[1:]]
+    pool = pool_of(made, 1)
+    with pytest.raises(SetupError, match="reset"):
+        step(pool, made, commands(1))
+    assert [world.state.step for world in made] == [0, 0, 0, 0]
     pool.close()
 
 
 @pytest.mark.parametrize("n_helpers", [0, 2])
-@pytest.mark.parametrize("kernel", ["submit", "take_sleepers", "run_next_job", "finished_from"])
+@pytest.mark.parametrize("kernel", ["submit", "take_sleepers", "next_told"])
 def test_a_pool_goes_on_after_ctrl_c(
     n_helpers: int, kernel: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if n_helpers == 0 and kernel == "run_next_job":
-        kernel = "run_jobs"  # alone all in one call
     original = getattr(thread_pool, kernel)
-    pool, made = WorldThreadPool(len(SIZES), n_helpers), worlds()
+    made = worlds()
+    pool = pool_of(made, n_helpers)
+    pool.is_watched[:] = 1
     step(pool, made, commands(0))
     for interrupted in range(3):
         left = [interrupted]
@@ -187,9 +199,9 @@ def play_on(pool: WorldThreadPool, made: list[Warehouse], expected: NDArray[np.f
 )
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_a_process_that_was_forked_has_threads_of_its_own() -> None:
-    pool, made, alone = WorldThreadPool(len(SIZES), 2), worlds(), WorldThreadPool(len(SIZES), 0)
+    made, ahead = worlds(), worlds()
+    pool, alone = pool_of(made, 2), pool_of(ahead, 0)
     step(pool, made, commands(0))
-    ahead = worlds()
     step(alone, ahead, commands(0))
     expected = step(alone, ahead, commands(1))
     forked = multiprocessing.get_context("fork").Process(
@@ -210,9 +222,9 @@ def test_a_program_ends_while_its_pool_is_at_work() -> None:
         "worlds = [Warehouse(Scenario(n_robots=2)) for _ in range(4)]\n"
         "for world in worlds: world.reset(0)\n"
         "rows = np.zeros((8, worlds[0].observe().shape[1]), np.float32)\n"
-        "pool = WorldThreadPool(4, 3)\n"
+        "pool = WorldThreadPool(worlds, [0, 2, 4, 6], 3)\n"
         "for _ in range(20):\n"
-        "    pool.step(worlds, [0, 2, 4, 6], np.zeros((8, 4)), rows, lambda *_: None)\n"
+        "    pool.step(np.zeros((8, 4)), rows, lambda *_: None)\n"
         "print(rows.any())\n"
     )
     done = subprocess.run(
