@@ -20,7 +20,7 @@ SUPERSUIT := .venvs/supersuit
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs format clean
+.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop docs dist format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -34,6 +34,7 @@ help:
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
 	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
 	@echo "make docs            the documentation site, site/index.html"
+	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -45,7 +46,7 @@ tables: $(STUDY)/installed
 
 test: check
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
-	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p trust.interpreted --numprocesses=2 --cov --cov-append --cov-report= \
+	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --numprocesses=2 --cov --cov-append --cov-report= \
 		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends)"
 	$(DEV)/bin/python -m coverage report --fail-under=92
 
@@ -59,10 +60,10 @@ check: $(DEV)/installed
 	$(DEV)/bin/mypy
 
 soak: $(DEV)/installed
-	$(DEV)/bin/python -m trust.soak --minutes $(MINUTES)
+	$(DEV)/bin/python -m verification.soak --minutes $(MINUTES)
 
 mutants: $(DEV)/installed
-	$(DEV)/bin/python -m trust.mutants
+	$(DEV)/bin/python -m verification.mutants
 
 # Tests from a copy of the tree without the package, so that the one that is installed is tested.
 test-lowest test-newest: test-%: .venvs/%/wheel
@@ -92,6 +93,11 @@ docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate_training_files.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
 
+dist: $(DEV)/installed
+	rm -rf dist
+	$(DEV)/bin/python -m build
+	$(DEV)/bin/python -m twine check --strict dist/*
+
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .
 	$(DEV)/bin/ruff format .
@@ -111,9 +117,9 @@ $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
-.venvs/lowest.txt: pyproject.toml trust/lowest.py
+.venvs/lowest.txt: pyproject.toml verification/lowest.py
 	@mkdir -p $(@D)
-	$(PYTHON) trust/lowest.py study render > $@
+	$(PYTHON) verification/lowest.py study render > $@
 
 .venvs/lowest/wheel: BOUNDS := --constraint .venvs/lowest.txt
 .venvs/newest/wheel: BOUNDS := --upgrade --upgrade-strategy eager

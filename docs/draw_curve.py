@@ -34,7 +34,7 @@ def draw(directory: Path, picture: Path) -> None:
     canvas, axes = pyplot.subplots(figsize=(WIDTH, 0.62 * WIDTH), layout="constrained")
     axes.plot(steps, [float(row["P"]) for row in rows], MARKERS[0] + "-", color=COLOURS[0])
     for name in SCRIPTED:
-        p = evaluate(policies.load(name), training.scenario, training.evaluation, 2).performance
+        p = evaluate(policies.load(name), training.scenario, training.evaluation, 2).means()["P"]
         axes.axhline(p, color=INK, linestyle="--", linewidth=0.8)
         axes.annotate(name, (steps[-1], p), ha="right", va="bottom", fontsize="small")
     asked = training.evaluation

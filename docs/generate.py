@@ -48,7 +48,8 @@ env.close()
 ```
 
 `swarm_logistics_v0.env` is the same with agents in turn (AEC). `env.reset_arrays` and `env.step_arrays` give and take one array for the
-whole swarm. `gymnasium.make("SwarmLogistics-v0")` is the swarm as one agent.
+whole swarm. `gymnasium.make("swarm_logistics_env:SwarmLogistics-v0")` is the swarm as one agent. [In other
+people's code](ecosystem.md) says how each library takes them.
 
 ## Agents
 
@@ -91,8 +92,8 @@ All agents terminate when every item is delivered (never with `restock`); a robo
 
 ## Infos
 
-A dict of its own for each agent, of numbers, with the same keys at the reset and at every step. Robots are not told: infos are for
-whoever trains or judges them.
+A dict of its own for each agent, of numbers, with the same keys at the reset and at every step. Robots do not
+sense them: infos are for those who train or judge robots.
 
 {infos}
 
@@ -108,7 +109,8 @@ fitted to bring the paper's tables closest, was chosen without a source, or is o
 
 {scenario}
 
-`reset(seed, options)` takes `options={{"scenario": {{...}}, "faults": [...]}}` for one episode. Any argument, option or command that cannot be
+`reset(seed, options)` takes `options={{"scenario": {{...}}, "faults": [...]}}` for one episode. A fault is a `Fault` or, as JSON and YAML
+have it, a dict of its arguments: `{{"mode": "FM1", "robots": 2}}`. Any argument, option or command that cannot be
 raises a subclass of `SwarmLogisticsError`, itself a `ValueError`, before anything has happened.
 
 ## Failure modes

@@ -13,19 +13,19 @@ from swarm_logistics_env.train.preset_files import load_training, preset_names
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
-    Imitation,
     Indicators,
     PPOSettings,
     Scores,
+    WorldKind,
 )
 from swarm_logistics_env.train.training import Training
 
 PAGE = Path(__file__).parent / "training_files.md"
 TABLES = {
     "[network]": Network,
+    "[[worlds]]": WorldKind,
     "[[conditions]]": Conditions,
     "[indicators]": Indicators,
-    "[imitation]": Imitation,
     "[ppo]": PPOSettings,
     "[evaluation]": Evaluation,
     "[scores]": Scores,

@@ -1,9 +1,11 @@
-"""Draws the pictures of the pages into docs/media: `python docs/pictures.py`."""
+"""Draws the pictures of the pages into docs/media: `python -m docs.pictures`."""
 
 from __future__ import annotations
 
 import shutil
 import tempfile
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,9 @@ from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import film_colours
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.watch import Session
+from swarm_logistics_env.watch.web import WatchServer
+from verification.browser import Browser
 
 MEDIA = Path(__file__).parent / "media"
 SIZE = 560  # px
@@ -32,6 +37,37 @@ def scene(seconds: float, faults: tuple[Fault, ...] = ()) -> NDArray[np.uint8]:
         observations = world.step(decide(policy, observations, world.state))
         picture = renderer.frame(world.state, scenario)
     return picture
+
+
+def browser_view(name: str) -> None:
+    """Photograph the page that `swarm-logistics watch` serves, with a headless Chromium."""
+    session = Session(Scenario(), lambda: policies.load("swarm-dt"), seed=1)
+    for seconds, broken in ((60.0, (2, 7, 9)), (90.0, (12, 20)), (240.0, ())):
+        while session.run.world.state.time < seconds:
+            session.play(0.1)
+        for robot in broken:
+            session.break_robot(robot)
+    session.select(9)
+    session.pause()
+    with (
+        WatchServer(session, "swarm-dt", port=0) as server,
+        tempfile.TemporaryDirectory() as folder,
+    ):
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        browser = Browser(Path(folder), (1280, 960))
+        try:
+            browser.open(server.address)
+            browser.wait_for("document.querySelectorAll('#row tr').length")
+            browser.click_on("#trails")
+            browser.wait_for("view.trails.length")
+            time.sleep(0.5)  # until they are drawn
+            (MEDIA / name).write_bytes(browser.screenshot())
+        finally:
+            browser.close()
+            server.shutdown()
+            thread.join()
+    Image.open(MEDIA / name).convert("RGB").save(MEDIA / name, optimize=True)
 
 
 def save(picture: NDArray[np.uint8], name: str) -> None:
@@ -68,4 +104,5 @@ if __name__ == "__main__":
     MEDIA.mkdir(exist_ok=True)
     save(scene(30.0), "warehouse.png")
     save(scene(60.0, (Fault("FM1", 2), Fault("FM4", [0, 5]))), "faults.png")
+    browser_view("watch.png")
     figures()

@@ -16,7 +16,7 @@ class Straight:
         self.scenario = scenario
 
     def reset(self, n_robots, seed):
-        # One stream a robot: another swarm size shifts nobody's luck.
+        # Each robot has a stream of its own, so that another swarm size changes no robot's draws.
         self.rngs = [generator(seed, "straight", robot) for robot in range(n_robots)]
         self.heading = np.array([rng.uniform(-np.pi, np.pi) for rng in self.rngs])
 

@@ -1,4 +1,4 @@
-"""One episode from the first command to the last: the unit of every measurement."""
+"""One episode from the first command to the last, which is what every measurement counts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from swarm_logistics_env.warehouse import Fault, Warehouse
 
 @dataclass(frozen=True)
 class Episode:
-    """What came of one run.
+    """The results of one run.
 
     Attributes:
         seed: the seed it was run with.
@@ -26,7 +26,7 @@ class Episode:
         all_delivered: nothing was left to ask for, so P is capped by the number of items.
         failed_robots: the robots that any fault named, ascending.
         anchoring_seconds: robot-seconds that working robots spent touching failed ones.
-        digest: of every robot's position at every control step and of all deliveries, in
+        digest: hash of every robot's position at every control step and of all deliveries, in
             hexadecimal. Runs of equal digest went the same way, whatever their timers said.
     """
 
@@ -42,6 +42,64 @@ class Episode:
     def delivered(self) -> int:
         """Items delivered in the order requested: the paper's performance P."""
         return int(self.delivery_times.shape[0])
+
+
+class Play:
+    """An episode that is played step by step; the caller may change its world in between.
+
+    Args:
+        policy_seed: decides the policy's own randomness; `seed` does if it is None.
+        world_type: what is made of the scenario, the warehouse or another world with its methods.
+
+    Attributes:
+        world: the world; its scenario and faults may be changed between two steps.
+        seed: it decides the layout, the requests and which robots fail.
+
+    Raises:
+        FaultError: a fault names robots that are not there.
+        PolicyError: `policy` is no policy.
+        ScenarioError: robots, items and obstacles do not find room.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        policy: Policy,
+        seed: int,
+        faults: Sequence[Fault] = (),
+        policy_seed: int | None = None,
+        world_type: type[Warehouse] = Warehouse,
+    ) -> None:
+        self.world = world_type(scenario)
+        self._policy, self.seed = policy, seed
+        self._observations = self.world.reset(seed, faults)
+        start(policy, scenario, seed if policy_seed is None else policy_seed)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is up or everything is delivered."""
+        return self.world.is_over_time or self.world.all_delivered
+
+    def sensed(self, robot: int) -> NDArray[np.float32]:
+        """Return the observation row (D,) that `robot` acts on next."""
+        row: NDArray[np.float32] = self._observations[robot]
+        return row
+
+    def step(self) -> None:
+        """Take one control period, or do nothing once the episode is over.
+
+        Raises:
+            PolicyError: the policy returned commands of the wrong shape, or not finite.
+        """
+        if self.is_over:
+            return
+        commands = decide(self._policy, self._observations, self.world.state)
+        try:
+            self._observations = self.world.step(commands)
+        except CommandError as error:
+            raise PolicyError(
+                f"{type(self._policy).__name__} at {self.world.state.time:g} s: {error}"
+            ) from error
 
 
 def run_episode(
@@ -72,18 +130,11 @@ def run_episode(
         >>> run_episode(Scenario(duration=10.0), policies.load("swarm-dt"), seed=0).ended_at
         10.0
     """
-    world = world_type(scenario)
-    observations = world.reset(seed, faults)
-    start(policy, scenario, seed if policy_seed is None else policy_seed)
+    play = Play(scenario, policy, seed, faults, policy_seed, world_type)
+    world = play.world
     digest = hashlib.blake2b(digest_size=16)
-    while not (world.is_over_time or world.all_delivered):
-        commands = decide(policy, observations, world.state)
-        try:
-            observations = world.step(commands)
-        except CommandError as error:
-            raise PolicyError(
-                f"{type(policy).__name__} at {world.state.time:g} s: {error}"
-            ) from error
+    while not play.is_over:
+        play.step()
         digest.update(world.state.robot_position.tobytes())
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)

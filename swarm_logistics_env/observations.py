@@ -46,7 +46,7 @@ def n_columns(scenario: Scenario) -> int:
 
 @dataclass(frozen=True)
 class Column:
-    """A named part of an observation row: where it stands, its unit and the range of its values."""
+    """A named part of an observation row: its place, its unit and the range of its values."""
 
     name: str
     unit: str
@@ -66,33 +66,41 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
     lowest = _block(LOWEST_TIMER, 1, ("present", "x", "y", "timer"))
     message = _run(MESSAGES, n_columns(scenario) - MESSAGES)
     messages = (
-        Column("neighbour_message", "1", message, -1, 1, "what each broadcasts, one by one"),
+        Column("neighbour_message", "1", message, -1, 1, "the numbers that each broadcasts"),
     )
     return (
-        Column("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"robots; {beam}"),
-        Column("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "walls and obstacles"),
-        Column("range_items", "m", _run(RANGE_ITEMS, N_BEAMS), 0, reach, "free items"),
+        Column("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"to robots; {beam}"),
+        Column("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "to walls and obstacles"),
+        Column("range_items", "m", _run(RANGE_ITEMS, N_BEAMS), 0, reach, "to free items"),
         Column("item_present", "flag", items["present"], 0, 1, "a free item is in view"),
         Column("item_x", "m", items["x"], -view, view, "its centre, forward"),
         Column("item_y", "m", items["y"], -view, view, "its centre, left"),
         Column("item_requested", "flag", items["requested"], 0, 1, "it is the requested one"),
-        Column("item_recently_held", "flag", items["recently_held"], 0, 1, "it is in the memory"),
-        Column("neighbour_present", "flag", neighbours["present"], 0, 1, "heard, or in view"),
+        Column(
+            "item_recently_held", "flag", items["recently_held"], 0, 1, "it was put down lately"
+        ),
+        Column("neighbour_present", "flag", neighbours["present"], 0, 1, "one is heard or in view"),
         Column("neighbour_x", "m", neighbours["x"], -far, far, "its centre, forward"),
         Column("neighbour_y", "m", neighbours["y"], -far, far, "its centre, left"),
-        Column("neighbour_timer_heard", "flag", neighbours["timer_heard"], 0, 1, "it tells one"),
-        Column("neighbour_timer", "s", neighbours["timer"], 0, limit, "the timer it tells"),
-        Column("lowest_timer_present", "flag", lowest["present"], 0, 1, "any timer was heard"),
-        Column("lowest_timer_x", "m", lowest["x"], -far, far, "teller of the lowest, forward"),
-        Column("lowest_timer_y", "m", lowest["y"], -far, far, "teller of the lowest, left"),
+        Column(
+            "neighbour_timer_heard", "flag", neighbours["timer_heard"], 0, 1, "its timer is heard"
+        ),
+        Column("neighbour_timer", "s", neighbours["timer"], 0, limit, "its timer"),
+        Column("lowest_timer_present", "flag", lowest["present"], 0, 1, "a timer is heard"),
+        Column("lowest_timer_x", "m", lowest["x"], -far, far, "its sender, forward"),
+        Column("lowest_timer_y", "m", lowest["y"], -far, far, "its sender, left"),
         Column("lowest_timer", "s", lowest["timer"], 0, limit, "the lowest timer heard"),
-        Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "an item"),
-        Column("carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "the requested"),
-        Column("in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is"),
+        Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "it carries an item"),
+        Column(
+            "carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "the requested one"
+        ),
+        Column("in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is there"),
         Column("timer_runs", "flag", _run(TIMER_RUNS, 1), 0, 1, "its own timer is not silent"),
         Column("timer", "s", _run(TIMER, 1), 0, limit, "its own timer; the limit when silent"),
-        Column("velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; saturates"),
-        Column("contact", "flag", _run(CONTACT, 1), 0, 1, "touches a robot, wall or obstacle"),
+        Column(
+            "velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; cut at top speed"
+        ),
+        Column("contact", "flag", _run(CONTACT, 1), 0, 1, "it touches a robot, wall or obstacle"),
         *(messages if scenario.message_size else ()),
     )
 

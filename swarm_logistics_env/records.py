@@ -12,11 +12,11 @@ _OTHER_KIND = ("int_type", "tuple_type")
 
 
 class Record(BaseModel):
-    """A frozen, hashable set of named values that cannot be wrong.
+    """A frozen, hashable set of named values, validated when it is made.
 
     Raises:
-        The class's `error_type` (a `ValueError`), naming each bad field, its value and what
-        would be right. An unknown field is an error that suggests the nearest known one.
+        The class's `error_type` (a `ValueError`), which names each bad field, its value and what
+        would be right. For an unknown field it suggests the nearest known one.
     """
 
     model_config = ConfigDict(
@@ -56,12 +56,13 @@ class Record(BaseModel):
     @classmethod
     def _sentence(cls, error: ValidationError) -> str:
         found: list[dict[str, Any]] = [dict(problem) for problem in error.errors()]
-        # Of a list that lost its bad items: that it is too short is no news.
+        # A list that lost its bad items is also too short; the bad items are reported alone.
         deeper = {problem["loc"][:-1] for problem in found}
         found = [p for p in found if p["type"] != "too_short" or p["loc"] not in deeper]
-        # Of a number or a list: that it is not the other, where what is wrong with the one is told.
-        told = {p["loc"][:1] for p in found if p["type"] not in _OTHER_KIND}
-        found = [p for p in found if p["type"] not in _OTHER_KIND or p["loc"][:1] not in told]
+        # A field may be a number or a list: if one of them has a more precise error, that the
+        # value is not the other is left out.
+        precise = {p["loc"][:1] for p in found if p["type"] not in _OTHER_KIND}
+        found = [p for p in found if p["type"] not in _OTHER_KIND or p["loc"][:1] not in precise]
         problems = (cls._problem(problem) for problem in found)
         return "; ".join(dict.fromkeys(problems))
 

@@ -17,17 +17,18 @@ from pydantic import (
 from swarm_logistics_env.errors import ScenarioError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 
-# The densest that discs are strewn at random: well below random sequential addition's .547.
+# Discs may cover this part of the floor; random sequential addition ends at 0.547.
 DENSEST_COVER = 0.4
 # Numbers beyond these do not survive in float32 observations, or vanish when squared.
 SMALLEST, LARGEST = 1e-9, 1e9
-# Of its radius, what a robot may drive in one physics step: further, crowds press it through walls.
+# In a physics step a robot may drive this part of its radius; a crowd presses a faster one
+# through walls.
 LONGEST_STRIDE = 0.8
-# A physics step [s]: with longer ones piles of robots stand inside themselves.
+# The longest physics step [s]; with a longer one, robots that press together overlap.
 LONGEST_PHYSICS_PERIOD = 0.02
 MOST_SUBSTEPS = 1000
 
-# Public addresses of what the defaults were taken from.
+# The public addresses of the sources that defaults were taken from.
 SOURCES = {
     "paper": "https://arxiv.org/abs/2311.01944",
     "simulator": "https://github.com/emmilner/swarm_sim",
@@ -38,7 +39,7 @@ SOURCES = {
 Probability = Annotated[float, Field(ge=0, le=1)]
 Mix = Annotated[tuple[Annotated[float, Field(gt=0, le=1)], ...], Field(min_length=1)]
 
-# What may change while robots are at work; the rest is built into arena, bodies and spaces.
+# These may change while robots are at work; the others are built into arena, bodies and spaces.
 CHANGES_DURING_RUN = frozenset(
     {
         "delivery_width",
@@ -168,17 +169,6 @@ class Scenario(Record):
     def n_substeps(self) -> int:
         """Physics steps in a control step."""
         return round(self.control_period / self.physics_period)
-
-    @classmethod
-    def from_json(cls, text: str | bytes) -> Self:
-        """Return the record that `to_json` wrote; before there was a `heading_drift` it was 0.
-
-        Raises:
-            ScenarioError: `text` is not JSON or is not such a record.
-        """
-        scenario = super().from_json(text)
-        is_older = cls.model_fields.keys() - scenario.model_fields_set == {"heading_drift"}
-        return scenario.replace(heading_drift=0.0) if is_older else scenario
 
     @property
     def is_gossip(self) -> bool:

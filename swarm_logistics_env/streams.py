@@ -1,8 +1,8 @@
 """Random streams keyed by seed, purpose and entity (common random numbers).
 
-A stream depends on its key alone: not on the swarm size, the process, the order of calls or any
-other world. So robot 3 starts in the same place whether 5 or 150 robots follow it, and removing
-it shifts nobody's stream.
+A stream depends on its key alone. It does not depend on the swarm size, the process, the order of
+calls or any other world. So robot 3 starts in the same place whether 5 or 150 robots follow it,
+and removing it changes no other robot's stream.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ def key(seed: int, purpose: str, *entity: int) -> int:
 
     Args:
         seed: any integer; 0 is a seed like every other.
-        purpose: what the numbers are for, e.g. "item places".
-        entity: whom they are for, e.g. the robot's number.
+        purpose: the use of the numbers, e.g. "item places".
+        entity: integers that name what the numbers belong to, e.g. the robot's number.
 
     Raises:
-        SetupError: the seed is no integer.
+        SetupError: `seed` is not an integer.
     """
     try:
         number = operator.index(seed)
@@ -38,7 +38,7 @@ def key(seed: int, purpose: str, *entity: int) -> int:
 
 
 def generator(seed: int, purpose: str, *entity: int) -> np.random.Generator:
-    """Return numpy's Generator (Philox) on the stream of that key."""
+    """Return a numpy Generator (Philox) for the stream of that key; see `key`."""
     return np.random.Generator(np.random.Philox(key=key(seed, purpose, *entity)))
 
 

@@ -19,8 +19,8 @@ if not (Path(__file__).parents[1] / "swarm_logistics_env").is_dir():
     collect_ignore = [
         "test_imports.py",
         "test_packaging.py",
-        "trust/test_mutants.py",
-        "trust/test_ignores.py",
+        "verification/test_mutants.py",
+        "verification/test_ignores.py",
     ]
 
 

@@ -86,7 +86,7 @@ def test_links_and_pictures_exist(name: str) -> None:
             assert (DOCS / (link or picture)).exists(), f"{name}: {link or picture}"
 
 
-@pytest.mark.filterwarnings("ignore")  # of the libraries that build the site, among themselves
+@pytest.mark.filterwarnings("ignore")  # the libraries that build the site warn about each other
 def test_site_builds_without_warnings(tmp_path: Path) -> None:
     sphinx = pytest.importorskip("sphinx.application", reason="needs the extra docs")
     pytest.importorskip("furo", reason="needs the extra docs")

@@ -11,7 +11,7 @@ from swarm_logistics_env import Episode, Fault, Scenario, policies, run_episode
 from swarm_logistics_env.errors import FaultError, PolicyError
 from swarm_logistics_env.warehouse import WarehouseState
 
-# Everything is in reach of everybody, so that whoever drives east delivers.
+# All items are within reach, so that a robot that drives east delivers.
 REACHABLE = Scenario(n_robots=1, n_items=3, pickup_range=14.0, duration=60.0)
 
 

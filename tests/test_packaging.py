@@ -48,7 +48,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     copy = tmp_path_factory.mktemp("tree") / "source"
     out = tmp_path_factory.mktemp("dist")
     shutil.copytree(ROOT, copy, symlinks=True, ignore=environments_and_output)
-    # Not isolated: the dev extra holds setuptools, so that this needs no network.
+    # The build is not isolated: the dev extra holds setuptools, so it needs no network.
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(copy)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

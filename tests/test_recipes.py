@@ -15,7 +15,8 @@ import swarm_logistics_env
 from swarm_logistics_env import kernels, policies
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
-PAGE = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 POLICY = """
 import numpy as np
@@ -56,6 +57,105 @@ assert abs(speeds[1] / speeds[0] - 0.5) < 0.05, speeds
 """
 
 
+RESTS = """
+import numpy as np
+from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.policies import Policy
+
+
+class Still(Policy):
+    def reset(self, n_robots, seed):
+        self.n_robots = n_robots
+
+    def act(self, observations):
+        return np.zeros((self.n_robots, 4))
+
+
+scenario = Scenario(n_robots=3, n_items=4, duration=3.0)
+rested = run_episode(scenario.replace(rest=3.0), policies.load("swarm-dt"), seed=0)
+assert rested.digest == run_episode(scenario, Still(), seed=0).digest
+assert rested.digest != run_episode(scenario, policies.load("swarm-dt"), seed=0).digest
+"""
+
+INTERPRETED = """
+import numpy as np
+from verification.interpreted import interpret_kernels
+from swarm_logistics_env import Scenario, Warehouse, observations, swarm_logistics_v0
+
+np.seterr(over="ignore", divide="ignore")
+interpret_kernels()
+
+
+def rows(**fields):
+    world = Warehouse(Scenario(n_robots=2, n_items=2, heading_drift=0.0, **fields))
+    world.reset(seed=0)
+    for _ in range(5):
+        world.step(np.array([[0.2, 0.1, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]))
+    return observations.unflatten(world.observe(), world.scenario)
+
+
+"""
+
+SCALED = """
+velocity, scaled = rows()["velocity"], rows(odometry_scale=2.0)["velocity"]
+assert velocity[0].all(), velocity
+np.testing.assert_allclose(scaled, 2.0 * velocity, rtol=1e-6)
+"""
+
+SPEEDS = """
+sensed = rows()
+assert sensed["speed"].shape == (2, 1)
+assert sensed["speed"][0, 0] > 0.1
+np.testing.assert_allclose(
+    sensed["speed"][:, 0], np.linalg.norm(sensed["velocity"], axis=1), rtol=1e-6
+)
+space = swarm_logistics_v0.parallel_env(n_robots=2).observation_space("robot_0")
+place = observations.columns(Scenario())[-1].columns
+assert (space.low[place], space.high[place]) == (0.0, 2.0)
+assert space.shape == (observations.N_COLUMNS,)
+"""
+
+INDICATOR = """
+def kept(p_o, p_f, **asked):
+    terms = {"p_f": (p_f, 1.0, 0.0), "p_o": (p_o, 0.0, 1.0)}
+    return judge("K", terms, offset=0.0, **asked)
+
+"""
+
+DEFINITION = """\
+        Definition(
+            symbol="K",
+            name="performance kept",
+            compares="fault",
+            performances={"p_o": "P_o", "p_f": "P_F"},
+            function=kept,
+            arguments=lambda _: {},
+            adjectives={0.0: "alive"},
+            axis="performance kept K",
+        ),"""
+
+STUDY = """
+from pathlib import Path
+from swarm_logistics_env.studies import Study
+
+size = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0}
+study = Study(
+    name="small", seeds=2, scenario={"n_robots": 4, "n_items": 8, "duration": 20.0, **size},
+    faults=[{"modes": ["FM4"], "robots": [1]}], indicators=["K"],
+)
+study.run(engine="local")
+study.report(Path())
+print(Path("report.md").read_text())
+"""
+
+DOCS = """
+import sys
+sys.path.append(sys.argv[1])
+import generate
+print(generate.page())
+"""
+
+
 class Copy:
     """A copy of the package in which a recipe is followed."""
 
@@ -78,9 +178,17 @@ class Copy:
         file.write_text(f"{before}\n{text}{found}{after}", encoding="utf-8")
         self.changed.add(name)
 
-    def run(self, *arguments: str) -> str:
+    def replace(self, name: str, old: str, new: str) -> None:
+        file = self.package / name
+        text = file.read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{name} has {old} {text.count(old)} times"
+        file.write_text(text.replace(old, new), encoding="utf-8")
+        self.changed.add(name)
+
+    def run(self, *arguments: str, **variables: str) -> str:
         """Run Python with the copy as the package, and return what it printed."""
         environment = {**os.environ, "PYTHONPATH": str(self.folder), "PYTHONWARNINGS": "error"}
+        environment |= variables
         done = subprocess.run(
             [sys.executable, *arguments],
             cwd=self.folder,
@@ -91,6 +199,15 @@ class Copy:
         )
         assert done.returncode == 0, done.stderr
         return done.stdout
+
+    def interpret(self, script: str) -> None:
+        """Run a script in which the interpreter runs the kernels; compiling them takes longer."""
+        paths = os.pathsep.join([str(self.folder), str(ROOT)])
+        self.run("-c", INTERPRETED + script, PYTHONPATH=paths, NUMBA_DISABLE_JIT="1")
+
+    def page(self) -> str:
+        """Return the page of the environment that the documentation's generator writes."""
+        return self.run("-c", DOCS, str(ROOT / "docs"))
 
     def command(self, *arguments: str) -> str:
         small = ("--set", "n_robots=3", "--set", "n_items=4", "--set", "duration=5")
@@ -108,11 +225,14 @@ def copy(tmp_path: Path) -> Copy:
     return Copy(tmp_path)
 
 
-def files_of(recipe: str, name: str) -> set[str]:
-    """The files that a recipe says it changes, `NAME` filled in."""
+def files_of(recipe: str, **names: str) -> set[str]:
+    """Return the files that a recipe says it changes, with the names that it leaves open."""
     found = re.search(rf"### {recipe}\n\nFiles: (.*)\n", PAGE)
     assert found
-    return {file.replace("NAME", name) for file in re.findall(r"`([^`]+)`", found[1])}
+    files = re.findall(r"`([^`]+)`", found[1])
+    for placeholder, name in names.items():
+        files = [file.replace(placeholder, name) for file in files]
+    return set(files)
 
 
 def test_a_policy(copy: Copy) -> None:
@@ -124,7 +244,7 @@ def test_a_policy(copy: Copy) -> None:
     )
     copy.insert("policies/loading.py", '    "homing": ', '    "circles": Circles,')
     assert "with circles, seed 0" in copy.command("run", "--policy", "circles")
-    assert copy.changed == files_of("A policy", "circles")
+    assert copy.changed == files_of("A policy", NAME="circles")
     script = "from swarm_logistics_env import policies as p; print(p.identity(p.load('swarm-dt')))"
     assert copy.run("-c", script).strip() == policies.identity(policies.load("swarm-dt"))
 
@@ -138,7 +258,7 @@ def test_a_wrapper(copy: Copy) -> None:
     )
     copy.insert("wrappers/__init__.py", '    "IndicatorReward",', '    "HalfSpeed",')
     copy.run("-c", DRIVES)
-    assert copy.changed == files_of("A wrapper", "half_speed")
+    assert copy.changed == files_of("A wrapper", NAME="half_speed")
 
 
 def test_a_failure_mode(copy: Copy) -> None:
@@ -146,4 +266,59 @@ def test_a_failure_mode(copy: Copy) -> None:
     copy.insert("warehouse/faults.py", '    "dead": ', row)
     printed = copy.command("run", "--fault", "weak:2@1")
     assert "failed robots " in printed
-    assert copy.changed == files_of("A failure mode", "weak")
+    assert copy.changed == files_of("A failure mode")
+
+
+def test_a_scenario_parameter(copy: Copy) -> None:
+    field = '    rest: NonNegativeFloat = Field(0.0, description="at first nobody moves [s]; off")'
+    copy.insert("scenario.py", "    item_radius: ", field)
+    copy.insert(
+        "episode.py",
+        "        try:\n            self._observations = self.world.step",
+        "        if self.world.state.time < self.world.scenario.rest:\n            commands *= 0.0",
+    )
+    copy.run("-c", RESTS)
+    assert "| rest | 2 (default 0) | at first nobody moves [s]; off |" in copy.run(
+        "-c", "from swarm_logistics_env import Scenario; print(Scenario(rest=2.0).sheet())"
+    )
+    assert "| `rest` | `0.0` | at first nobody moves [s]; off |" in copy.page()
+    assert copy.changed == files_of("A scenario parameter", READER="episode")
+
+
+def test_a_scenario_parameter_that_a_kernel_reads(copy: Copy) -> None:
+    field = (
+        '    odometry_scale: PositiveFloat = Field(1.0, description="factor of velocities; off")'
+    )
+    copy.insert("scenario.py", "    item_radius: ", field)
+    copy.insert("warehouse/structs.py", "    n_substeps: ", "    odometry_scale: float")
+    copy.insert(
+        "warehouse/own_state.py",
+        "    limit = parameters.max_speed",
+        "    forward *= parameters.odometry_scale\n    left *= parameters.odometry_scale",
+    )
+    copy.interpret(SCALED)
+    files = files_of("A scenario parameter", READER="warehouse/own_state")
+    assert copy.changed == files | {"warehouse/structs.py"}
+    assert "`warehouse/structs.py`" in PAGE
+
+
+def test_an_observation_column(copy: Copy) -> None:
+    copy.insert("observations.py", "N_COLUMNS = ", "SPEED = CONTACT + 1")
+    copy.replace("observations.py", "N_COLUMNS = CONTACT + 1", "N_COLUMNS = SPEED + 1")
+    column = '        Column("speed", "m/s", _run(SPEED, 1), 0, speed, "without direction"),'
+    copy.insert("observations.py", "        *(messages if ", column)
+    line = "    out[row.SPEED] = math.hypot(out[row.VELOCITY], out[row.VELOCITY + 1])"
+    copy.insert("warehouse/own_state.py", "    out[row.CONTACT] = ", line)
+    copy.interpret(SPEEDS)
+    assert "| 140 | `speed` | m/s | [0, 2] | without direction |" in copy.page()
+    assert copy.changed == files_of("An observation column", SENSE="own_state")
+
+
+def test_an_indicator(copy: Copy) -> None:
+    copy.insert("spi/indicators.py", "def scalability(", INDICATOR)
+    copy.insert("spi/definitions.py", "    relative_change,", "    kept,")
+    copy.insert("spi/definitions.py", '        Definition(\n            symbol="S"', DEFINITION)
+    report = copy.run("-c", STUDY)
+    assert "swarm-dt, alive? Failure mode FM4, m = 1 of N = 4." in report
+    assert "performance kept K per failure mode" in report
+    assert copy.changed == files_of("An indicator")

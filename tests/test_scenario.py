@@ -41,15 +41,6 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
     assert hash(Scenario.from_json(scenario.to_json())) == hash(scenario)
 
 
-def test_a_stored_scenario_from_before_there_was_a_drift_has_none() -> None:
-    stored = Scenario(n_robots=7).model_dump(mode="json")
-    del stored["heading_drift"]
-    older = Scenario.from_json(json.dumps(stored))
-    assert older == Scenario(n_robots=7, heading_drift=0.0)
-    # A few fields that somebody wrote by hand are no stored scenario.
-    assert Scenario.from_json('{"n_robots": 7}').heading_drift == 0.02
-
-
 @pytest.mark.parametrize(
     ("fields", "complaint"),
     [

@@ -7,15 +7,20 @@ from typing import TYPE_CHECKING
 from swarm_logistics_env.adapters.central_env import CentralEnv
 
 if TYPE_CHECKING:
+    from swarm_logistics_env.adapters.normalize import SwarmVecNormalize
     from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
-__all__ = ["CentralEnv", "SwarmVecEnv"]
+__all__ = ["CentralEnv", "SwarmVecEnv", "SwarmVecNormalize"]
 
 
-def __getattr__(name: str) -> type[SwarmVecEnv]:
-    # It loads stable-baselines3 and torch, so it is imported when somebody asks for it.
+def __getattr__(name: str) -> type[SwarmVecEnv | SwarmVecNormalize]:
+    # These load stable-baselines3 and torch, so they are imported when somebody asks for them.
     if name == "SwarmVecEnv":
         from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
         return SwarmVecEnv
+    if name == "SwarmVecNormalize":
+        from swarm_logistics_env.adapters.normalize import SwarmVecNormalize
+
+        return SwarmVecNormalize
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.commands import as_array
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.reset_options import checked_seed
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.policies.policy import mask_unreachable_commands
 from swarm_logistics_env.wrappers import FixedAgents
@@ -31,8 +32,13 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Infos are numbers, with the same keys at every step: "failed" (N,), 1 for each robot in which
     any failure mode holds, else 0; "delivered", items so far; what wrappers add.
 
+    `np_random_seed` is the seed of the current episode, also after a reset that was given none:
+    `reset(seed=env.np_random_seed)` plays it again.
+
     Args:
         env: a `SwarmLogisticsEnv` or a wrapper of one; default: one made with the arguments.
+        flat: whether observations and actions are vectors, (N * D,) and (N * (4 + message_size),),
+            robot after robot, for learners that take no matrices (RLlib, stable-baselines3).
         **arguments: those of `SwarmLogisticsEnv`.
 
     Raises:
@@ -44,11 +50,19 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         >>> observation, info = env.reset(seed=0)
         >>> observation.shape == env.observation_space.shape, env.action_space.shape
         (True, (3, 4))
+        >>> gymnasium.make("SwarmLogistics-v0", n_robots=3, flat=True).action_space.shape
+        (12,)
     """
 
     metadata: dict[str, Any] = SwarmLogisticsEnv.metadata
 
-    def __init__(self, env: SwarmLogisticsEnv | Wrapper | None = None, **arguments: Any) -> None:
+    def __init__(
+        self,
+        env: SwarmLogisticsEnv | Wrapper | None = None,
+        *,
+        flat: bool = False,
+        **arguments: Any,
+    ) -> None:
         if env is not None and any(value is not None for value in arguments.values()):
             raise SetupError(
                 f"env = {env} and {', '.join(arguments)}: should be an environment or the "
@@ -62,16 +76,24 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.render_mode = self.env.render_mode
         robot = self.env.possible_agents[0]
         row, command = self.env.observation_space(robot), self.env.action_space(robot)
-        rows = (self._rows.n_rows, 1)
-        self.observation_space = Box(np.tile(row.low, rows), np.tile(row.high, rows))
-        self.action_space = Box(np.tile(command.low, rows), np.tile(command.high, rows))
+        if not isinstance(command, Box):
+            raise SetupError(
+                f"env = {self.env}: its commands are {command}, should be a Box; put no "
+                "DiscreteActions inside of CentralEnv"
+            )
+        n_rows = self._rows.n_rows
+        self._commands_shape = (n_rows, *command.shape)
+        times = n_rows if flat else (n_rows, 1)
+        self.observation_space = Box(np.tile(row.low, times), np.tile(row.high, times))
+        self.action_space = Box(np.tile(command.low, times), np.tile(command.high, times))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin an episode; see `SwarmLogisticsEnv.reset_arrays`."""
+        seed = self.env.next_seed if seed is None else checked_seed(seed)
         super().reset(seed=seed)
-        return self._rows.reset_arrays(seed, options), self._info()
+        return self._shaped(self._rows.reset_arrays(seed, options)), self._info()
 
     def step(
         self, action: ArrayLike
@@ -90,11 +112,13 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 f"action of shape {commands.shape} and type {commands.dtype}: should be "
                 f"{self.action_space.shape} numbers"
             )
+        commands = commands.reshape(self._commands_shape)
         n_present = np.count_nonzero(state.robot_present)
         commands[: state.n_robots] = mask_unreachable_commands(commands[: state.n_robots], state)
         observations, rewards, terminations, truncations = self._rows.step_arrays(commands)
         reward = float(rewards.sum() / max(n_present, 1))
-        return observations, reward, bool(terminations.any()), bool(truncations.any()), self._info()
+        is_over, is_cut = bool(terminations.any()), bool(truncations.any())
+        return self._shaped(observations), reward, is_over, is_cut, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture or show it; see `SwarmLogisticsEnv.render`."""
@@ -109,6 +133,9 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def close(self) -> None:
         """Release what rendering holds; harmless when called twice."""
         self.env.close()
+
+    def _shaped(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        return observations.reshape(self.observation_space.shape)
 
     def _info(self) -> dict[str, Any]:
         failed = np.zeros(self._rows.n_rows, np.int8)

@@ -115,6 +115,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         """Which rows of the latest observations are a robot's, (num_envs,); others are zeros."""
         return self._worlds.present.copy()
 
+    @property
+    def rows_of_worlds(self) -> list[slice]:
+        """Of each of `worlds`, the slice of its rows."""
+        return self._worlds.rows
+
     def seed(self, seed: int | None = None) -> list[int]:
         """Fix all episodes from the next `reset` on; returns each row's world's seed.
 

@@ -1,4 +1,4 @@
-"""`swarm-logistics run` and `scenario`, and the place where the other commands are added."""
+"""`swarm-logistics run` and `scenario`; the other commands are added here."""
 
 from __future__ import annotations
 
@@ -6,18 +6,22 @@ from typing import Annotated
 
 import typer
 
-from swarm_logistics_env.cli import judging  # noqa: F401 - adds its commands to `study`
 from swarm_logistics_env.cli.application import Application
+from swarm_logistics_env.cli.film_command import film_command
+from swarm_logistics_env.cli.judging import judge_command
 from swarm_logistics_env.cli.options import (
     FaultOption,
+    PolicyOption,
     PresetOption,
+    SeedOption,
     SetOption,
     TrustPolicyOption,
-    fault_of,
+    faults_of,
     scenario_of,
 )
 from swarm_logistics_env.cli.study_commands import study
 from swarm_logistics_env.cli.train import train_command
+from swarm_logistics_env.cli.watch import watch_command
 
 app = Application(
     name="swarm-logistics",
@@ -28,6 +32,9 @@ app = Application(
 )
 app.add_typer(study)
 app.command("train")(train_command)
+app.command("film")(film_command)
+app.command("watch")(watch_command)
+app.command("judge")(judge_command)
 
 
 def _print_version(wanted: bool) -> None:
@@ -42,17 +49,21 @@ def _print_version(wanted: bool) -> None:
 def options(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Print it.", is_eager=True, callback=_print_version),
+        typer.Option(
+            "--version", help="Print the version.", is_eager=True, callback=_print_version
+        ),
     ] = False,
 ) -> None:
-    """Hold the options that belong to no command."""
+    """Take the options that stand before a command."""
 
 
 @app.command("scenario")
 def scenario_command(
     preset: PresetOption = "paper",
     changes: SetOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="As JSON, to be read back.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON, which can be read back.")
+    ] = False,
 ) -> None:
     """Print every condition of a run: value, unit, and whether the default is sourced or fitted."""
     from swarm_logistics_env.scenario import SOURCES
@@ -72,10 +83,8 @@ def scenario_command(
 
 @app.command("run")
 def run_command(
-    policy: Annotated[
-        str, typer.Option(help="Name, path of a policy file, or package.module:Class.")
-    ] = "swarm-dt",
-    seed: Annotated[int, typer.Option(help="Decides everything random.")] = 0,
+    policy: PolicyOption = "swarm-dt",
+    seed: SeedOption = 0,
     preset: PresetOption = "paper",
     changes: SetOption = None,
     faults: FaultOption = None,
@@ -87,8 +96,7 @@ def run_command(
     from swarm_logistics_env import policies
     from swarm_logistics_env.episode import run_episode
 
-    scenario = scenario_of(preset, changes)
-    scheduled = [fault_of(text) for text in faults or []]
+    scenario, scheduled = scenario_of(preset, changes), faults_of(faults)
     player = policies.load(policy, trust_code=trust_code)
     # This compiles the kernels, so that the time below is that of the episode alone.
     run_episode(scenario.replace(duration=scenario.control_period), player, seed)

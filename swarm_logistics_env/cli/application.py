@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import typer
+from rich.markup import escape
 
 
 class Application(typer.Typer):
@@ -27,7 +28,9 @@ class Application(typer.Typer):
         if "" not in sys.path:
             sys.path.append("")
         try:
-            code = super().__call__(arguments, standalone_mode=False)
+            command = typer.main.get_command(self)
+            _show_brackets(command)
+            code = command(arguments, standalone_mode=False)
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
         except Exception as error:
@@ -38,6 +41,15 @@ class Application(typer.Typer):
                 return 2
             return _complain(sentence, 2)
         return code if isinstance(code, int) else 0
+
+
+def _show_brackets(command: Any) -> None:
+    """Escape the help texts of a command and of those below it: Rich reads `[px]` as a style."""
+    command.help = escape(command.help or "")
+    for parameter in command.params:
+        parameter.help = escape(getattr(parameter, "help", None) or "")
+    for below in getattr(command, "commands", {}).values():
+        _show_brackets(below)
 
 
 def _sentence(error: Exception) -> str | None:
@@ -55,7 +67,7 @@ def _sentence(error: Exception) -> str | None:
 
 
 def _of_a_policy(error: Exception) -> str | None:
-    """Return what a user's own policy raised, and where; None if none of those raised the error."""
+    """Return what a user's own policy raised, and where; None if the error came from elsewhere."""
     from swarm_logistics_env.policies import policy
 
     frames = traceback.extract_tb(error.__traceback__)

@@ -1,4 +1,4 @@
-"""`swarm-logistics study power` and `study compare`."""
+"""`swarm-logistics judge`, `study power` and `study compare`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from swarm_logistics_env.cli.study_commands import (
     PolicyOption,
     ProcessesOption,
     TrustCodeOption,
+    show_report,
     study,
     study_of,
 )
@@ -24,6 +25,119 @@ SYMBOLS = tuple(DEFINITIONS)
 AtOption = Annotated[
     str, typer.Option(metavar="TEXT", help="Only comparisons whose name holds this.")
 ]
+
+
+@study.command("import")
+def judge_command(
+    file: Annotated[
+        Path, typer.Argument(metavar="TRIALS.csv", help="CSV file, one trial or delivery a row.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Directory to keep the study, report and tables.tex in.")
+    ] = None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column",
+            metavar="WHAT=NAME",
+            help="What a column of another name is, e.g. performance=boxes; may be repeated.",
+        ),
+    ] = None,
+    ignore: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Column to leave out; may be repeated."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Length of every trial [s], where no column says it.")
+    ] = None,
+    simulated: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE|DIR",
+            help="Simulated trials with the same seeds and further ones, or a study of them, that "
+            "narrow the intervals of at least ten real trials.",
+        ),
+    ] = None,
+    setup: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE|FILE",
+            help="A condition for the report to state, or a TOML file of some; may be repeated.",
+        ),
+    ] = None,
+) -> None:
+    """Judge trials of real robots or of another simulator, or a paper's tables.
+
+    Columns: robots, fault, faulty, delivered (or performance), and where they apply seed, policy,
+    onset, and any parameter; or time, one delivery a row. Without seeds the study is unpaired.
+    """
+    from tempfile import TemporaryDirectory
+
+    from swarm_logistics_env.report.document import document
+    from swarm_logistics_env.report.latex import latex_tables
+    from swarm_logistics_env.report.report_files import write_text
+    from swarm_logistics_env.report.with_simulation import with_simulation
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.importing import import_results
+
+    with TemporaryDirectory() as elsewhere:
+
+        def results_of(trials: Path, directory: Path) -> StudyResults:
+            count = import_results(
+                trials,
+                directory,
+                columns=dict(_pair("--column", text) for text in columns or []),
+                ignore=ignore or (),
+                duration=duration,
+                setup=_stated(setup or []),
+            )
+            typer.echo(f"{count} runs in {trials}\n")
+            return Study.stored(directory).findings()
+
+        results = results_of(file, out or Path(elsewhere) / "study")
+        whole = document(results)
+        if simulated is not None:
+            if simulated.is_dir():
+                model = Study.stored(simulated).findings()
+            else:
+                model = results_of(simulated, Path(elsewhere) / "simulated")
+            whole = with_simulation(whole, results, model)
+        show_report(results, whole, out)
+    if out is not None:
+        write_text(out / "tables.tex", latex_tables(whole.summary))
+        typer.echo(f"Written: {out / 'tables.tex'}")
+
+
+def _stated(texts: list[str]) -> dict[str, str]:
+    """Return the conditions that --setup states."""
+    import tomllib
+
+    from swarm_logistics_env.errors import StudyError
+
+    stated: dict[str, str] = {}
+    for text in texts:
+        if "=" in text:
+            stated.update([_pair("--setup", text)])
+            continue
+        try:
+            found = tomllib.loads(Path(text).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise StudyError(
+                f"--setup {text}: should be NAME=VALUE, or a file: {error.strerror}"
+            ) from None
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise StudyError(f"--setup {text}: is not TOML: {error}") from None
+        stated.update((name, str(value)) for name, value in found.items())
+    return stated
+
+
+def _pair(option: str, text: str) -> tuple[str, str]:
+    from swarm_logistics_env.errors import StudyError
+
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise StudyError(f"{option} {text}: should be NAME=VALUE")
+    return name, value
 
 
 @study.command("power")

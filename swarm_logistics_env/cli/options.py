@@ -23,11 +23,15 @@ FaultOption = Annotated[
     list[str] | None,
     typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
 ]
+PolicyOption = Annotated[
+    str, typer.Option(help="Name, path of a policy file, or package.module:Class.")
+]
+SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[
-    bool, typer.Option("--trust-code", help="Read a .zip policy: executes the code in it.")
+    bool, typer.Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
 ]
 
-_FAULT = re.compile(r"(?P<mode>\w+)(:(?P<robots>\d+))?(@(?P<onset>[\d.]+))?")
+_FAULT = re.compile(r"(?P<mode>\w+)(:(?P<robots>\d+))?(@(?P<onset>\d+\.?\d*|\.\d+))?")
 
 
 def scenario_of(preset: str, changes: list[str] | None) -> Scenario:
@@ -50,19 +54,20 @@ def scenario_of(preset: str, changes: list[str] | None) -> Scenario:
     return Scenario.preset(preset).replace(**fields)
 
 
-def fault_of(text: str) -> Fault:
-    """Return the fault that MODE[:ROBOTS][@ONSET] describes.
+def faults_of(texts: list[str] | None) -> list[Fault]:
+    """Return the faults that `--fault MODE[:ROBOTS][@ONSET]` describes.
 
     Raises:
-        FaultError: the text does not read so, or there is no such fault.
+        FaultError: a text does not read so, or there is no such fault.
     """
     from swarm_logistics_env.warehouse.faults import Fault
 
-    match = _FAULT.fullmatch(text)
-    if match is None:
-        raise FaultError(f"--fault {text}: should be MODE[:ROBOTS][@ONSET], e.g. FM1:2@200")
-    try:
-        onset = float(match["onset"] or 0)
-    except ValueError:
-        raise FaultError(f"--fault {text}: the onset should be a number of seconds") from None
-    return Fault(match["mode"], int(match["robots"] or 1), onset=onset)
+    faults = []
+    for text in texts or []:
+        match = _FAULT.fullmatch(text)
+        if match is None:
+            raise FaultError(f"--fault {text}: should be MODE[:ROBOTS][@ONSET], e.g. FM1:2@200")
+        faults.append(
+            Fault(match["mode"], int(match["robots"] or 1), onset=float(match["onset"] or 0))
+        )
+    return faults

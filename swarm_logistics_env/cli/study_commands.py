@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from swarm_logistics_env.report.document import Document
     from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.engines import Engine
     from swarm_logistics_env.studies.plan import Plan
+    from swarm_logistics_env.studies.results import StudyResults
     from swarm_logistics_env.studies.shards import Shard
     from swarm_logistics_env.studies.study import Tally
 
@@ -148,23 +150,6 @@ def export_command(
     typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
 
 
-@study.command("import")
-def import_command(
-    file: Annotated[Path, typer.Argument(help="CSV file, one run a row.")],
-    out: Annotated[Path, typer.Option(help="Directory of the study made of it.")],
-) -> None:
-    """Judge results from elsewhere, e.g. a paper's tables.
-
-    Columns: kind (size, fault, parameter), name, value, delivered; n_robots for faults; policy and
-    seed where known. Without seeds the study is unpaired.
-    """
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.importing import import_results
-
-    typer.echo(f"{import_results(file, out)} runs in {out}\n")
-    _show(Study.stored(out))
-
-
 @study.command("merge")
 def merge_command(
     directories: Annotated[list[Path], typer.Argument(help="Directories of shards of a study.")],
@@ -191,6 +176,7 @@ def study_of(
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
+    from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.studies import Study
 
     if seeds is not None:
@@ -199,6 +185,12 @@ def study_of(
         fields["first_seed"] = first_seed
     if policies:
         fields["policies"] = tuple(policies)
+        for name in policies:
+            if name.endswith(".zip") and not trust_code:
+                raise StudyError(
+                    f"--policy {name}: reading a model of stable-baselines3 executes the code in "
+                    "it: should be allowed by --trust-code"
+                )
     if asked.endswith(".toml") or Path(asked).is_file():
         return Study.from_file(asked, out=out, trust_code=trust_code, **fields)
     return Study.preset(asked, out=out, **fields)
@@ -248,21 +240,26 @@ def _in_one_line(tally: Tally, players: str) -> str:
     )
 
 
-def _show(asked: Study) -> None:
+def show_report(results: StudyResults, whole: Document, out: Path | None) -> None:
+    """Print the summary of a study's report, and write all of it into a directory."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.report_files import (
         how_to_get_figures,
         missing_packages,
         write_report,
     )
 
-    results = asked.findings()
-    whole = document(results)
     for section in whole.summary:
         show(section)
-    assert asked.out is not None
-    written = write_report(results, asked.out, whole)
-    typer.echo(f"Written: {', '.join(str(path) for path in written)}")
-    if missing := missing_packages():
-        typer.echo(how_to_get_figures(missing))
+    if out is not None:
+        written = write_report(results, out, whole)
+        typer.echo(f"Written: {', '.join(str(path) for path in written)}")
+        if missing := missing_packages():
+            typer.echo(how_to_get_figures(missing))
+
+
+def _show(asked: Study) -> None:
+    from swarm_logistics_env.report.document import document
+
+    results = asked.findings()
+    show_report(results, document(results), asked.out)

@@ -38,8 +38,8 @@ def train_command(
     seeds: Annotated[int | None, typer.Option(help="With --tune: episodes a condition.")] = None,
 ) -> None:
     """Train a policy, or tune a scripted one; the same command goes on where it was stopped."""
-    from swarm_logistics_env.train.preset_files import preset_names
     from swarm_logistics_env.train.request import train_as_asked, tune_as_asked
+    from swarm_logistics_env.train.training import preset_names
 
     if (preset is None) == (tune is None):
         raise TrainingError(

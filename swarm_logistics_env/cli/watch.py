@@ -6,29 +6,27 @@ from typing import Annotated
 
 import typer
 
-from swarm_logistics_env.cli.app import app
 from swarm_logistics_env.cli.options import (
     FaultOption,
+    PolicyOption,
     PresetOption,
     SetOption,
     TrustPolicyOption,
-    fault_of,
+    faults_of,
     scenario_of,
 )
 
 
-@app.command("watch")
 def watch_command(
-    policy: Annotated[
-        str, typer.Option(help="Name, path of a policy file, or package.module:Class.")
-    ] = "swarm-dt",
-    seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
+    policy: PolicyOption = "swarm-dt",
+    seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
     preset: PresetOption = "paper",
     changes: SetOption = None,
     faults: FaultOption = None,
-    speed: Annotated[float, typer.Option(help="Times real time.")] = 1.0,
+    speed: Annotated[float, typer.Option(help="How many times real time it plays.")] = 1.0,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="On this machine only; 0: any free one.")
+        int,
+        typer.Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free."),
     ] = 8765,
     trust_code: TrustPolicyOption = False,
 ) -> None:
@@ -37,11 +35,8 @@ def watch_command(
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.web import serve
 
+    scenario, scheduled = scenario_of(preset, changes), faults_of(faults)
     session = Session(
-        scenario_of(preset, changes),
-        lambda: policies.load(policy, trust_code=trust_code),
-        seed,
-        [fault_of(text) for text in faults or []],
-        speed,
+        scenario, lambda: policies.load(policy, trust_code=trust_code), seed, scheduled, speed
     )
     serve(session, policy, port, announce=typer.echo)

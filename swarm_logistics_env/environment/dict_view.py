@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Space
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
@@ -57,7 +57,7 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         return {agent: self.observation_space(agent) for agent in self.possible_agents}
 
     @property
-    def action_spaces(self) -> dict[str, Box]:
+    def action_spaces(self) -> dict[str, Space[Any]]:
         """The action space of every possible agent."""
         return {agent: self.action_space(agent) for agent in self.possible_agents}
 

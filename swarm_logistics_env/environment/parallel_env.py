@@ -50,7 +50,8 @@ class SwarmLogisticsEnv(DictView):
 
     Args:
         scenario: the conditions; default: the paper's.
-        faults: the faults that are scheduled in every episode.
+        faults: the faults that are scheduled in every episode, each a `Fault` or a dict of its
+            arguments, as `{"mode": "FM1", "robots": 2}`.
         rewards: reward term -> weight; default: 1 to everybody for each delivery.
         render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
@@ -84,7 +85,7 @@ class SwarmLogisticsEnv(DictView):
         self,
         scenario: Scenario | None = None,
         *,
-        faults: Sequence[Fault] = (),
+        faults: Sequence[Fault | Mapping[str, Any]] = (),
         rewards: Mapping[str, float] | None = None,
         render_mode: Literal["human", "rgb_array"] | None = None,
         max_cycles: int | None = None,

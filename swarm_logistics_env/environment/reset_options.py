@@ -6,7 +6,7 @@ import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.errors import FaultError, SetupError, suggest
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
 
@@ -56,20 +56,35 @@ def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[
     """Return the faults that the options give, or `default` where they give none.
 
     Raises:
-        SetupError: they are not a sequence of faults.
+        SetupError, FaultError: as `checked_faults`.
     """
     return checked_faults('options["faults"]', options.get("faults", default))
 
 
 def checked_faults(name: str, faults: Any) -> tuple[Fault, ...]:
-    """Return faults as a tuple.
+    """Return faults as a tuple; a dict of a fault's arguments, as JSON and YAML have it, is one.
 
     Raises:
         SetupError: they are not a sequence of faults.
+        FaultError: a dict is not that of a fault that can be.
     """
-    if not isinstance(faults, Sequence) or not all(isinstance(fault, Fault) for fault in faults):
-        raise SetupError(f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)]')
-    return tuple(faults)
+    is_list = isinstance(faults, Sequence) and not isinstance(faults, str)
+    if not is_list or not all(isinstance(fault, Fault | Mapping) for fault in faults):
+        raise SetupError(
+            f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)] or '
+            '[{"mode": "FM1", "robots": 2}]'
+        )
+    return tuple(fault if isinstance(fault, Fault) else _fault_of(name, fault) for fault in faults)
+
+
+def _fault_of(name: str, fields: Mapping[str, Any]) -> Fault:
+    known = Fault.model_fields
+    for field in fields:
+        if field not in known:
+            raise FaultError(f"{name}: a fault has no {field!r}{suggest(str(field), known)}")
+    if "mode" not in fields:
+        raise FaultError(f'{name}: {dict(fields)!r} has no "mode": should name one, as "FM1"')
+    return Fault(**fields)
 
 
 def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:

@@ -54,6 +54,9 @@ class MotionFrame:
     Args:
         scenario: for its control period.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
+
+    Attributes:
+        turned: how far each row's frame is turned from its robot's body (N,) [rad].
     """
 
     def __init__(self, scenario: Scenario, listens: bool = True) -> None:
@@ -67,7 +70,7 @@ class MotionFrame:
         self.counts = np.zeros(len(keys), np.int64)
         self.memory = np.empty((len(keys), known.N_COLUMNS))
         known.begin_memory(keys, self.memory)
-        self._turned = np.zeros(len(keys))
+        self.turned = np.zeros(len(keys))
 
     def begin_rows(self, rows: NDArray[np.int64], keys: NDArray[np.uint64]) -> None:
         """Begin an episode in these rows alone."""
@@ -81,7 +84,7 @@ class MotionFrame:
         known.remember(observations, self._period, self.memory)
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
         read_rows(
-            observations, self.memory, self.keys, self._random_headings(), inputs, self._turned
+            observations, self.memory, self.keys, self._random_headings(), inputs, self.turned
         )
         if not self._listens:
             inputs[:, LEAD] = 0.0
@@ -114,14 +117,14 @@ class MotionFrame:
         A robot that is caged by items clears its way instead.
         """
         commands = np.zeros((len(outputs), 4))
-        turn_outputs(outputs.astype(np.float64), self._turned, commands)
+        turn_outputs(outputs.astype(np.float64), self.turned, commands)
         clear_the_way(self._rows, self.memory, commands)
         known.note_commands(self._rows, commands, self.memory)
         return commands
 
     def outputs_for(self, commands: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the outputs (N, 3) that ask for these commands (N, 4); turns are left out."""
-        cos, sin = np.cos(self._turned), np.sin(self._turned)
+        cos, sin = np.cos(self.turned), np.sin(self.turned)
         x, y = commands[:, 0], commands[:, 1]
         return np.stack([cos * x + sin * y, cos * y - sin * x, commands[:, 3]], axis=1)
 

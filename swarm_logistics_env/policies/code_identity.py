@@ -61,6 +61,30 @@ def code_digest(kind: type) -> str:
                 _follow(base.__module__, Path(inspect.getfile(base)), packages, used)
             except (TypeError, OSError):  # typed into an interpreter
                 continue
+    return _digest(used)
+
+
+def function_digest(function: object) -> str:
+    """Return 16 hexadecimal digits that change with the module of a function.
+
+    Whatever that module imports from its own package counts as well, unless this is the package.
+    An object that is no function has the module of its class. Empty if there is no source.
+    """
+    function = getattr(function, "func", function)  # functools.partial
+    if not (inspect.isroutine(function) or inspect.isclass(function)):
+        function = type(function)
+    name = str(getattr(function, "__module__", ""))
+    used: dict[str, Path] = {}
+    try:
+        _follow(
+            name, Path(inspect.getfile(function)), {name.partition(".")[0]} - {OWN_PACKAGE}, used
+        )
+    except (TypeError, OSError):  # typed into an interpreter
+        return ""
+    return _digest(used)
+
+
+def _digest(used: dict[str, Path]) -> str:
     digest = hashlib.sha256()
     for name, path in sorted(used.items()):
         digest.update(name.encode() + b"\0" + _content(path) + b"\0")

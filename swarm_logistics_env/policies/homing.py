@@ -10,8 +10,6 @@ What it leans on: the remembered direction is kept in the robot's own frame, whi
 memory fades within ten seconds. It holds for robots that move sideways: this policy never commands
 a turn. Swarm D-T remembers no direction and does not need it.
 As it never turns, this policy is for the holonomic drive.
-
-The networks that `swarm-logistics train` makes begin by imitating this policy.
 """
 
 from __future__ import annotations
@@ -78,22 +76,12 @@ class Homing:
                 f"observations of {len(observations)} robots: reset was told "
                 f"{len(self._frame.keys)}"
             )
-        self._frame.read(observations)
-        commands = homing_commands(self._frame, observations, self._period)
-        return self._frame.command(self._frame.outputs_for(commands))
-
-
-def homing_commands(
-    frame: MotionFrame, observations: NDArray[np.float32], period: float
-) -> NDArray[np.float64]:
-    """Return the policy's commands (N, 4) for the rows that `frame` read last; period in s.
-
-    Imitation asks this of the frame of the network that plays.
-    """
-    numbers = ((frame.counts - 1) * period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
-    commands = np.zeros((len(observations), 4))
-    decide_homing(observations, frame.memory, frame.keys, numbers, period, commands)
-    return commands
+        frame = self._frame
+        frame.read(observations)
+        numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+        commands = np.zeros((len(observations), 4))
+        decide_homing(observations, frame.memory, frame.keys, numbers, self._period, commands)
+        return frame.command(frame.outputs_for(commands))
 
 
 @kernel

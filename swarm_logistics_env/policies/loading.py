@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import re
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -13,6 +14,7 @@ from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.files import SUFFIX, read_policy
 from swarm_logistics_env.policies.homing import Homing
+from swarm_logistics_env.policies.mixed import Mixed
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
 from swarm_logistics_env.policies.sb3_policy import StableBaselinesPolicy
@@ -68,14 +70,20 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
             `swarm_logistics_env.policies`, "package.module:Class", or the path of a policy file.
             Naming a class imports, and so executes, its module. A file that `swarm-logistics
             train` wrote (.safetensors) executes nothing; a model that stable-baselines3 saved
-            (.zip) does.
+            (.zip) does. "NAME=20,NAME=5" mixes them in one swarm, see `mixed.Mixed`.
         trust_code: whether to read a file although that executes the code in it.
         parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
 
     Raises:
         PolicyError: there is no such policy, or it does not take these parameters.
     """
-    make = NAMES.get(name) or _declared(name) or _filed(name, trust_code) or _imported(name)
+    make = (
+        NAMES.get(name)
+        or _declared(name)
+        or _mixed(name, trust_code)
+        or _filed(name, trust_code)
+        or _imported(name)
+    )
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         raise PolicyError(
@@ -100,6 +108,15 @@ def _declared(name: str) -> Callable[..., Policy] | None:
         made: Callable[..., Policy] = point.load()
         return made
     return None
+
+
+def _mixed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
+    if not re.fullmatch(r"[^,]+=\d+(,[^,]+=\d+)+", name):
+        return None
+    parts = [part.rpartition("=") for part in name.split(",")]
+    return functools.partial(
+        Mixed, [(load(part, trust_code=trust_code), int(count)) for part, _, count in parts]
+    )
 
 
 def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:

@@ -41,7 +41,7 @@ class StableBaselinesPolicy:
             self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
         except OSError as error:
             raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
-        self._model = _model(path)
+        self._model = read_model(path)
         found = self._model.observation_space.shape, self._model.action_space.shape
         wanted = (n_columns(Scenario()),), (4,)
         if found != wanted:
@@ -59,7 +59,12 @@ class StableBaselinesPolicy:
         return np.asarray(commands, dtype=np.float64)
 
 
-def _model(path: Path) -> Any:
+def read_model(path: Path) -> Any:
+    """Return the PPO model in a file, which executes the code in it.
+
+    Raises:
+        PolicyError: it is none, or stable-baselines3 is missing.
+    """
     try:
         from stable_baselines3 import PPO
     except ImportError:

@@ -8,13 +8,7 @@ from functools import lru_cache
 
 import pygame
 
-from swarm_logistics_env.rendering.palette import (
-    DELIVERING,
-    INK,
-    MARKS,
-    SEARCHING,
-    SHUFFLING,
-)
+from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.rendering.sprites import badge, blank, halo, item, robot, words
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
@@ -28,9 +22,9 @@ class Caption:
     """Writes what cannot be seen in the warehouse itself.
 
     Args:
-        left, top: where it begins [px].
-        width: room for a line [px].
-        text_height: [px].
+        left, top: its upper left corner [px].
+        width: the longest line that fits [px].
+        text_height: the height of letters [px].
     """
 
     def __init__(self, left: int, top: int, width: int, text_height: int) -> None:
@@ -53,7 +47,7 @@ class Caption:
     @staticmethod
     def least_width(text_height: int) -> int:
         """Return the width [px] below which words would be cut."""
-        return max(words(text, text_height, INK).get_width() for text in _WIDEST)
+        return max(words(text, text_height, palette.INK).get_width() for text in _WIDEST)
 
     def draw_legend(self, canvas: pygame.Surface) -> None:
         """Draw what the colours mean, which never changes, where there is room for it."""
@@ -96,15 +90,17 @@ class Caption:
         return places
 
     def _words(self, text: str) -> pygame.Surface:
-        return words(text, self._text_height, INK)
+        return words(text, self._text_height, palette.INK)
 
 
 @lru_cache(maxsize=128)
 def _failure(mode: str, count: int, text_height: int) -> pygame.Surface:
-    name = words(f"{mode} ×{count}", text_height, INK)
-    if mode not in MARKS:
+    name = words(f"{mode} ×{count}", text_height, palette.INK)
+    if mode not in palette.MARKS:
         return name
-    return _row([(badge(MARKS[mode], round(0.7 * text_height)),), (name,)], text_height // 5)
+    return _row(
+        [(badge(palette.MARKS[mode], round(0.7 * text_height)),), (name,)], text_height // 5
+    )
 
 
 def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
@@ -112,13 +108,13 @@ def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
     load, asked_for = item(0.45 * radius, False), item(0.5 * radius, True)
     entries: list[pygame.Surface] = []
     for name, pictures in {
-        "searching": (robot(radius, SEARCHING, 0, False),),
-        "shuffling": (robot(radius, SHUFFLING, 0, False), load),
-        "delivering": (robot(radius, DELIVERING, 0, False), asked_for),
+        "searching": (robot(radius, palette.SEARCHING, 0, False),),
+        "shuffling": (robot(radius, palette.SHUFFLING, 0, False), load),
+        "delivering": (robot(radius, palette.DELIVERING, 0, False), asked_for),
         "requested item": (item(0.9 * radius, True),),
-        "timer": (halo(0.6 * radius, 0), robot(0.6 * radius, SEARCHING, 0, False)),
+        "timer": (halo(0.6 * radius, 0), robot(0.6 * radius, palette.SEARCHING, 0, False)),
     }.items():
-        entries.append(_row([pictures, (words(name, text_height, INK),)], text_height // 4))
+        entries.append(_row([pictures, (words(name, text_height, palette.INK),)], text_height // 4))
     return tuple(entries)
 
 

@@ -13,10 +13,10 @@ class Curve:
     """Deliveries of one run.
 
     Attributes:
-        name: what the run is.
-        times: of the deliveries [s], ascending.
-        until: how far the run has come [s].
-        style: its place in `palette.RUNS`; two runs differ by thickness and lightness as well.
+        name: the name of the run.
+        times: the times of its deliveries [s], ascending.
+        until: the time that the run has reached [s].
+        style: an index of `palette.RUNS`; runs differ by thickness and lightness as well.
     """
 
     name: str
@@ -31,7 +31,7 @@ class Event:
 
     time: float  # [s]
     robot: int
-    mode: str | None  # None: repaired
+    mode: str | None  # None if it was repaired
 
     @property
     def label(self) -> str:

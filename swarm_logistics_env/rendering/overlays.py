@@ -8,11 +8,10 @@ import math
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import sprites
+from swarm_logistics_env.rendering import palette, sprites
 from swarm_logistics_env.rendering.beams import N_BEAMS, ranges
 from swarm_logistics_env.rendering.canvas import Point, draw_line, stamp
 from swarm_logistics_env.rendering.links import followed
-from swarm_logistics_env.rendering.palette import BEAM, FLOOR, LINK, TRAIL, mixed
 from swarm_logistics_env.rendering.projection import Projection
 from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
@@ -22,13 +21,13 @@ _TRAIL_SHADES = 5
 
 
 def draw_trails(canvas: pygame.Surface, projection: Projection, trails: Trails) -> None:
-    """Draw where robots have been, the older the paler."""
+    """Draw the paths of the robots; older parts are paler."""
     past = trails.positions()
     times, n_robots, _ = past.shape
     pixels = np.array(projection.points(past.reshape(-1, 2))).reshape(times, n_robots, 2)
     borders = np.linspace(0, times - 1, _TRAIL_SHADES + 1).round().astype(int).tolist()
     for shade, (first, last) in enumerate(itertools.pairwise(borders)):
-        colour = mixed(FLOOR, TRAIL, (shade + 1) / _TRAIL_SHADES)
+        colour = palette.mixed(palette.FLOOR, palette.TRAIL, (shade + 1) / _TRAIL_SHADES)
         for robot in range(n_robots):
             run = pixels[first : last + 1, robot]
             if len(run) > 1 and not np.isnan(run).any():
@@ -47,9 +46,9 @@ def draw_links(
     """Draw an arrow from the requested item's carrier to the neighbour it follows.
 
     Args:
-        robots: where robots are [px].
-        radius: theirs [px].
-        all_links: thin arrows from all other robots as well.
+        robots: the places of the robots on the picture [px].
+        radius: the radius of a robot [px].
+        all_links: whether to draw thin arrows from all other robots as well.
     """
     carrier = NOBODY
     if state.requested != NOBODY:
@@ -76,19 +75,19 @@ def draw_beams(
     """Draw how far each beam of a robot, which is at `at` [px], reaches, and its view range."""
     reach = float(state.ranger_range[robot])
     nearest = ranges(state, scenario, robot).min(axis=0)
-    dot = sprites.dot(max(2.0, projection.length(scenario.robot_radius) / 4.0), BEAM)
+    dot = sprites.dot(max(2.0, projection.length(scenario.robot_radius) / 4.0), palette.BEAM)
     hits = []
     for beam, distance in enumerate(nearest.tolist()):
         angle = float(state.robot_heading[robot]) + 2.0 * math.pi * beam / N_BEAMS
         far = projection.length(distance)
         end = (at[0] + far * math.cos(angle), at[1] - far * math.sin(angle))
-        draw_line(canvas, BEAM, at, end, 1.0)
+        draw_line(canvas, palette.BEAM, at, end, 1.0)
         if distance < reach:
             hits.append((dot, end))
     stamp(canvas, hits)
     view = projection.length(float(state.view_range[robot]))
     if view > 0.0:
-        stamp(canvas, [(sprites.circle(view, 1.5, BEAM), at)])
+        stamp(canvas, [(sprites.circle(view, 1.5, palette.BEAM), at)])
 
 
 def _draw_arrow(
@@ -103,6 +102,6 @@ def _draw_arrow(
     x_part, y_part = (end[0] - start[0]) / length, (end[1] - start[1]) / length
     tip = (end[0] - gap * x_part, end[1] - gap * y_part)
     base = (tip[0] - 0.8 * head * x_part, tip[1] - 0.8 * head * y_part)
-    draw_line(canvas, LINK, start, base, width)
+    draw_line(canvas, palette.LINK, start, base, width)
     step = sprites.heading_step(math.atan2(-y_part, x_part))
-    stamp(canvas, [(sprites.arrowhead(head, step, LINK), tip)])
+    stamp(canvas, [(sprites.arrowhead(head, step, palette.LINK), tip)])

@@ -5,18 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import sprites
+from swarm_logistics_env.rendering import palette, sprites
 from swarm_logistics_env.rendering.background import background
 from swarm_logistics_env.rendering.canvas import Point, new_canvas, stamp
 from swarm_logistics_env.rendering.caption import Caption
 from swarm_logistics_env.rendering.overlays import draw_beams, draw_links, draw_trails
-from swarm_logistics_env.rendering.palette import (
-    DELIVERING,
-    RGB,
-    SEARCHING,
-    SHUFFLING,
-    mark,
-)
 from swarm_logistics_env.rendering.projection import Projection
 from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
@@ -27,8 +20,8 @@ class Picture:
     """Draws states of a warehouse; see `Renderer` for the arguments.
 
     Attributes:
-        trails: where robots were, to which each state that is noted or drawn is added, or None.
-        projection: where the warehouse lies on the picture.
+        trails: the robots' paths so far, or None; each state that is noted or drawn is added.
+        projection: the place of the warehouse on the picture.
     """
 
     def __init__(
@@ -165,7 +158,7 @@ class Picture:
         away = 0.8 * self._robot_radius + 0.3 * height
         area = self._canvas.get_rect()
         for robot in np.flatnonzero(state.robot_present & state.failed).tolist():
-            sprite = sprites.badge(mark(state.failure_modes[robot]), height)
+            sprite = sprites.badge(palette.mark(state.failure_modes[robot]), height)
             x, y = robots[robot]
             place = sprite.get_rect(center=(round(x + away), round(y - away)))
             self._canvas.blit(sprite, place.clamp(area))
@@ -182,7 +175,7 @@ def _shape(scenario: Scenario) -> tuple[float, ...]:
     )
 
 
-def _state_colour(carried: int, requested: int) -> RGB:
+def _state_colour(carried: int, requested: int) -> palette.RGB:
     if carried == NOBODY:
-        return SEARCHING
-    return DELIVERING if carried == requested else SHUFFLING
+        return palette.SEARCHING
+    return palette.DELIVERING if carried == requested else palette.SHUFFLING

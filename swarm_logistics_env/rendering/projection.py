@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.scenario import Scenario
 
 LEAST_SIZE, LARGEST_SIZE = 100, 8000  # of a picture's longer side [px]
-_MARGIN = 0.025  # of the picture's size, on each side
+_MARGIN = 0.025  # a part of the picture's size, on each side
 
 
 @dataclass(frozen=True)

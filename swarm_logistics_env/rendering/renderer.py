@@ -17,7 +17,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.rendering.window import Window
+    import pygame
 
 RenderMode = Literal["rgb_array", "human"]
 
@@ -25,8 +25,8 @@ RenderMode = Literal["rgb_array", "human"]
 class Renderer:
     """Draws states of a warehouse.
 
-    A frame depends on the state and the arguments alone (with `trails`, on the states before it
-    too). It can be pickled and copied; a copy opens a window of its own.
+    A frame depends on the state and the arguments alone; with `trails` also on the states before
+    it. A renderer can be pickled and copied; a copy opens a window of its own.
 
     Args:
         scenario: the conditions; another one may come with each frame, and the picture's size
@@ -39,7 +39,7 @@ class Renderer:
             rather than only the one that carries the requested item.
 
     Raises:
-        SetupError: pygame is not installed, or an argument cannot be.
+        SetupError: pygame is not installed, or an argument is not allowed.
 
     Example:
         >>> from swarm_logistics_env import Scenario, Warehouse
@@ -82,11 +82,11 @@ class Renderer:
             "all_links": all_links,
         }
         self._picture = Picture(scenario, size, show_beams_of, trails, all_links)
-        self._window: Window | None = None
+        self._window: _Window | None = None
         self._was_closed_by_user = False
 
     def frame(self, state: WarehouseState, scenario: Scenario) -> NDArray[np.uint8]:
-        """Return the picture of `state`: (H, W, 3), red, green, blue. Works in either mode."""
+        """Return the picture of `state` in either mode: (H, W, 3), uint8, red, green and blue."""
         from swarm_logistics_env.rendering.canvas import to_array
 
         return to_array(self._picture.draw(state, scenario))
@@ -94,7 +94,7 @@ class Renderer:
     def show(self, state: WarehouseState, scenario: Scenario) -> None:
         """Show `state` in the window, at most one state per control period of real time.
 
-        Nothing is shown any more once the user has closed the window.
+        After the user has closed the window, nothing is shown any more.
 
         Raises:
             SetupError: the mode is not "human", or there is no display.
@@ -103,10 +103,7 @@ class Renderer:
             raise SetupError(f"show with mode = {self.mode!r}: should be 'human'")
         if self._was_closed_by_user:
             return
-        if self._window is None:
-            from swarm_logistics_env.rendering.window import Window
-
-            self._window = Window()
+        self._window = self._window or _Window()
         picture = self._picture.draw(state, scenario)
         if not self._window.show(picture, 1.0 / scenario.control_period):
             self._was_closed_by_user = True
@@ -139,3 +136,50 @@ def load_pygame() -> None:
         raise SetupError(
             f"rendering needs pygame ({error}): pip install 'swarm-logistics-env[render]'"
         ) from error
+
+
+class _Window:
+    """Shows pictures at a steady rate. There is one window per process: SDL's display.
+
+    Raises:
+        SetupError: there is no display.
+    """
+
+    def __init__(self) -> None:
+        import pygame
+
+        try:
+            pygame.display.init()
+        except pygame.error as error:
+            raise _no_display(str(error)) from error
+        # SDL falls back to a driver that shows nothing.
+        if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
+            pygame.display.quit()
+            raise _no_display("SDL found none")
+        pygame.display.set_caption("swarm-logistics")
+        self._clock = pygame.time.Clock()
+
+    def show(self, picture: pygame.Surface, rate: float) -> bool:
+        """Show a picture, wait until it is due at `rate` [1/s]; False once the user has closed."""
+        import pygame
+
+        screen = pygame.display.get_surface()
+        if screen is None or screen.get_size() != picture.get_size():
+            screen = pygame.display.set_mode(picture.get_size())
+        screen.blit(picture, (0, 0))
+        pygame.display.flip()
+        self._clock.tick(rate)
+        return not any(event.type == pygame.QUIT for event in pygame.event.get())
+
+    def close(self) -> None:
+        """Close the window; harmless when called twice."""
+        import pygame
+
+        pygame.display.quit()
+
+
+def _no_display(reason: str) -> SetupError:
+    return SetupError(
+        f"a window needs a display ({reason}): use render_mode = 'rgb_array', or set "
+        "SDL_VIDEODRIVER=dummy to go without"
+    )

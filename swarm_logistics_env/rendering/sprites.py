@@ -1,4 +1,9 @@
-"""Small pictures of what is drawn in the warehouse and its caption; each is painted once."""
+"""Small pictures of what is drawn in the warehouse and its caption; each is painted once.
+
+Shapes are painted from signed distances, so that they are smooth at any size: an array holds the
+distance [px] from each pixel's centre to the shape's edge, negative inside. Angles are clockwise
+from the right [rad], as on a screen.
+"""
 
 from __future__ import annotations
 
@@ -11,31 +16,70 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from swarm_logistics_env.rendering.palette import (
-    FLOOR,
-    INK,
-    ITEM,
-    ITEM_EDGE,
-    OBSTACLE,
-    REQUESTED,
-    RGB,
-    TIMER,
-)
-from swarm_logistics_env.rendering.shapes import (
-    box,
-    disc,
-    painted,
-    pill,
-    pixels,
-    ring,
-    wedge,
-)
+from swarm_logistics_env.rendering import palette
 
 HEADINGS = 120  # headings that are told apart
 HALOS = 12  # ages of a timer that are told apart
 _LETTERS = 4  # times as large as they are shown
 
 P = ParamSpec("P")
+Distance = NDArray[np.float64]  # (H, W) [px]
+Layer = tuple[Distance, palette.RGB, float]  # a shape, its colour, its opacity in [0, 1]
+
+
+def pixels(reach: float) -> tuple[Distance, Distance]:
+    """Return x (1, W) and y (H, 1) [px] of a square that reaches so far around its middle pixel."""
+    half = math.ceil(reach) + 1
+    axis = np.arange(-half, half + 1, dtype=np.float64)
+    return axis[np.newaxis, :], axis[:, np.newaxis]
+
+
+def disc(x: Distance, y: Distance, radius: float) -> Distance:
+    """Return the distance to a disc about the origin."""
+    return np.hypot(x, y) - radius
+
+
+def ring(x: Distance, y: Distance, radius: float, width: float) -> Distance:
+    """Return the distance to a ring about the origin, `radius` to the middle of its width."""
+    return np.abs(np.hypot(x, y) - radius) - width / 2
+
+
+def box(x: Distance, y: Distance, half_width: float, half_height: float) -> Distance:
+    """Return the distance to an upright box about the origin."""
+    return np.maximum(np.abs(x) - half_width, np.abs(y) - half_height)
+
+
+def pill(x: Distance, y: Distance, half_width: float, radius: float) -> Distance:
+    """Return the distance to a box with round ends, `half_width` and `radius` from the origin."""
+    return np.hypot(np.maximum(np.abs(x) - (half_width - radius), 0.0), y) - radius
+
+
+def wedge(
+    x: Distance, y: Distance, angle: float, tip: float, base: float, half_width: float
+) -> Distance:
+    """Return the distance to a triangle that points along `angle`.
+
+    Its tip and its base, of twice the half width, lie `tip` and `base` from the origin.
+    """
+    along = x * math.cos(angle) + y * math.sin(angle)
+    across = np.abs(y * math.cos(angle) - x * math.sin(angle))
+    length = tip - base
+    slope = math.hypot(length, half_width)
+    sides: Distance = ((along - tip) * half_width + across * length) / slope
+    return np.maximum(sides, base - along)
+
+
+def painted(*layers: Layer) -> NDArray[np.uint8]:
+    """Return the layers, the first lowest, as straight RGBA (H, W, 4)."""
+    shape = np.broadcast_shapes(*(distance.shape for distance, _, _ in layers))
+    colour, alpha = np.zeros((*shape, 3)), np.zeros((*shape, 1))
+    for distance, rgb, opacity in layers:
+        cover = (np.clip(0.5 - distance, 0.0, 1.0) * opacity)[..., np.newaxis]
+        colour = np.array(rgb) * cover + colour * (1.0 - cover)
+        alpha = cover + alpha * (1.0 - cover)
+    straight = np.divide(colour, alpha, out=np.zeros_like(colour), where=alpha > 0.0)
+    rgba: NDArray[np.uint8] = np.rint(np.dstack([straight, 255.0 * alpha])).astype(np.uint8)
+    return rgba
 
 
 def _sprite(paint: Callable[P, NDArray[np.uint8]]) -> Callable[P, pygame.Surface]:
@@ -54,7 +98,7 @@ def blank(width: int, height: int) -> pygame.Surface:
 
 
 @_sprite
-def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[np.uint8]:
+def robot(radius: float, colour: palette.RGB, heading: int, is_faulty: bool) -> NDArray[np.uint8]:
     """Return a disc with a nose; a faulty robot's edge is thick.
 
     Args:
@@ -66,8 +110,8 @@ def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[
     x, y = pixels(nose)
     turned = -2.0 * math.pi * heading / HEADINGS
     return painted(
-        (wedge(x, y, turned, nose, radius * 0.5, radius * 0.6 + 0.5), INK, 1.0),
-        (disc(x, y, radius), INK, 1.0),
+        (wedge(x, y, turned, nose, radius * 0.5, radius * 0.6 + 0.5), palette.INK, 1.0),
+        (disc(x, y, radius), palette.INK, 1.0),
         (disc(x, y, radius - edge), colour, 1.0),
     )
 
@@ -79,7 +123,7 @@ def halo(radius: float, age: int) -> NDArray[np.uint8]:
     reach = radius * (1.5 + 1.0 * strength)
     x, y = pixels(reach)
     fading = np.clip((reach - np.hypot(x, y)) / (reach - radius), 0.0, 1.0)
-    glow = painted((disc(x, y, reach), TIMER, 0.25 + 0.4 * strength))
+    glow = painted((disc(x, y, reach), palette.TIMER, 0.25 + 0.4 * strength))
     glow[..., 3] = np.rint(glow[..., 3] * fading**0.7)
     return glow
 
@@ -92,8 +136,8 @@ def item(half: float, is_requested: bool) -> NDArray[np.uint8]:
     edge = max(1, round(0.2 * half))
     inner = half - edge
     return painted(
-        (box(x, y, half, half), INK if is_requested else ITEM_EDGE, 1.0),
-        (box(x, y, inner, inner), REQUESTED if is_requested else ITEM, 1.0),
+        (box(x, y, half, half), palette.INK if is_requested else palette.ITEM_EDGE, 1.0),
+        (box(x, y, inner, inner), palette.REQUESTED if is_requested else palette.ITEM, 1.0),
     )
 
 
@@ -116,32 +160,34 @@ def target(radius: float) -> NDArray[np.uint8]:
     ]
     shape = np.minimum.reduce([ring(x, y, radius + width / 2, width), *ticks])
     # A white edge keeps it apart from whatever lies below.
-    return painted((shape - 1.0, FLOOR, 0.8), (shape, REQUESTED, 1.0))
+    return painted((shape - 1.0, palette.FLOOR, 0.8), (shape, palette.REQUESTED, 1.0))
 
 
 @_sprite
 def obstacle(radius: float) -> NDArray[np.uint8]:
     """Return a solid disc of that radius [px]."""
     x, y = pixels(radius)
-    return painted((disc(x, y, radius), INK, 1.0), (disc(x, y, radius - 2.0), OBSTACLE, 1.0))
+    return painted(
+        (disc(x, y, radius), palette.INK, 1.0), (disc(x, y, radius - 2.0), palette.OBSTACLE, 1.0)
+    )
 
 
 @_sprite
-def circle(radius: float, width: float, colour: RGB) -> NDArray[np.uint8]:
+def circle(radius: float, width: float, colour: palette.RGB) -> NDArray[np.uint8]:
     """Return a thin circle; all lengths in pixels."""
     x, y = pixels(radius + width)
     return painted((ring(x, y, radius, width), colour, 1.0))
 
 
 @_sprite
-def dot(radius: float, colour: RGB) -> NDArray[np.uint8]:
+def dot(radius: float, colour: palette.RGB) -> NDArray[np.uint8]:
     """Return a plain disc of that radius [px]."""
     x, y = pixels(radius)
     return painted((disc(x, y, radius), colour, 1.0))
 
 
 @_sprite
-def arrowhead(length: float, heading: int, colour: RGB) -> NDArray[np.uint8]:
+def arrowhead(length: float, heading: int, colour: palette.RGB) -> NDArray[np.uint8]:
     """Return a triangle of that length [px] with its tip in the middle of the picture."""
     x, y = pixels(1.2 * length)
     turned = -2.0 * math.pi * heading / HEADINGS
@@ -160,7 +206,7 @@ def _fast(surface: pygame.Surface) -> pygame.Surface:
 
 
 @lru_cache(maxsize=512)
-def words(text: str, height: int, colour: RGB) -> pygame.Surface:
+def words(text: str, height: int, colour: palette.RGB) -> pygame.Surface:
     """Return a line of text of that height [px], in the font that pygame brings along."""
     # A font is not kept, because a pygame.quit() elsewhere would make it unusable.
     pygame.font.init()
@@ -174,15 +220,15 @@ def words(text: str, height: int, colour: RGB) -> pygame.Surface:
 @lru_cache(maxsize=256)
 def badge(mark: str, height: int) -> pygame.Surface:
     """Return a mark in white on a black pill of that height [px]."""
-    text = words(mark, round(1.25 * height), FLOOR)
+    text = words(mark, round(1.25 * height), palette.FLOOR)
     text = text.subsurface(text.get_bounding_rect())
     radius = height / 2
     half_width = max(radius, text.get_width() / 2 + 0.3 * height)
     x, y = pixels(half_width)
     y = y[np.abs(y[:, 0]) <= radius + 2.0]
     rgba = painted(
-        (pill(x, y, half_width + 1.0, radius + 1.0), FLOOR, 0.9),
-        (pill(x, y, half_width, radius), INK, 1.0),
+        (pill(x, y, half_width + 1.0, radius + 1.0), palette.FLOOR, 0.9),
+        (pill(x, y, half_width, radius), palette.INK, 1.0),
     )
     size = (rgba.shape[1], rgba.shape[0])
     surface = pygame.image.frombytes(rgba.tobytes(), size, "RGBA")

@@ -6,16 +6,9 @@ from collections.abc import Callable, Sequence
 
 import pygame
 
+from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.rendering.canvas import Point, draw_line, new_canvas
 from swarm_logistics_env.rendering.curves import Curve, Event
-from swarm_logistics_env.rendering.palette import (
-    FLOOR,
-    FLOOR_LINE,
-    INK,
-    RGB,
-    RUNS,
-    SURROUNDINGS,
-)
 from swarm_logistics_env.rendering.sprites import badge, words
 
 _GRID_LINES = 4
@@ -32,12 +25,13 @@ def draw_strip(
 
     Args:
         size: width and height [px].
-        curves: the runs.
-        duration: where the time axis ends [s].
+        curves: the deliveries of each run.
+        events: failures and repairs; each is marked on the time axis.
+        duration: the end of the time axis [s].
     """
     width, height = size
     canvas = new_canvas(width, height)
-    canvas.fill(SURROUNDINGS)
+    canvas.fill(palette.SURROUNDINGS)
     line = round(1.2 * text_height)
     top = _draw_names(canvas, curves, width, text_height) + line
     plot = pygame.Rect(
@@ -46,7 +40,7 @@ def draw_strip(
         max(1, width - 3 * text_height),
         max(1, height - top - line - text_height // 3),
     )
-    canvas.fill(FLOOR, plot)
+    canvas.fill(palette.FLOOR, plot)
     most = _round_up(max((len(curve.times) for curve in curves), default=0))
 
     def place(time: float, count: float) -> Point:
@@ -56,28 +50,30 @@ def draw_strip(
     for step in range(_GRID_LINES + 1):
         share = step / _GRID_LINES
         x, _ = place(share * duration, 0)
-        pygame.draw.line(canvas, FLOOR_LINE, (round(x), plot.top), (round(x), plot.bottom))
-        seconds = words(f"{share * duration:.4g} s", text_height, INK)
+        pygame.draw.line(canvas, palette.FLOOR_LINE, (round(x), plot.top), (round(x), plot.bottom))
+        seconds = words(f"{share * duration:.4g} s", text_height, palette.INK)
         canvas.blit(
             seconds, seconds.get_rect(midtop=(round(x), plot.bottom + 3)).clamp(canvas.get_rect())
         )
     for count in (0, most):
-        name = words(f"{count}", text_height, INK)
+        name = words(f"{count}", text_height, palette.INK)
         canvas.blit(name, name.get_rect(midright=(plot.left - 4, round(place(0, count)[1]))))
     last, row = -plot.width, 0
     for time, label in _marks(events, duration / plot.width):
         x = round(place(time, 0)[0])
-        pygame.draw.line(canvas, INK, (x, plot.top), (x, plot.bottom))
+        pygame.draw.line(canvas, palette.INK, (x, plot.top), (x, plot.bottom))
         sign = badge(label, round(0.75 * text_height))
         # Marks that would lie on one another are drawn one below the other.
         row = (row + 1) % 4 if x - last < sign.get_width() else 0
         last, y = x, plot.top + 2 + row * sign.get_height()
         canvas.blit(sign, sign.get_rect(midtop=(x, y)).clamp(plot))
     # Thin curves are drawn over thick ones, so that both are seen where two runs are the same.
-    for curve in sorted(curves, key=lambda curve: -RUNS[curve.style % len(RUNS)][1]):
-        colour, thick = RUNS[curve.style % len(RUNS)]
+    for curve in sorted(
+        curves, key=lambda curve: -palette.RUNS[curve.style % len(palette.RUNS)][1]
+    ):
+        colour, thick = palette.RUNS[curve.style % len(palette.RUNS)]
         _draw_staircase(canvas, curve, place, colour, thick * max(1.0, text_height / 18))
-    pygame.draw.rect(canvas, INK, plot.inflate(2, 2), 1)
+    pygame.draw.rect(canvas, palette.INK, plot.inflate(2, 2), 1)
     return canvas
 
 
@@ -95,11 +91,11 @@ def _marks(events: Sequence[Event], apart: float) -> list[tuple[float, str]]:
 def _draw_names(
     canvas: pygame.Surface, curves: Sequence[Curve], width: int, text_height: int
 ) -> int:
-    """Write whose curve is which; return where the last line of it begins [px]."""
+    """Write which curve is which; return the top of the last line of names [px]."""
     x, y = text_height // 2, text_height // 3
     for curve in curves:
-        colour, thick = RUNS[curve.style % len(RUNS)]
-        name = words(f"{curve.name}: {len(curve.times)} delivered", text_height, INK)
+        colour, thick = palette.RUNS[curve.style % len(palette.RUNS)]
+        name = words(f"{curve.name}: {len(curve.times)} delivered", text_height, palette.INK)
         sample = round(1.5 * text_height)
         if x > text_height and x + sample + name.get_width() + 10 > width:
             x, y = text_height // 2, y + round(1.2 * text_height)
@@ -114,7 +110,7 @@ def _draw_staircase(
     canvas: pygame.Surface,
     curve: Curve,
     place: Callable[[float, float], Point],
-    colour: RGB,
+    colour: palette.RGB,
     width: float,
 ) -> None:
     before = place(0.0, 0)

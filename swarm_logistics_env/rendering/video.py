@@ -29,10 +29,11 @@ _PALETTE_SIDE = 16  # px, as ffmpeg wants palettes
 
 
 def check_film(path: Path) -> None:
-    """Find out whether a film can be written there, before any of it is made.
+    """Check that a film can be written there, before any of it is made.
 
     Raises:
-        SetupError: no such kind of film, no such folder, or imageio-ffmpeg is not installed.
+        SetupError: the name ends otherwise than in .mp4 or .gif, the folder cannot be written to,
+            or imageio-ffmpeg is not installed.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise SetupError(f"{path}: should end in {' or '.join(SUFFIXES)}")
@@ -42,14 +43,15 @@ def check_film(path: Path) -> None:
 
 
 def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
-    """Write frames of one size as a film and return how many; nothing of it is left if it fails.
+    """Write frames of one size as a film and return how many; if it fails, no file is left.
 
     Args:
-        path: ends in .mp4 or .gif; what is there is replaced once the film is whole.
-        frame_rate: [1/s].
+        path: a file name that ends in .mp4 or .gif; an older file is replaced when the film is
+            complete.
+        frame_rate: the number of frames per second [1/s].
 
     Raises:
-        SetupError: as `check_film`; there are no frames, or ffmpeg fails.
+        SetupError: as `check_film` raises it; or there are no frames, or ffmpeg fails.
     """
     check_film(path)
     with _becoming(path) as whole:

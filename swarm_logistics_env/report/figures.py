@@ -41,7 +41,7 @@ def marks(results: StudyResults) -> str:
     """Return what the marks of a figure of indicators mean."""
     return (
         "Filled: the Holm-adjusted verdict is decided; hollow: inconclusive; bars: "
-        f"{percent(results.level)} intervals, an arrow where a bar leaves the axis; dashed: "
+        f"{percent(results.confidence)} intervals, an arrow where a bar leaves the axis; dashed: "
         "thresholds"
     )
 

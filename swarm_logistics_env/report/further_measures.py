@@ -15,7 +15,7 @@ from swarm_logistics_env.studies.fault_runs import (
     anchoring_loads,
     fault_budgets,
 )
-from swarm_logistics_env.studies.results import LEVEL, StudyResults
+from swarm_logistics_env.studies.results import CONFIDENCE, StudyResults
 from swarm_logistics_env.studies.size_series import SizeSeries, steps
 
 _WORTH = (
@@ -164,7 +164,7 @@ def _looks(results: StudyResults) -> Section:
     n_seeds = len(results.plan.seeds)
     rows = []
     for number, (look, alpha) in enumerate(
-        zip(results.looks, spi.look_levels(results.looks, 1 - LEVEL)), start=1
+        zip(results.looks, spi.look_alphas(results.looks, 1 - CONFIDENCE)), start=1
     ):
         when = "past" if look < n_seeds else "to come" if look > n_seeds else "this report"
         rows.append(

@@ -46,10 +46,10 @@ def compared(results: StudyResults) -> Iterator[Section]:
     cells_by_table = cells_against_baseline(results)
     for figure in difference_figures(results, cells_by_table, entries):
         yield Section("", figures=(figure,))
-    level = wording.percent(results.level)
+    confidence = wording.percent(results.confidence)
     for table in dict.fromkeys(one.table for one in entries):
         here = [one for one in entries if one.table == table]
-        yield _indicators(table, here, policies, level)
+        yield _indicators(table, here, policies, confidence)
     for table, cells in cells_by_table.items():
         yield _cells(table, cells, policies[0])
 
@@ -81,9 +81,9 @@ def _matrix(results: StudyResults, policies: tuple[str, ...]) -> Section:
 
 
 def _indicators(
-    table: str, entries: list[IndicatorAgainstBaseline], policies: tuple[str, ...], level: str
+    table: str, entries: list[IndicatorAgainstBaseline], policies: tuple[str, ...], confidence: str
 ) -> Section:
-    columns = ["question", *(f"{policy} [{level}]" for policy in policies)]
+    columns = ["question", *(f"{policy} [{confidence}]" for policy in policies)]
     columns += [f"{policy} - {policies[0]} [95 %]" for policy in policies[1:]]
     rows = []
     for one in entries:

@@ -103,7 +103,7 @@ def _answers(
     """
     indicator = asked[0].comparison.indicator
     properties = list(dict.fromkeys(test.property_name for test in asked))
-    columns = [f"{indicator} [{wording.percent(results.level)}]"]
+    columns = [f"{indicator} [{wording.percent(results.confidence)}]"]
     columns += [f"{indicator} paper"] if published else []
     for name in properties:
         columns += [name, "paper"] if published else [name]
@@ -146,7 +146,7 @@ def _claims(results: StudyResults, policy: str) -> Iterator[Section]:
             )
         )
     columns = (
-        "indicator", "claim", "paper", f"ours [{wording.percent(results.level)}]", "claim is",
+        "indicator", "claim", "paper", f"ours [{wording.percent(results.confidence)}]", "claim is",
         "under Holm", "seeds for 80 % power at the paper's value",
     )  # fmt: skip
     lines = (

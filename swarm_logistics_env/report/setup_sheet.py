@@ -7,12 +7,15 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any
 
+from swarm_logistics_env.report.recorded_setup import recorded_setup
 from swarm_logistics_env.report.result_tables import NOTHING, Section
 from swarm_logistics_env.studies.plan import Plan
 
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:
     """Return everything that was held fixed and everything that was varied."""
+    if plan.imported_from is not None:
+        return recorded_setup(plan)
     specification = plan.specification
     policies = {condition.policy for condition in plan.conditions}
     return (
@@ -40,17 +43,6 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
 
 def _study(plan: Plan) -> tuple[str, ...]:
     name = plan.specification.name
-    if plan.imported_from is not None:
-        shared = (
-            "Paired by the seeds that it names" if plan.paired else "Unpaired: it names no seeds"
-        )
-        return (
-            (
-                f"Study {name!r}: {len(plan.conditions)} conditions, imported from "
-                f"{plan.imported_from}. {shared}. Of their conditions only what varies is known: "
-                "the scenario below is this package's default, not theirs."
-            ),
-        )
     return (
         (
             f"Study {name!r}: {len(plan.conditions)} conditions x {len(plan.seeds)} seeds "

@@ -44,9 +44,9 @@ def fixed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def percent(level: float) -> str:
-    """Return a confidence level, e.g. "95 %"; of an early look never rounded up to 100 %."""
-    return "> 99.99 %" if level > 0.9999 else f"{100 * level:.4g} %"
+def percent(confidence: float) -> str:
+    """Return a confidence, e.g. "95 %"; of an early look never rounded up to 100 %."""
+    return "> 99.99 %" if confidence > 0.9999 else f"{100 * confidence:.4g} %"
 
 
 def limits(interval: Interval | None) -> str:
@@ -189,11 +189,11 @@ def _conditions(test: IndicatorTest) -> str:
 
 
 def _interval(estimate: Estimate) -> str:
-    level = percent(estimate.level)
+    confidence = percent(estimate.confidence)
     if estimate.low is None or estimate.high is None:
         return f"{estimate.value:.3f} (no interval)"
     low, high = fixed(estimate.low, 3), fixed(estimate.high, 3)
-    return f"{fixed(estimate.value, 3)}, {level} interval [{low}, {high}]"
+    return f"{fixed(estimate.value, 3)}, {confidence} interval [{low}, {high}]"
 
 
 def _seeds(results: StudyResults, estimate: Estimate) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .efficiency import karp_flatt, marginal_gain, per_robot_efficiency
-from .estimate import Estimate, Verdict
+from .efficiency import karp_flatt
+from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
 from .indicators import (
     adaptability,
@@ -23,7 +23,8 @@ from .power import (
 from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
-from .sequential import LookVerdict, look_levels, verdict_at_look
+from .sequential import look_alphas
+from .simulation import Simulation
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -34,16 +35,20 @@ from .summaries import (
     worst_decile,
 )
 from .survival import SurvivalCurve, kaplan_meier
+from .trials import Trial, Trials, read_trials
 
 __all__ = [
     "Estimate",
     "FaultBudget",
     "IndicatorError",
     "Interval",
-    "LookVerdict",
+    "Options",
     "ScalingFit",
     "SelfRepair",
+    "Simulation",
     "SurvivalCurve",
+    "Trial",
+    "Trials",
     "Verdict",
     "adaptability",
     "adjust",
@@ -56,16 +61,15 @@ __all__ = [
     "interquartile_mean",
     "kaplan_meier",
     "karp_flatt",
-    "look_levels",
+    "look_alphas",
     "lower_decile_of_power",
-    "marginal_gain",
     "mean_interval",
     "minimum_detectable_effect",
     "no_plan_because",
     "pairing_correlation",
-    "per_robot_efficiency",
     "prediction_interval",
     "probability_of_improvement",
+    "read_trials",
     "relative_change",
     "repair_times",
     "resilience_index",
@@ -73,6 +77,5 @@ __all__ = [
     "scalability",
     "seeds_for_power",
     "self_repair",
-    "verdict_at_look",
     "worst_decile",
 ]

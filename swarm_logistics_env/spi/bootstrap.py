@@ -16,7 +16,7 @@ _FLAT = 1e-12
 def resampled_pivots(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return sqrt(n) mean / sd of resampled seeds, in ascending order.
 
-    Dividing by the deviation of each resample is what keeps the error level at ten seeds;
+    Dividing by the deviation of each resample is what keeps the error at alpha at ten seeds;
     percentile and BCa intervals lose it. The same seeds are drawn at every call, so that equal
     data give equal verdicts.
 
@@ -49,7 +49,7 @@ def critical_value(pivots: NDArray[np.float64], alpha: float) -> NDArray[np.floa
 
     Args:
         pivots: Ascending along the first axis, shape (RESAMPLES, ...).
-        alpha: Two-sided level of the test, in (0, 1).
+        alpha: Two-sided error of the test, in (0, 1).
     """
     # upper_p < alpha / 2 exactly where at most `most` pivots lie at or above the statistic.
     most = int(np.ceil(alpha * (RESAMPLES + 1) / 2 - 1)) - 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from .bootstrap import MIN_SEEDS
 from .inputs import IndicatorError, between_0_and_1, finite, performance, positive_mean, same_seeds
 from .ratio import RatioTest, paired_ratio
+from .simulation import Simulation, combined_ratio, simulated_samples
 from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
 
@@ -33,14 +34,14 @@ class Estimate:
     Attributes:
         indicator: Which indicator this is.
         value: The ratio of means plus offset, dimensionless.
-        low: Lower limit of the interval at `level`; -inf where the interval is unbounded. None at
-            n = 1 and where the differences show no spread; `value` where the value is exact.
+        low: Lower limit of the interval; -inf where the interval is unbounded. None at n = 1 and
+            where the differences show no spread; `value` where the value is exact.
         high: Upper limit of the interval; inf where the interval is unbounded; None as `low`.
         probability: Confidence that theta > threshold, in [0, 1], not a posterior frequency:
             1 - p/2 where mean(D) > 0, else p/2, D = num - (threshold - offset) den.
-        verdict: On theta > threshold, one-sided (1 - level)/2 on each side, unadjusted.
+        verdict: On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted.
         threshold: The value that theta is tested against.
-        level: Confidence level of the interval, in (0, 1).
+        confidence: Of the interval, in (0, 1).
         n_seeds: Number of seeds; of the smallest sample where unpaired.
         p_value: Two-sided p of mean(D) = 0, in [0, 1]: what Holm acts on. From ten paired seeds on
             the larger of the t test's and the studentised bootstrap's.
@@ -55,8 +56,9 @@ class Estimate:
             runs: the value is exact, and no evidence), "capped" (a capped P blocks the verdict on
             the side that it leans to: p = 1), "unbounded" (the mean denominator is not
             distinguishable from 0), "assumes_normal" (below ten paired seeds, or unpaired: the
-            verdict rests on normal differences), "skewed" (D is so skewed that the verdict errs
-            more often than its level at this n).
+            verdict rests on normal differences), "with_simulation" (simulated runs narrow the
+            interval; the verdict rests on normal differences), "skewed" (D is so skewed that the
+            verdict errs more often than it promises at this n).
     """
 
     indicator: str
@@ -66,7 +68,7 @@ class Estimate:
     probability: float | None = None
     verdict: Verdict = "inconclusive"
     threshold: float
-    level: float
+    confidence: float
     n_seeds: int
     p_value: float | None = None
     paired: bool
@@ -93,7 +95,7 @@ class Estimate:
 
 
 def verdict_at(alpha: float, p_value: float | None, probability: float | None) -> Verdict:
-    """Judge theta > threshold by a two-sided p at level `alpha`; `probability` gives the side.
+    """Judge theta > threshold by a two-sided p against `alpha`; `probability` gives the side.
 
     No p (one seed) is inconclusive.
     """
@@ -107,18 +109,44 @@ def verdict_at(alpha: float, p_value: float | None, probability: float | None) -
 LEAST_SEEDS = 3
 
 
+class Options(TypedDict, total=False):
+    """What every indicator takes besides its performances.
+
+    Attributes:
+        threshold: What theta is tested against, finite; 0 if not given.
+        confidence: Of the interval, in (0, 1); 0.95 if not given.
+        paired: Whether row i of every sample is the same seed; False for results that come without
+            seeds; True if not given.
+        saturated: Names of the performances that are capped (every item delivered in a run). The
+            true P is then larger: a reference that is capped blocks "supported", a changed
+            condition that is capped blocks "refuted".
+        identical: Whether the runs compared are the same runs, seed by seed: the value is then
+            exact.
+        simulation: Simulated runs of the same set-ups and of further ones, to narrow the interval;
+            for at least ten paired real runs.
+    """
+
+    threshold: float
+    confidence: float
+    paired: bool
+    saturated: Collection[str]
+    identical: bool
+    simulation: Simulation | None
+
+
 def judge(
     indicator: str,
     terms: Mapping[str, tuple[ArrayLike, float, float]],
     *,
     offset: float,
-    threshold: float,
-    level: float,
-    paired: bool,
+    threshold: float = 0.0,
+    confidence: float = 0.95,
+    paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
+    simulation: Simulation | None = None,
 ) -> Estimate:
-    """Estimate one ratio of means and judge it against `threshold`.
+    """Estimate one ratio of means and judge it against `threshold`; see `Options`.
 
     Args:
         indicator: Its name.
@@ -126,61 +154,51 @@ def judge(
             denominator; the first two are compared, the last is the reference that the ratio
             divides by.
         offset: Added to the ratio of means.
-        threshold: What theta is tested against, finite.
-        level: Confidence level, in (0, 1).
-        paired: Whether row i of every sample is the same seed.
-        saturated: Names of the terms whose P is capped (every item delivered in a run). The true P
-            is then larger: a reference that is capped blocks "supported", a changed condition that
-            is capped blocks "refuted".
-        identical: Whether the runs compared are the same runs, seed by seed.
 
     Raises:
         IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
-            reference 0, threshold or level out of range, an unknown name in `saturated`, or
-            `identical` with performances that differ.
+            reference 0, threshold or confidence out of range, an unknown name in `saturated`,
+            `identical` with performances that differ, or a simulation that does not fit.
     """
     finite("threshold", threshold)
-    between_0_and_1("level", level)
+    between_0_and_1("confidence", confidence)
     weighted = _checked(terms, saturated, paired=paired, identical=identical)
-    samples = {name: term.sample for name, term in weighted.items()}
-    *_, reference = samples.values()
-    n_seeds = min(sample.size for sample in samples.values())
-    asked = _Asked(
-        indicator=indicator, threshold=threshold, level=level, n_seeds=n_seeds, paired=paired
+    samples = [term.sample for term in weighted.values()]
+    mean_den = float(samples[-1].mean())
+    mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
+    n_seeds = min(sample.size for sample in samples)
+    untested = Estimate(
+        indicator=indicator,
+        value=mean_num / mean_den + offset,
+        threshold=threshold,
+        confidence=confidence,
+        n_seeds=n_seeds,
+        paired=paired,
+        mean_denominator=mean_den,
     )
-    if identical or n_seeds == 1:
-        return _untested(asked, weighted, offset, identical=identical)
-
-    flags = []
-    correlation = None
-    if paired:
-        num, den = _numerator(weighted), reference
-        test = paired_ratio(num, den, offset=offset, threshold=threshold, level=level)
-        correlation = pairing_correlation(*list(samples.values())[:2])
-        # Without spread the skewness of D would be one of rounding errors.
-        if not test.degenerate and _skewed(num - (threshold - offset) * den):
-            flags.append("skewed")
-    else:
-        test = unpaired_ratio(
-            list(weighted.values()), offset=offset, threshold=threshold, level=level
-        )
+    if identical:  # the same runs leave nothing to test
+        value = untested.value
+        return replace(untested, low=value, high=value, flags=("identical",))
+    if n_seeds == 1 and simulation is None:
+        return replace(untested, flags=("single_seed",))
+    test, flags = _tested(untested, weighted, offset, simulation)
     p_value, probability = float(test.p_value), float(test.probability)
     flags += _flags(test, n_seeds, _capped_side(weighted, saturated))
     if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
         p_value, probability = 1.0, 0.5
-    elif not paired or n_seeds < MIN_SEEDS:
+    elif not paired or n_seeds < MIN_SEEDS or simulation is not None:
         flags.append("assumes_normal")
     if test.unbounded:
         flags.append("unbounded")
-    return Estimate(
-        **asked,
+    return replace(
+        untested,
         value=float(test.value),
         low=None if test.degenerate else float(test.low),
         high=None if test.degenerate else float(test.high),
         probability=probability,
-        verdict=verdict_at(1.0 - level, p_value, probability),
+        verdict=verdict_at(1.0 - confidence, p_value, probability),
         p_value=p_value,
-        pairing_correlation=correlation,
+        pairing_correlation=pairing_correlation(*samples[:2]) if paired else None,
         difference_sd=float(test.difference_sd),
         mean_denominator=float(test.mean_denominator),
         degrees_of_freedom=test.degrees_of_freedom,
@@ -188,30 +206,32 @@ def judge(
     )
 
 
-class _Asked(TypedDict):
-    indicator: str
-    threshold: float
-    level: float
-    n_seeds: int
-    paired: bool
-
-
-def _untested(
-    asked: _Asked, weighted: Mapping[str, Term], offset: float, *, identical: bool
-) -> Estimate:
-    """Return the value alone: one seed has no spread, and identical runs leave nothing to test."""
-    *_, reference = (term.sample for term in weighted.values())
-    mean_den = float(reference.mean())
-    mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
-    value = mean_num / mean_den + offset
-    return Estimate(
-        **asked,
-        value=value,
-        low=value if identical else None,
-        high=value if identical else None,
-        mean_denominator=mean_den,
-        flags=("identical",) if identical else ("single_seed",),
-    )
+def _tested(
+    asked: Estimate, weighted: Mapping[str, Term], offset: float, simulation: Simulation | None
+) -> tuple[RatioTest, list[str]]:
+    """Return the test that the data allow, and what to say of it."""
+    asking = {
+        "offset": offset,
+        "threshold": asked.threshold,
+        "confidence": asked.confidence,
+    }
+    if not asked.paired:
+        if simulation is not None:
+            raise IndicatorError("simulation needs paired = True: set-ups that were replayed")
+        return unpaired_ratio(list(weighted.values()), **asking), []
+    *_, reference = weighted.values()
+    num, den = _numerator(weighted), reference.sample
+    if simulation is not None:
+        weights = {name: (term.in_num, term.in_den) for name, term in weighted.items()}
+        replayed, further = (
+            simulated_samples(name, samples, weights)
+            for name, samples in zip(Simulation._fields, simulation, strict=True)
+        )
+        return combined_ratio((num, den), replayed, further, **asking), ["with_simulation"]
+    test = paired_ratio(num, den, **asking)
+    # Without spread the skewness of D would be one of rounding errors.
+    skewed = not test.degenerate and _skewed(num - (asked.threshold - offset) * den)
+    return test, ["skewed"] if skewed else []
 
 
 def _checked(
@@ -232,7 +252,12 @@ def _checked(
         if name not in samples:
             raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
     if identical:
-        _refuse_differing(samples, paired=paired)
+        first = next(iter(samples))
+        for name in samples:
+            if not paired or not np.array_equal(samples[first], samples[name]):
+                raise IndicatorError(
+                    f"identical = True, but {first} and {name} differ: should be paired and equal"
+                )
     *_, (reference_name, reference) = samples.items()
     positive_mean(reference_name, reference)
     return weighted
@@ -246,15 +271,6 @@ def _flags(test: RatioTest, n_seeds: int, capped_side: set[Verdict]) -> Iterator
         yield "degenerate"
     if ("supported" if test.probability > 0.5 else "refuted") in capped_side:
         yield "capped"
-
-
-def _refuse_differing(samples: Mapping[str, NDArray[np.float64]], *, paired: bool) -> None:
-    (name, first), *others = samples.items()
-    for other_name, other in others:
-        if not paired or not np.array_equal(first, other):
-            raise IndicatorError(
-                f"identical = True, but {name} and {other_name} differ: should be paired and equal"
-            )
 
 
 def _capped_side(terms: Mapping[str, Term], saturated: Collection[str]) -> set[Verdict]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, SupportsIndex
+from typing import TYPE_CHECKING, SupportsIndex, Unpack
 
-from .estimate import judge
+from .estimate import Options, judge
 from .inputs import IndicatorError, count, finite
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from numpy.typing import ArrayLike
 
     from .estimate import Estimate
@@ -21,11 +19,7 @@ def scalability(
     *,
     n: SupportsIndex,
     m: SupportsIndex,
-    threshold: float = 0.0,
-    level: float = 0.95,
-    paired: bool = True,
-    saturated: Collection[str] = (),
-    identical: bool = False,
+    **options: Unpack[Options],
 ) -> Estimate:
     """Scalability S = ((P_{N+m} - P_N) / P_N) / (m/N), from N to N + m robots (paper, eq. S).
 
@@ -36,11 +30,7 @@ def scalability(
         p_nm: Performance P_{N+m} over the same seeds [items].
         n: Swarm size N, at least 1.
         m: Robots added, at least 1; may exceed N.
-        threshold: What S is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
-        paired: Whether the samples share their seeds; False for results that come without seeds.
-        saturated: Names of the performances above that are capped, every item delivered in a run.
-        identical: Whether both runs of every seed are the same run: the value is then exact.
+        options: Threshold, confidence, pairing and the like: see `Options`.
 
     Raises:
         IndicatorError: Input from which S is undefined: n or m below 1, performance empty, negative
@@ -51,11 +41,7 @@ def scalability(
         "S",
         {"p_nm": (p_nm, gain, 0.0), "p_n": (p_n, -gain, 1.0)},
         offset=0.0,
-        threshold=threshold,
-        level=level,
-        paired=paired,
-        saturated=saturated,
-        identical=identical,
+        **options,
     )
 
 
@@ -66,10 +52,7 @@ def fault_tolerance(
     *,
     n: SupportsIndex | None = None,
     m: SupportsIndex | None = None,
-    threshold: float = 0.0,
-    level: float = 0.95,
-    paired: bool = True,
-    saturated: Collection[str] = (),
+    **options: Unpack[Options],
 ) -> Estimate:
     """Fault tolerance FT = (P_F - P_S) / P_o: m faulty robots against m removed (paper, eq. FT).
 
@@ -81,10 +64,7 @@ def fault_tolerance(
         p_s: Performance P_S with the same m robots removed [items].
         n: Swarm size N; FT does not depend on it, given together with m it is checked.
         m: Faulty robots, 1 <= m < N: some robot has to be left in P_S.
-        threshold: What FT is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
-        paired: Whether the samples share their seeds; False for results that come without seeds.
-        saturated: Names of the performances above that are capped, every item delivered in a run.
+        options: Threshold, confidence, pairing and the like: see `Options`.
 
     Raises:
         IndicatorError: Input from which FT is undefined: only one of n and m, m < 1, m >= N,
@@ -98,10 +78,7 @@ def fault_tolerance(
         "FT",
         {"p_f": (p_f, 1.0, 0.0), "p_s": (p_s, -1.0, 0.0), "p_o": (p_o, 0.0, 1.0)},
         offset=0.0,
-        threshold=threshold,
-        level=level,
-        paired=paired,
-        saturated=saturated,
+        **options,
     )
 
 
@@ -111,11 +88,7 @@ def robustness(
     *,
     n: SupportsIndex,
     m: SupportsIndex,
-    threshold: float = 0.0,
-    level: float = 0.95,
-    paired: bool = True,
-    saturated: Collection[str] = (),
-    identical: bool = False,
+    **options: Unpack[Options],
 ) -> Estimate:
     """Robustness R = (P_F - P_o) / P_o + m/N (paper, eq. R).
 
@@ -126,11 +99,7 @@ def robustness(
         p_f: Performance P_F with m faulty robots [items].
         n: Swarm size N, at least 1.
         m: Faulty robots, 1 <= m <= N.
-        threshold: What R is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
-        paired: Whether the samples share their seeds; False for results that come without seeds.
-        saturated: Names of the performances above that are capped, every item delivered in a run.
-        identical: Whether both runs of every seed are the same run: the value is then exact.
+        options: Threshold, confidence, pairing and the like: see `Options`.
 
     Raises:
         IndicatorError: Input from which R is undefined: m < 1, m > N, performance empty, negative
@@ -146,11 +115,7 @@ def robustness(
             "p_o": (p_o, -1.0, 1.0),
         },
         offset=faulty / robots,
-        threshold=threshold,
-        level=level,
-        paired=paired,
-        saturated=saturated,
-        identical=identical,
+        **options,
     )
 
 
@@ -160,11 +125,7 @@ def adaptability(
     *,
     x_o: float,
     x_new: float,
-    threshold: float = 0.0,
-    level: float = 0.95,
-    paired: bool = True,
-    saturated: Collection[str] = (),
-    identical: bool = False,
+    **options: Unpack[Options],
 ) -> Estimate:
     """Adaptability A = ((P_new - P_o) / P_o) / |(x_new - x_o) / x_o| + 1 (paper, eq. A).
 
@@ -175,11 +136,7 @@ def adaptability(
         p_new: Performance P_new at x_new over the same seeds [items].
         x_o: Original value of the parameter, not 0, in any unit.
         x_new: New value, not equal to x_o, in the same unit.
-        threshold: What A is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
-        paired: Whether the samples share their seeds; False for results that come without seeds.
-        saturated: Names of the performances above that are capped, every item delivered in a run.
-        identical: Whether both runs of every seed are the same run: the value is then exact.
+        options: Threshold, confidence, pairing and the like: see `Options`.
 
     Raises:
         IndicatorError: Input from which A is undefined: x_o = 0, x_new = x_o, performance empty,
@@ -194,23 +151,14 @@ def adaptability(
         "A",
         {"p_new": (p_new, gain, 0.0), "p_o": (p_o, -gain, 1.0)},
         offset=1.0,
-        threshold=threshold,
-        level=level,
-        paired=paired,
-        saturated=saturated,
-        identical=identical,
+        **options,
     )
 
 
 def relative_change(
     p_o: ArrayLike,
     p_new: ArrayLike,
-    *,
-    threshold: float = 0.0,
-    level: float = 0.95,
-    paired: bool = True,
-    saturated: Collection[str] = (),
-    identical: bool = False,
+    **options: Unpack[Options],
 ) -> Estimate:
     """Relative change (P_new - P_o) / P_o, for ablations and regressions (paper, eq. SdP).
 
@@ -219,11 +167,7 @@ def relative_change(
     Args:
         p_o: Performance P_o of the reference over seeds [items], shape (n_seeds,).
         p_new: Performance P_new over the same seeds [items].
-        threshold: What the change is tested against.
-        level: Confidence level of interval and verdict, in (0, 1).
-        paired: Whether the samples share their seeds; False for results that come without seeds.
-        saturated: Names of the performances above that are capped, every item delivered in a run.
-        identical: Whether both runs of every seed are the same run: the value is then exact.
+        options: Threshold, confidence, pairing and the like: see `Options`.
 
     Raises:
         IndicatorError: Performance empty, negative or not finite, mean P_o = 0, unequal seed sets
@@ -233,9 +177,5 @@ def relative_change(
         "change",
         {"p_new": (p_new, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)},
         offset=0.0,
-        threshold=threshold,
-        level=level,
-        paired=paired,
-        saturated=saturated,
-        identical=identical,
+        **options,
     )

@@ -44,16 +44,16 @@ def adjust(estimates: Sequence[Estimate]) -> tuple[Verdict, ...]:
 
     In the order given. An estimate without a p (one seed) counts in the family and stays
     inconclusive. One of identical runs is no evidence: it stays inconclusive and outside the
-    family. The family-wise error is 1 - level.
+    family. The family-wise error is 1 - confidence.
 
     Raises:
-        IndicatorError: The estimates' levels differ.
+        IndicatorError: The estimates' confidences differ.
     """
-    levels = sorted({estimate.level for estimate in estimates})
-    if len(levels) > 1:
-        raise IndicatorError(f"levels {levels} in one family: should be one level")
+    confidences = sorted({estimate.confidence for estimate in estimates})
+    if len(confidences) > 1:
+        raise IndicatorError(f"confidence = {confidences} in one family: should be one number")
     return tuple(
-        verdict_at(1.0 - estimate.level, p, estimate.probability)
+        verdict_at(1.0 - estimate.confidence, p, estimate.probability)
         for estimate, p in zip(estimates, adjusted_p_values(estimates), strict=True)
     )
 

@@ -25,19 +25,19 @@ _FAR_OUT = 1e3
 def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float | None:
     """Distance from the threshold that the estimate's own number of seeds finds with `power`.
 
-    In units of the indicator; the same on both sides, by two one-sided tests of (1 - level)/2. With
-    the spread's 60 % upper confidence limit, so that the power is `power` on average. None where
-    `no_plan_because` says why.
+    In units of the indicator; the same on both sides, by two one-sided tests of
+    (1 - confidence)/2. With the spread's 60 % upper confidence limit, so that the power is `power`
+    on average. None where `no_plan_because` says why.
 
     Raises:
-        IndicatorError: power outside (0, 1) or not above the tests' own (1 - level)/2.
+        IndicatorError: power outside (0, 1) or not above the tests' own (1 - confidence)/2.
     """
     _check_power(estimate, power)
     sd, df = _spread_limit(estimate, PLANNED_LIMIT), estimate.degrees_of_freedom
     if not sd or df is None:
         return None
     return (
-        _noncentrality(df, estimate.level, power)
+        _noncentrality(df, estimate.confidence, power)
         * sd
         / math.sqrt(estimate.n_seeds)
         / estimate.mean_denominator
@@ -61,7 +61,7 @@ def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> in
         The smallest n >= 2; None where `no_plan_because` says why.
 
     Raises:
-        IndicatorError: effect not finite; power outside (0, 1) or not above (1 - level)/2.
+        IndicatorError: effect not finite; power outside (0, 1) or not above (1 - confidence)/2.
     """
     _check_power(estimate, power)
     if no_plan_because(estimate, effect) is not None:
@@ -103,7 +103,7 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
         return "the runs show no spread between seeds"
     if effect == estimate.threshold:
         return f"an effect of {effect:g} lies at the threshold: no number of seeds finds it"
-    # Large samples need (z_level + z_power)^2 sd^2 / distance^2 seeds, about 8 at 80 %.
+    # Large samples need (z_confidence + z_power)^2 sd^2 / distance^2 seeds, about 8 at 80 %.
     distance = abs(effect - estimate.threshold) * estimate.mean_denominator
     if 8.0 * (_spread_limit(estimate, PLANNED_LIMIT) / distance) ** 2 > MAX_SEEDS:
         return f"an effect of {effect:g} needs more than {MAX_SEEDS:,} seeds"
@@ -112,10 +112,9 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
 
 def _check_power(estimate: Estimate, power: float) -> None:
     between_0_and_1("power", power)
-    if power <= (1.0 - estimate.level) / 2:
-        raise IndicatorError(
-            f"power = {power}: should exceed the one-sided level {(1.0 - estimate.level) / 2:g}"
-        )
+    error = (1.0 - estimate.confidence) / 2
+    if power <= error:
+        raise IndicatorError(f"power = {power}: should exceed the one-sided error {error:g}")
 
 
 def _spread_limit(estimate: Estimate, confidence: float) -> float:
@@ -135,24 +134,24 @@ def _power_at(estimate: Estimate, effect: float, n_seeds: int, confidence: float
     # Welch's degrees of freedom grow with n - 1, as the paired ones do.
     df = estimate.degrees_of_freedom * (n_seeds - 1) / (estimate.n_seeds - 1)
     noncentrality = distance / _spread_limit(estimate, confidence) * math.sqrt(n_seeds)
-    return _power(df, noncentrality, estimate.level)
+    return _power(df, noncentrality, estimate.confidence)
 
 
-def _power(df: float, noncentrality: float, level: float) -> float:
-    """Chance of a verdict on the right side by the one-sided t-test of (1 - level)/2."""
+def _power(df: float, noncentrality: float, confidence: float) -> float:
+    """Chance of a verdict on the right side by the one-sided t-test of (1 - confidence)/2."""
     from scipy.special import chdtr, nctdtr, stdtrit
 
-    critical = float(stdtrit(df, 0.5 + level / 2))
+    critical = float(stdtrit(df, 0.5 + confidence / 2))
     if critical > _FAR_OUT:
         return float(chdtr(df, df * (noncentrality / critical) ** 2))
     return 1.0 - float(nctdtr(df, noncentrality, critical))
 
 
-def _noncentrality(df: float, level: float, power: float) -> float:
-    """Noncentrality at which the one-sided test of (1 - level)/2 has the wanted power."""
+def _noncentrality(df: float, confidence: float, power: float) -> float:
+    """Noncentrality at which the one-sided test of (1 - confidence)/2 has the wanted power."""
     from scipy.special import chdtri, nctdtrinc, stdtrit
 
-    critical = float(stdtrit(df, 0.5 + level / 2))
+    critical = float(stdtrit(df, 0.5 + confidence / 2))
     if critical > _FAR_OUT:
         return critical * math.sqrt(float(chdtri(df, 1.0 - power)) / df)
     return float(nctdtrinc(df, 1.0 - power, critical))

@@ -42,7 +42,7 @@ def paired_ratio(
     *,
     offset: float = 0.0,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
 ) -> RatioTest:
     """Interval and test of theta over paired seeds, for one study or many at once.
 
@@ -51,17 +51,17 @@ def paired_ratio(
         den: Denominators of the same shape, mean over the last axis > 0.
         offset: Added to the ratio of means.
         threshold: The theta that the test compares with.
-        level: Confidence level of the Fieller interval, in (0, 1).
+        confidence: Of the Fieller interval, in (0, 1).
 
     Returns:
         Arrays of shape (...). The interval inverts the test: it excludes `threshold` exactly where
-        p_value < 1 - level, but where it is unbounded (limits -inf, inf). Differences without
+        p_value < 1 - confidence, but where it is unbounded (limits -inf, inf). Differences without
         spread (`degenerate`) have p = 1 and no limits.
     """
     from scipy.special import stdtr, stdtrit
 
     n = num.shape[-1]
-    df, alpha = n - 1, 1.0 - level
+    df, alpha = n - 1, 1.0 - confidence
     value = num.mean(axis=-1) / den.mean(axis=-1)
 
     null = threshold - offset
@@ -72,7 +72,7 @@ def paired_ratio(
     degenerate = np.ptp(difference, axis=-1) <= rounding
     statistic = mean_difference / (np.where(degenerate, 1.0, sd) / np.sqrt(n))
     above, below = stdtr(df, -statistic), stdtr(df, statistic)
-    t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + level / 2)))
+    t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + confidence / 2)))
     if n >= MIN_SEEDS:
         pivots = resampled_pivots(num - value[..., np.newaxis] * den)
         mirrored = -pivots[::-1]
@@ -127,6 +127,26 @@ def fieller_limits(
     s_rd = (residual * den_centred).sum(axis=-1) / scale
     s_dd = np.square(den_centred).sum(axis=-1) / scale
 
+    return limits_from_moments(value, mean_den, s_rr, s_rd, s_dd, (t_low, t_high))
+
+
+def limits_from_moments(
+    value: NDArray[np.float64],
+    mean_den: NDArray[np.float64],
+    s_rr: NDArray[np.float64],
+    s_rd: NDArray[np.float64],
+    s_dd: NDArray[np.float64],
+    critical: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Limits around a ratio of means `value`, and where they are unbounded.
+
+    Args:
+        value, mean_den: the ratio and the mean of its denominator, shape (...).
+        s_rr, s_rd, s_dd: squared standard errors and their covariance, of the mean residual
+            num - value den and of `mean_den`.
+        critical: of the lower and of the upper limit, positive; inf for no limit.
+    """
+
     def limit(t: NDArray[np.float64], side: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         finite = np.where(np.isfinite(t), t, 0.0)
         a = mean_den**2 - finite**2 * s_dd
@@ -135,7 +155,7 @@ def fieller_limits(
         shift = (-(finite**2) * s_rd + side * root) / np.where(unbounded, 1.0, a)
         return value + shift, unbounded
 
-    low, low_unbounded = limit(t_low, -1)
-    high, high_unbounded = limit(t_high, 1)
+    low, low_unbounded = limit(critical[0], -1)
+    high, high_unbounded = limit(critical[1], 1)
     unbounded = low_unbounded | high_unbounded
     return np.where(unbounded, -np.inf, low), np.where(unbounded, np.inf, high), unbounded

@@ -23,7 +23,8 @@ def resilience_index(
     *,
     onset: float,
     threshold: float = 1.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
+    paired: bool = True,
 ) -> Estimate:
     """Deliveries after the onset over the paired reference's, as a ratio of means over seeds.
 
@@ -35,7 +36,8 @@ def resilience_index(
         reference: Delivery times [s] of the same seeds' reference runs.
         onset: When the faults begin [s]; later deliveries count.
         threshold: What the index is tested against.
-        level: Confidence level, in (0, 1).
+        confidence: Of the interval, in (0, 1).
+        paired: Whether both share their seeds, run by run.
 
     Raises:
         IndicatorError: No seeds, unequal numbers of seeds, a time negative or not finite, or no
@@ -55,6 +57,6 @@ def resilience_index(
         },
         offset=0.0,
         threshold=threshold,
-        level=level,
-        paired=True,
+        confidence=confidence,
+        paired=paired,
     )

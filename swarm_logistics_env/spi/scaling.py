@@ -42,7 +42,7 @@ class ScalingFit:
         peak_low: Lower limit of N* from the profile of the residual sum; None without a peak,
             0 where the data set no lower limit.
         peak_high: Its upper limit; inf where the data set none.
-        level: Confidence level of that interval.
+        confidence: Of that interval.
         weighting: "1/P" minimises the sum of residual^2 / P, "none" that of residual^2. N* moves
             with it, so it is never to be quoted without.
         residual_sum: The sum that was minimised.
@@ -55,7 +55,7 @@ class ScalingFit:
     peak: float | None
     peak_low: float | None
     peak_high: float | None
-    level: float
+    confidence: float
     weighting: Weighting
     residual_sum: float
     aicc: float | None
@@ -72,7 +72,7 @@ def fit_scaling(
     *,
     law: Law = "usl",
     weighting: Weighting = "1/P",
-    level: float = 0.95,
+    confidence: float = 0.95,
 ) -> ScalingFit:
     """Fit one law to mean performance at each swarm size (Gunther 2007 for the USL).
 
@@ -82,13 +82,13 @@ def fit_scaling(
         law: Which law.
         weighting: Weight of each squared residual: 1/P (counts: their variance grows with them) or
             none.
-        level: Confidence level of the interval of N*, in (0, 1).
+        confidence: Of the interval of N*, in (0, 1).
 
     Raises:
         IndicatorError: Unequal lengths, fewer than four sizes, a size not positive or repeated, a P
             not finite or negative, P = 0 under 1/P, an unknown law or weighting, or no convergence.
     """
-    between_0_and_1("level", level)
+    between_0_and_1("confidence", confidence)
     if law not in CURVES:
         raise IndicatorError(f"law = {law!r}: should be one of {', '.join(CURVES)}")
     n, observed = _checked(sizes, p, weighting)
@@ -101,7 +101,9 @@ def fit_scaling(
     if peak is not None:
         # The search starts below the sharpness of the fit, which may be nearly flat.
         bluntest = min(-_SHARPNESS, sharpness_of(law, fitted, peak) - 5.0)
-        low, high = _peak_limits(law, peak, bluntest, residual_sum, n, observed, weights, level)
+        low, high = _peak_limits(
+            law, peak, bluntest, residual_sum, n, observed, weights, confidence
+        )
     names = ("g", "a", "b") if law == "usl" else ("k", "p", "q")
     return ScalingFit(
         law=law,
@@ -109,7 +111,7 @@ def fit_scaling(
         peak=peak,
         peak_low=low,
         peak_high=high,
-        level=level,
+        confidence=confidence,
         weighting=weighting,
         residual_sum=residual_sum,
         aicc=_aicc(residual_sum, n.size),
@@ -117,14 +119,16 @@ def fit_scaling(
 
 
 def compare_scaling(
-    sizes: ArrayLike, p: ArrayLike, *, weighting: Weighting = "1/P", level: float = 0.95
+    sizes: ArrayLike, p: ArrayLike, *, weighting: Weighting = "1/P", confidence: float = 0.95
 ) -> tuple[ScalingFit, ...]:
     """Both laws on the same data, the one with the smaller AICc (or residual sum) first.
 
     Raises:
         IndicatorError: As `fit_scaling`.
     """
-    fits = [fit_scaling(sizes, p, law=law, weighting=weighting, level=level) for law in CURVES]
+    fits = [
+        fit_scaling(sizes, p, law=law, weighting=weighting, confidence=confidence) for law in CURVES
+    ]
     # Both laws have three parameters, so the residual sum gives the order of AICc, defined or not.
     return tuple(sorted(fits, key=lambda fit: fit.residual_sum))
 
@@ -179,16 +183,16 @@ def _peak_limits(
     n: NDArray[np.float64],
     observed: NDArray[np.float64],
     weights: NDArray[np.float64],
-    level: float,
+    confidence: float,
 ) -> tuple[float, float]:
-    """Every N* whose best fit is not worse than the best of all by an F-test at `level`."""
+    """Every N* whose best fit is not worse than the best of all by an F-test at `confidence`."""
     from scipy.optimize import brentq
     from scipy.special import stdtrit
 
     if residual_sum <= 1e-12 * float(np.square(observed * weights).sum()):  # the law fits exactly
         return peak, peak
     df = n.size - 3
-    allowed = residual_sum * (1.0 + float(stdtrit(df, 0.5 + level / 2)) ** 2 / df)
+    allowed = residual_sum * (1.0 + float(stdtrit(df, 0.5 + confidence / 2)) ** 2 / df)
 
     def excess(log_peak: float) -> float:
         return _residual_sum_at(law, math.exp(log_peak), bluntest, n, observed, weights) - allowed

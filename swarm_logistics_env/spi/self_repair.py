@@ -32,7 +32,7 @@ class SelfRepair:
         followed: How long the runs were followed after the onset [s].
         p_value: Of "nothing is lost", one-sided: pairs swapped at random lose as much.
         null_seconds: The likeliest time of the pair without faults [s]: noise.
-        distinguishable: Whether p_value < 1 - level; where not, the time measures noise.
+        distinguishable: Whether p_value < 1 - confidence; where not, the time measures noise.
     """
 
     seconds: float | None
@@ -57,7 +57,7 @@ def self_repair(
     onset: float,
     end: float,
     generator: np.random.Generator,
-    level: float = 0.95,
+    confidence: float = 0.95,
 ) -> SelfRepair:
     """Estimate the self-repair time from counts pooled over seeds, against the paired reference.
 
@@ -76,13 +76,13 @@ def self_repair(
         onset: When the faults begin [s].
         end: When all runs end [s]; they must not run out of items before.
         generator: Only source of randomness: swaps pairs and simulates counts.
-        level: Confidence level of interval and test, in (0, 1).
+        confidence: Of interval and test, in (0, 1).
 
     Raises:
         IndicatorError: Unequal numbers of seeds within a pair, no seeds, not 0 <= onset < end, a
             delivery after the end, or no delivery after the onset in a reference.
     """
-    between_0_and_1("level", level)
+    between_0_and_1("confidence", confidence)
     followed, bin_seconds = _followed(onset, end)
     counts = [
         _counts(name, runs, onset, end)
@@ -100,10 +100,10 @@ def self_repair(
     best = int(curve.argmax())
     p_value = _swapped_p(lead, other, float(curve[best]), generator)
     dispersion = _dispersion(null_lead, null_other, bin_seconds)
-    kept = _kept(lead.sum(axis=0), other.sum(axis=0), curve, dispersion, level, generator)
+    kept = _kept(lead.sum(axis=0), other.sum(axis=0), curve, dispersion, confidence, generator)
     null_best = int(_log_likelihood(null_lead.sum(axis=0), null_other.sum(axis=0)).argmax())
 
-    distinguishable = p_value < 1.0 - level
+    distinguishable = p_value < 1.0 - confidence
     to_the_end = bool(kept[-1] == curve.size - 1)
     # A change inside a bin shows at one of its edges: the interval reaches a bin further.
     return SelfRepair(
@@ -236,7 +236,7 @@ def _kept(
     other: NDArray[np.float64],
     curve: NDArray[np.float64],
     dispersion: float,
-    level: float,
+    confidence: float,
     generator: np.random.Generator,
 ) -> NDArray[np.intp]:
     """Return the change points that the likelihood ratio does not reject, ascending."""
@@ -255,7 +255,7 @@ def _kept(
         simulated = drawn.astype(np.float64)
         curves = _log_likelihood(simulated, both - simulated)
         ratios = 2.0 * (curves.max(axis=1) - curves[:, change])
-        limits.append(float(np.quantile(ratios, level, method="higher")))
+        limits.append(float(np.quantile(ratios, confidence, method="higher")))
     inside = ratio <= np.interp(np.arange(curve.size), candidates, limits)
     inside[int(curve.argmax())] = True
     return np.flatnonzero(inside)

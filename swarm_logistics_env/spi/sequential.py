@@ -1,14 +1,13 @@
-"""Looks at a growing study: levels that keep the declared error (O'Brien-Fleming type spending)."""
+"""Looks at a growing study, each with an alpha that keeps the declared error over all of them."""
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .estimate import verdict_at
 from .inputs import IndicatorError, between_0_and_1, count
 
 if TYPE_CHECKING:
@@ -16,25 +15,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .estimate import Estimate, Verdict
-
 _REACH = 9.0  # standard deviations that the integration grid covers
 _GRID = 801  # its points: the boundaries are then right to five digits
 
 
-class LookVerdict(NamedTuple):
-    """A verdict at one look: the level it was taken at, and whether that look was declared."""
-
-    verdict: Verdict
-    alpha: float
-    exploratory: bool
-
-
-def look_levels(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
+def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
     """Two-sided p below which to stop at each declared look, in order.
 
     Lan and DeMets' (1983) spending function of O'Brien-Fleming type, on both sides, with the share
-    of the final number of seeds as information. The levels of a single look are (alpha,).
+    of the final number of seeds as information. A single look gives (alpha,).
 
     Args:
         looks: Numbers of seeds at which the study is looked at, rising.
@@ -54,7 +43,7 @@ def look_levels(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
     # The sum process is Brownian motion on [0, 1]; `density` is that of paths not stopped so far,
     # on the points of the last look, where they start.
     points, density, weights = np.zeros(1), np.ones(1), np.ones(1)
-    levels, information, spent = [], 0.0, 0.0
+    alphas, information, spent = [], 0.0, 0.0
     for look in seeds:
         now = look / seeds[-1]
         step = math.sqrt(now - information)
@@ -72,32 +61,14 @@ def look_levels(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
 
         reach = _REACH * math.sqrt(now)
         boundary = reach if stopped(reach) >= 0.0 else float(brentq(stopped, 0.0, reach))
-        levels.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
+        alphas.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
         start, mass = points, weights * density
         points = np.linspace(-boundary, boundary, _GRID)
         steps = (points[:, np.newaxis] - start) / step
         density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
         weights = _simpson(points)
         information, spent = now, spent + to_spend
-    return tuple(levels)
-
-
-def verdict_at_look(estimate: Estimate, looks: Sequence[int]) -> LookVerdict:
-    """Judge an estimate at the look that its number of seeds is.
-
-    At a number of seeds that was not declared the verdict is taken at the full level and marked
-    exploratory: nothing bounds the error of stopping where the data please.
-
-    Raises:
-        IndicatorError: Looks as for `look_levels`.
-    """
-    alpha = 1.0 - estimate.level
-    levels = dict(zip(looks, look_levels(looks, alpha), strict=True))
-    declared = levels.get(estimate.n_seeds)
-    at = alpha if declared is None else declared
-    return LookVerdict(
-        verdict_at(at, estimate.p_value, estimate.probability), at, exploratory=declared is None
-    )
+    return tuple(alphas)
 
 
 def _spent(information: float, alpha: float) -> float:

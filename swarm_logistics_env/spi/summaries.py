@@ -21,25 +21,25 @@ class Interval(NamedTuple):
     high: float | None
 
 
-def mean_interval(p: ArrayLike, level: float = 0.95) -> Interval:
+def mean_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     """Mean performance with its t-interval [items], n - 1 degrees of freedom, cut off at 0.
 
     Raises:
-        IndicatorError: p empty, negative or not finite; level outside (0, 1).
+        IndicatorError: p empty, negative or not finite; confidence outside (0, 1).
     """
-    return _not_negative(t_interval(performance("p", p), level))
+    return _not_negative(t_interval(performance("p", p), confidence))
 
 
-def prediction_interval(p: ArrayLike, level: float = 0.95) -> Interval:
+def prediction_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     """Mean performance with the interval of one further run [items]: mean -+ t sd sqrt(1 + 1/n).
 
     Cut off at 0: no run delivers less.
     A single published run is to be compared with this one, not with `mean_interval`.
 
     Raises:
-        IndicatorError: p empty, negative or not finite; level outside (0, 1).
+        IndicatorError: p empty, negative or not finite; confidence outside (0, 1).
     """
-    return _not_negative(t_interval(performance("p", p), level, of_one_run=True))
+    return _not_negative(t_interval(performance("p", p), confidence, of_one_run=True))
 
 
 def interquartile_mean(p: ArrayLike) -> float:
@@ -63,23 +63,25 @@ def worst_decile(p: ArrayLike) -> float:
     return float(ascending[: math.ceil(ascending.size / 10)].mean())
 
 
-def probability_of_improvement(p_o: ArrayLike, p_new: ArrayLike, level: float = 0.95) -> Interval:
+def probability_of_improvement(
+    p_o: ArrayLike, p_new: ArrayLike, confidence: float = 0.95
+) -> Interval:
     """Share of seeds on which P_new > P_o, ties counting half, with Wilson's interval.
 
     Raises:
-        IndicatorError: A sample empty, negative or not finite, unequal seed sets; level outside
-            (0, 1).
+        IndicatorError: A sample empty, negative or not finite, unequal seed sets; confidence
+            outside (0, 1).
     """
     from scipy.special import ndtri
 
-    between_0_and_1("level", level)
+    between_0_and_1("confidence", confidence)
     before, after = performance("p_o", p_o), performance("p_new", p_new)
     same_seeds(p_o=before, p_new=after)
     share = float(np.mean((after > before) + 0.5 * (after == before)))
     n = before.size
     if n == 1:
         return Interval(share, None, None)
-    z2 = float(ndtri(0.5 + level / 2)) ** 2
+    z2 = float(ndtri(0.5 + confidence / 2)) ** 2
     # Ties make the scores less variable than Wilson's 0 or 1: the interval is never too short.
     centre = (share + z2 / (2 * n)) / (1 + z2 / n)
     half = math.sqrt(z2 * (share * (1 - share) / n + z2 / (4 * n * n))) / (1 + z2 / n)
@@ -102,21 +104,21 @@ def pairing_correlation(p_a: ArrayLike, p_b: ArrayLike) -> float | None:
 
 
 def t_interval(
-    sample: NDArray[np.float64], level: float = 0.95, *, of_one_run: bool = False
+    sample: NDArray[np.float64], confidence: float = 0.95, *, of_one_run: bool = False
 ) -> Interval:
     """Mean of a sample (n,) of any sign with its t-interval, or with that of one further value.
 
     Raises:
-        IndicatorError: level outside (0, 1).
+        IndicatorError: confidence outside (0, 1).
     """
     from scipy.special import stdtrit
 
-    between_0_and_1("level", level)
+    between_0_and_1("confidence", confidence)
     n, mean = sample.size, float(sample.mean())
     if n == 1:
         return Interval(mean, None, None)
     spread = float(sample.std(ddof=1)) * math.sqrt(1 / n + of_one_run)
-    half = float(stdtrit(n - 1, 0.5 + level / 2)) * spread
+    half = float(stdtrit(n - 1, 0.5 + confidence / 2)) * spread
     return Interval(mean, mean - half, mean + half)
 
 

@@ -27,23 +27,26 @@ class SurvivalCurve(NamedTuple):
         return float(self.seconds[reached[0]]) if reached.size else None
 
 
-def kaplan_meier(seconds: ArrayLike, happened: ArrayLike, level: float = 0.95) -> SurvivalCurve:
+def kaplan_meier(
+    seconds: ArrayLike, happened: ArrayLike, confidence: float = 0.95
+) -> SurvivalCurve:
     """Kaplan-Meier curve with Greenwood's interval on the log(-log) scale.
 
     Args:
         seconds: Time of the event, or until which the run was watched without it [s], shape (n,).
         happened: Whether the event was seen, shape (n,); False: censored.
-        level: Confidence level of the pointwise interval, in (0, 1).
+        confidence: Of the pointwise interval, in (0, 1).
 
     Returns:
         One entry per distinct event time, rising; empty where every run is censored.
 
     Raises:
-        IndicatorError: Empty or unequal arrays, a time negative or not finite, level out of range.
+        IndicatorError: Empty or unequal arrays, a time negative or not finite, confidence not
+            in (0, 1).
     """
     from scipy.stats import CensoredData, ecdf
 
-    between_0_and_1("level", level)
+    between_0_and_1("confidence", confidence)
     time = numbers("seconds", seconds)
     event = np.asarray(happened, dtype=bool)
     if time.ndim != 1 or time.shape != event.shape or time.size == 0:
@@ -58,7 +61,7 @@ def kaplan_meier(seconds: ArrayLike, happened: ArrayLike, level: float = 0.95) -
     curve = ecdf(CensoredData(uncensored=time[event], right=time[~event])).sf
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # share 0 has no limits, which is dealt with below
-        limits: Any = curve.confidence_interval(level, method="log-log")
+        limits: Any = curve.confidence_interval(confidence, method="log-log")
     times, share, low, high = np.array(
         [curve.quantiles, curve.probabilities, limits.low.probabilities, limits.high.probabilities]
     )[:, np.isin(curve.quantiles, time[event])]

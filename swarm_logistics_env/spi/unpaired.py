@@ -36,7 +36,7 @@ def unpaired_ratio(
     *,
     offset: float = 0.0,
     threshold: float = 0.0,
-    level: float = 0.95,
+    confidence: float = 0.95,
 ) -> RatioTest:
     """Interval and test of theta from independent samples of at least two seeds each.
 
@@ -62,7 +62,7 @@ def unpaired_ratio(
     else:
         df = at_null.degrees_of_freedom
         p_value = 2.0 * float(stdtr(df, -abs(at_null.mean) / math.sqrt(at_null.variance)))
-        low, high = _limits(terms, value, mean_den, 0.5 + level / 2)
+        low, high = _limits(terms, value, mean_den, 0.5 + confidence / 2)
     n = min(term.sample.size for term in terms)
     return RatioTest(
         value=np.asarray(value + offset),

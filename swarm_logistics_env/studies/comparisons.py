@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
 from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.simulation import Simulation
 from swarm_logistics_env.studies.runs import Condition
 
 Performance = Callable[["Arm"], NDArray[np.float64]]
@@ -129,6 +130,13 @@ class Comparison:
         return (self.original, *([self.removed] if self.removed else []), self.changed)
 
     @property
+    def arguments(self) -> dict[str, Arm]:
+        """The arms by the names that the indicator's function has for their performances."""
+        # In the definition's order of performances, which is not that of `arms`.
+        arms = filter(None, (self.original, self.changed, self.removed))
+        return dict(zip(self.definition.performances, arms))
+
+    @property
     def label(self) -> str:
         """The step in words, e.g. "N 5 -> 10" or "FM1, m = 2"."""
         before, after = self.original.setting, self.changed.setting
@@ -142,28 +150,27 @@ class Comparison:
         self,
         performance: Performance,
         *,
-        level: float = 0.95,
+        confidence: float = 0.95,
         paired: bool = True,
         saturated: Collection[Arm] = (),
         identical: bool = False,
+        simulation: Simulation | None = None,
     ) -> Estimate:
         """Return the indicator over seeds.
 
         Args:
             performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
-            level: confidence level of interval and verdict, in (0, 1).
+            confidence: of interval and verdict, in (0, 1).
             paired: whether the arms share their seeds, row by row.
             saturated: arms whose P is capped, every item delivered in a run.
             identical: whether the runs of the original and the changed arm are the same runs.
+            simulation: simulated runs that narrow the interval of real ones, by `arguments`.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
         """
         definition = self.definition
-        # In the definition's order of performances, which is not that of `arms`.
-        named = dict(
-            zip(definition.performances, filter(None, (self.original, self.changed, self.removed)))
-        )
+        named = self.arguments
         change = Change(
             self.original.setting.value,
             self.changed.setting.value,
@@ -173,9 +180,10 @@ class Comparison:
             **{name: performance(arm) for name, arm in named.items()},
             **definition.arguments(change),
             threshold=self.threshold,
-            level=level,
+            confidence=confidence,
             paired=paired,
             saturated=[name for name, arm in named.items() if arm in saturated],
+            simulation=simulation,
             # The removed robots make the third condition another one by construction.
             **({} if self.removed else {"identical": identical}),
         )

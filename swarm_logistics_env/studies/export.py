@@ -58,6 +58,8 @@ def _parquet(store: Store, path: Path) -> int:
     for row in rows:
         if row["all_delivered"] is not None:
             row["all_delivered"] = bool(row["all_delivered"])
+    if any(isinstance(row["delivered"], float) for row in rows):
+        numbers["delivered"] = pa.float64()
     names = list(rows[0]) if rows else []
     # Named types: a column of failed runs alone would have none.
     schema = pa.schema([(name, numbers.get(name, pa.string())) for name in names])

@@ -67,14 +67,17 @@ def fault_budgets(results: StudyResults) -> Iterator[ModeBudget]:
 
 
 def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
-    """Yield the anchoring load of every fault whose runs are complete."""
+    """Yield the anchoring load of every fault whose runs are complete and tell it."""
     for comparison in results.plan.comparisons:
-        if comparison.removed is None:
+        # Nobody recorded how long robots stood by each other in trials from elsewhere.
+        if comparison.removed is None or results.plan.imported_from is not None:
             continue
         outcomes = results.outcomes_of(comparison.changed)
         if outcomes is None:
             continue
-        seconds = np.array([outcome.anchoring_seconds for outcome in outcomes])
+        if any(outcome.anchoring_seconds is None for outcome in outcomes):
+            continue  # the task does not tell
+        seconds = np.array([outcome.anchoring_seconds for outcome in outcomes], dtype=np.float64)
         (fault,) = comparison.changed.condition.faults
         lasted = np.array(
             [

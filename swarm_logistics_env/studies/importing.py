@@ -1,261 +1,295 @@
-"""Importing: results from elsewhere (a paper's tables, another lab's runs) judged like ours."""
+"""Importing: trials recorded elsewhere (real robots, another lab, a paper) made a study."""
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import json
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies import metadata
-from swarm_logistics_env.studies.comparisons import NO_FAULT, Comparison, Setting
-from swarm_logistics_env.studies.plan import Plan, adaptability, robustness, scalability
-from swarm_logistics_env.studies.runs import StudiedPolicy
+import numpy as np
+
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi.definitions import comparing
+from swarm_logistics_env.spi.inputs import IndicatorError
+from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
+from swarm_logistics_env.studies import comparisons, metadata
+from swarm_logistics_env.studies.comparisons import Arm, Comparison, NullPair, Setting
+from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import new_store, refuse_study_in
+from swarm_logistics_env.tasks.recorded_trials import (
+    RECORDED,
+    Origin,
+    RecordedCell,
+    RecordedFault,
+    RecordedScenario,
+    RecordedTable,
+)
 from swarm_logistics_env.tasks.task import Outcome
 
-CODE = "imported"
-_NEEDED = ("kind", "name", "value", "delivered")
-_COLUMNS = (*_NEEDED, "n_robots", "policy", "seed")
-_TITLES = {"size": "Scalability", "fault": "Fault tolerance and robustness"}
 
+def import_results(
+    file: Path,
+    out: Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    ignore: Sequence[str] = (),
+    duration: float | None = None,
+    setup: Mapping[str, str] | None = None,
+) -> int:
+    """Make a study of a CSV file of trials (`spi.read_trials`); return how many runs it holds.
 
-@dataclass(frozen=True)
-class Origin:
-    """Where imported results came from.
-
-    Attributes:
-        file: its name; digest: of its content; paired: whether its rows name their seeds.
-        seeds: those that they name; empty: none, or the store was made when seeds were numbered
-            anew from 0 on.
-    """
-
-    file: str
-    digest: str
-    paired: bool
-    seeds: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Row:
-    line: int
-    policy: str
-    setting: Setting
-    n_robots: int | None
-    seed: int | None
-    delivered: int
-
-    @property
-    def title(self) -> str:
-        """Heading of the table it belongs to."""
-        return _TITLES.get(self.setting.kind, f"Adaptability to {self.setting.name}")
-
-
-def import_results(file: Path, out: Path) -> int:
-    """Make a study of a CSV file with one run a row; return how many runs it holds.
-
-    Columns: `kind` (size, fault or parameter), `name` (n_robots; none, removed or a failure mode;
-    a scenario field), `value` (N; m; the parameter's, x_o in its first row), `delivered` (P),
-    `n_robots` (N of fault rows), and where known `policy` and `seed`. With a seed in every row the
-    study is paired; with none it is not, and rows of one condition are its runs.
+    Swarm sizes without fault, failure modes and the values of each parameter become a table each;
+    the values of everything else that the file varies make tables of their own. A parameter's x_o
+    is its value in the file's first row. With seeds the study is paired, without them it is not.
 
     Args:
         file: the CSV.
         out: directory of the study; it may not hold another.
+        columns, ignore, duration: as for `spi.read_trials`.
+        setup: name and value of what the report is to say of the conditions.
 
     Raises:
-        StudyError: the file cannot be read, or a row of it cannot be.
+        StudyError: the file cannot be read, a row of it cannot be, or nothing is compared in it.
     """
     refuse_study_in(out, "import")
     try:
-        content = file.read_bytes()
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise StudyError(f"cannot read {file}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise StudyError(f"{file} is not a CSV file in UTF-8: {error.reason}") from error
-    try:
-        rows = list(_rows(file, text))
-    except csv.Error as error:
-        raise StudyError(f"{file} is not a CSV file: {error}") from error
-    if not rows:
-        raise StudyError(f"{file} holds no run")
-    cells = _cells(file, rows)
-    seeds = tuple(sorted({row.seed for row in rows if row.seed is not None}))
-    specification = _specification(file, rows, max(map(len, cells.values())))
-    origin = Origin(file.name, hashlib.sha256(content).hexdigest()[:16], bool(seeds), seeds)
-    plan = imported_plan(specification, origin)
+        trials = read_trials(file, columns=columns, ignore=ignore, duration=duration)
+    except IndicatorError as error:
+        raise StudyError(str(error)) from error
+    tables = tuple(_tables(file, trials.rows))
+    cells: dict[tuple[str, RecordedCell], list[Trial]] = {}
+    for table in tables:
+        for cell in table.cells:
+            cells[table.policy, cell] = [
+                row for row in trials.rows if row.policy == table.policy and _is(row, cell)
+            ]
+    _refuse_unused(file, trials.rows, cells.values())
+    specification = Specification(
+        name=file.stem,
+        task=RECORDED.name,
+        policies=tuple(dict.fromkeys(row.policy for row in trials.rows)),
+        seeds=max(map(len, cells.values())),
+    )
+    origin = Origin(
+        file=trials.file,
+        digest=trials.digest,
+        paired=trials.paired,
+        seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
+        setup=tuple((setup or {}).items()),
+        tables=tables,
+    )
     with new_store(out) as store:
-        for policy, title, arm in plan.cells:
-            found = cells.get((policy, title, arm.setting), [])
-            for number, row in enumerate(found):
-                run = arm.condition.run(CODE, number if row.seed is None else row.seed)
-                store.add(run, Outcome(run.key, untimed=row.delivered))
+        for (policy, cell), rows in cells.items():
+            condition = _arm(origin, policy, cell).condition
+            for number, row in enumerate(rows):
+                run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
+                store.add(run, _outcome(run.key, row))
         store.set_note(metadata.SPECIFICATION, specification.to_json())
-        store.set_note(metadata.CODE, CODE)
+        store.set_note(metadata.CODE, RECORDED.code())
         store.set_note(metadata.IDENTITIES, "{}")
         store.set_note(metadata.DECLARED_SEEDS, str(specification.seeds))
-        store.set_note(metadata.IMPORTED, json.dumps(asdict(origin)))
-    return len(rows)
+        store.set_note(metadata.IMPORTED, origin.to_json())
+    return len(trials.rows)
 
 
 def imported_plan(specification: Specification, origin: Origin) -> Plan:
-    """Return the plan of imported results: no condition is shared between two of its tables.
-
-    A paper's tables may give several values of P for what we would call one condition.
-    """
-    comparisons: list[Comparison] = []
-    base, task = specification.scenario, specification.played
-
-    def policy_of(label: str, title: str) -> StudiedPolicy:
-        return StudiedPolicy(label, f"{origin.file} ({origin.digest}), {title}", label)
-
-    for label in specification.policies:
-        for sizes in specification.sizes:
-            comparisons += scalability(base, sizes, policy_of(label, sizes.title), task)
-        for faults in specification.faults:
-            asked = robustness(base, faults, policy_of(label, faults.title), task)
-            comparisons += [item for item in asked if isinstance(item, Comparison)]
-        for parameter in specification.parameters:
-            comparisons += adaptability(base, parameter, policy_of(label, parameter.title), task)
+    """Return the plan of recorded trials: what their tables compare, and nothing to play."""
+    found = [item for table in origin.tables for item in _compared(origin, table)]
     return Plan(
         specification,
-        tuple(comparisons),
-        CODE,
+        tuple(item for item in found if isinstance(item, Comparison)),
+        RECORDED.code(),
         {},
+        null_pairs=tuple(item for item in found if isinstance(item, NullPair)),
         paired=origin.paired,
         imported_from=origin.file,
-        imported_seeds=tuple(origin.seeds),
+        imported_seeds=origin.seeds,
+        setup=origin.setup,
     )
 
 
-def _rows(file: Path, text: str) -> Iterator[_Row]:
-    reader = csv.DictReader(text.splitlines(), restkey="", restval="")
-    columns = reader.fieldnames or ()
-    for needed in _NEEDED:
-        if needed not in columns:
-            raise StudyError(f"{file} has no column {needed!r}: it needs {', '.join(_NEEDED)}")
-    for column in columns:
-        if column not in _COLUMNS:
-            raise StudyError(f"{file} has a column {column!r}{suggest(column, _COLUMNS)}")
-    for values in reader:
-        place = f"{file}, line {reader.line_num}"
-        if "" in values:
-            raise StudyError(f"{place}: has more values than the file has columns")
-        setting = _level(place, values)
-        if setting.kind == "fault" and not values.get("n_robots"):
-            raise StudyError(f"{place}: n_robots is missing, without which R is undefined")
-        yield _Row(
-            reader.line_num,
-            values.get("policy") or "imported",
-            setting,
-            _whole(place, "n_robots", values.get("n_robots"), 1),
-            _whole(place, "seed", values.get("seed"), 0),
-            _whole(place, "delivered", values["delivered"] or "nothing", 0) or 0,
+def _compared(origin: Origin, table: RecordedTable) -> Iterator[Comparison | NullPair]:
+    arms = [_arm(origin, table.policy, cell) for cell in table.cells]
+    original, *others = arms
+    kind = original.setting.kind
+    if kind == "size":
+        for small, large in zip(arms, others):
+            for definition in comparing(kind):
+                yield Comparison(table.title, definition.symbol, small, large)
+        return
+    by_setting = {arm.setting: arm for arm in arms}
+    for arm in others:
+        setting = arm.setting
+        if setting == comparisons.OTHER_BEHAVIOUR:
+            yield NullPair(table.title, original, arm)
+        if kind == "fault" and setting.name in (REPEATED, RECORDED.removed):
+            continue
+        removed = by_setting.get(setting._replace(name=str(RECORDED.removed)))
+        for definition in comparing(kind):
+            # Whoever recorded no trials with the robots removed asks for R alone.
+            if removed is not None or not definition.needs_removed:
+                third = removed if definition.needs_removed else None
+                yield Comparison(table.title, definition.symbol, original, arm, third)
+
+
+def _arm(origin: Origin, policy: str, cell: RecordedCell) -> Arm:
+    studied = StudiedPolicy(policy, f"{policy}: {origin.file} ({origin.digest})", policy)
+    scenario: Any = cell.scenario
+    faults: Any = () if cell.fault is None else (cell.fault,)
+    task: Any = RECORDED
+    condition = Condition(studied, scenario, faults, int(cell.repeated), task=task)
+    return Arm(Setting(cell.kind, cell.name, cell.value, cell.onset), condition)
+
+
+def _outcome(key: str, row: Trial) -> Outcome:
+    if row.times is None:
+        return Outcome(key, untimed=row.performance)
+    return Outcome(key, delivery_times=np.array(row.times), ended_at=row.duration or 0.0)
+
+
+def _is(row: Trial, cell: RecordedCell) -> bool:
+    """Whether a trial was run in a cell's condition."""
+    fault = cell.fault
+    return _scenario(row) == cell.scenario and (row.fault, row.faulty, row.onset) == (
+        (REPEATED if cell.repeated else NO_FAULT, 0, 0.0)
+        if fault is None
+        else (fault.mode, fault.robots, fault.onset)
+    )
+
+
+def _scenario(row: Trial) -> RecordedScenario:
+    return RecordedScenario(
+        n_robots=row.n_robots or 0,
+        duration=row.duration or 0.0,
+        table=row.table,
+        parameters=row.parameters,
+    )
+
+
+def _tables(file: Path, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
+    """Yield what can be compared: all rows that differ in one thing alone, for each thing."""
+    for policy in dict.fromkeys(row.policy for row in rows):
+        own = [row for row in rows if row.policy == policy]
+        for table in dict.fromkeys(row.table for row in own):
+            here = [row for row in own if row.table == table]
+            plain = [row for row in here if row.fault == NO_FAULT]
+            if table in ("", "size"):
+                yield from _of_sizes(policy, plain)
+            if table in ("", "fault"):
+                yield from _of_faults(file, policy, here)
+            for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
+                yield from _of_parameter(file, policy, name, plain)
+
+
+def _of_sizes(policy: str, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
+    groups = _grouped((row.parameters, row) for row in rows if row.n_robots is not None)
+    groups = {key: group for key, group in groups.items() if len({r.n_robots for r in group}) > 1}
+    for parameters, group in groups.items():
+        scenarios = {scenario.n_robots: scenario for scenario in map(_scenario, group)}
+        yield RecordedTable(
+            policy=policy,
+            title=_title("Scalability", parameters, several=len(groups) > 1),
+            cells=tuple(
+                RecordedCell(kind="size", name="n_robots", value=n, scenario=scenarios[n])
+                for n in sorted(scenarios)
+            ),
         )
 
 
-def _level(place: str, values: dict[str, str]) -> Setting:
-    kind, name = values["kind"], values["name"]
-    try:
-        value = float(values["value"])
-    except ValueError:
-        raise StudyError(f"{place}: value = {values['value']!r}: should be a number") from None
-    if kind == "size":
-        return Setting("size", "n_robots", _whole(place, "value", values["value"], 1) or 0)
-    if kind == "fault":
-        m = _whole(place, "value", values["value"], 0) or 0
-        return NO_FAULT if name == "none" else Setting("fault", name, m)
-    if kind == "parameter":
-        return Setting("parameter", name, value)
-    known = ("size", "fault", "parameter")
-    raise StudyError(f"{place}: kind = {kind!r}{suggest(kind, known)}")
+def _of_faults(file: Path, policy: str, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
+    groups = _grouped((((("N", float(row.n_robots or 0)), *row.parameters)), row) for row in rows)
+    groups = {key: group for key, group in groups.items() if any(row.faulty for row in group)}
+    for key, group in groups.items():
+        broken = next(row for row in group if row.faulty)
+        if not any(row.fault == NO_FAULT for row in group):
+            raise StudyError(
+                f"{file}, line {broken.line}: has the fault {broken.fault!r}, but no row without "
+                "one (fault none) of the same robots and parameters: R and FT are relative to it"
+            )
+        cells = [_fault_cell(row) for row in group]
+        # What faults are measured against stands first, then the pair that shows chance alone.
+        cells.sort(key=lambda cell: (cell.fault is not None, cell.repeated))
+        yield RecordedTable(
+            policy=policy,
+            title=_title("Fault tolerance and robustness", key, several=len(groups) > 1),
+            cells=tuple(dict.fromkeys(cells)),
+        )
 
 
-def _whole(place: str, name: str, text: str | None, least: int) -> int | None:
-    if not text:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not (value >= least and value == int(min(value, 1e15))):
-        raise StudyError(f"{place}: {name} = {text}: should be a whole number, {least} or more")
-    return int(value)
+def _fault_cell(row: Trial) -> RecordedCell:
+    fault = None
+    if row.faulty:
+        fault = RecordedFault(mode=row.fault, robots=row.faulty, onset=row.onset)
+    return RecordedCell(
+        kind="fault",
+        name=row.fault,
+        value=row.faulty,
+        onset=row.onset,
+        scenario=_scenario(row),
+        fault=fault,
+        repeated=row.fault == REPEATED,
+    )
 
 
-def _cells(file: Path, rows: list[_Row]) -> dict[tuple[str, str, Setting], list[_Row]]:
-    cells: dict[tuple[str, str, Setting], list[_Row]] = {}
+def _of_parameter(
+    file: Path, policy: str, name: str, rows: Sequence[Trial]
+) -> Iterator[RecordedTable]:
+    groups = _grouped(
+        (
+            (
+                ("N", float(row.n_robots or 0)),
+                *(pair for pair in row.parameters if pair[0] != name),
+            ),
+            row,
+        )
+        for row in rows
+    )
+    groups = {key: g for key, g in groups.items() if len({dict(r.parameters)[name] for r in g}) > 1}
+    x_o = dict(rows[0].parameters)[name]
+    for key, group in groups.items():
+        by_value = {dict(row.parameters)[name]: row for row in group}
+        values = sorted(by_value, key=lambda x: x != x_o)  # a stable sort: x_o, then as in the file
+        if values[0] == 0.0:
+            raise StudyError(
+                f"{file}, line {by_value[0.0].line}: {name} = 0 is x_o, as in the first row, "
+                "and A is relative to x_o: let a row with another value stand first"
+            )
+        yield RecordedTable(
+            policy=policy,
+            title=_title(f"Adaptability to {name}", key, several=len(groups) > 1),
+            cells=tuple(
+                RecordedCell(
+                    kind="parameter", name=name, value=value, scenario=_scenario(by_value[value])
+                )
+                for value in values
+            ),
+        )
+
+
+_Fixed = tuple[tuple[str, float], ...]
+
+
+def _grouped(rows: Iterable[tuple[_Fixed, Trial]]) -> dict[_Fixed, list[Trial]]:
+    groups: dict[_Fixed, list[Trial]] = {}
+    for key, row in rows:
+        groups.setdefault(key, []).append(row)
+    return groups
+
+
+def _title(general: str, fixed: _Fixed, *, several: bool) -> str:
+    told = ", ".join(f"{name} = {value:g}" for name, value in fixed)
+    return f"{general} ({told})" if several else general
+
+
+def _refuse_unused(file: Path, rows: Sequence[Trial], used: Iterable[Sequence[Trial]]) -> None:
+    compared = {row.line for found in used for row in found}
     for row in rows:
-        cells.setdefault((row.policy, row.title, row.setting), []).append(row)
-    with_seed = [row for row in rows if row.seed is not None]
-    if with_seed and len(with_seed) < len(rows):
-        bare = next(row for row in rows if row.seed is None)
-        raise StudyError(f"{file}, line {bare.line}: has no seed, as other rows have")
-    seeds = sorted({row.seed for row in with_seed if row.seed is not None})
-    for (policy, _, setting), found in cells.items():
-        if not seeds:
-            continue
-        theirs = sorted(row.seed for row in found if row.seed is not None)
-        if len(set(theirs)) < len(theirs):
-            raise StudyError(f"{file}: {policy}, {setting} has two rows of one seed")
-        if theirs != seeds:
+        if row.line not in compared:
+            varied = ", ".join(repr(name) for name, _ in row.parameters)
+            hint = f"; columns taken for parameters: {varied}" if varied else ""
             raise StudyError(
-                f"{file}: {policy}, {setting} has {len(theirs)} of the file's {len(seeds)} seeds: "
-                "give every condition the same seeds, or leave the column out"
+                f"{file}, line {row.line}: stands alone: should differ from some other row in the "
+                f"fault, the number of robots or one parameter alone{hint}"
             )
-    return cells
-
-
-def _specification(file: Path, rows: list[_Row], seeds: int) -> Specification:
-    fields: dict[str, Any] = {
-        "name": file.stem,
-        "policies": list(dict.fromkeys(row.policy for row in rows)),
-        "seeds": seeds,
-        "sizes": [],
-        "faults": [],
-        "parameters": [],
-    }
-    # Tables keep the order of the file, because a parameter's first value is x_o.
-    for title in dict.fromkeys(row.title for row in rows):
-        table = [row for row in rows if row.title == title]
-        settings = list(dict.fromkeys(row.setting for row in table))
-        values = [setting.value for setting in settings]
-        kind = settings[0].kind
-        if kind != "fault" and len(settings) < 2:
-            raise StudyError(
-                f"{file}: {title}: {settings[0]} stands alone, nothing to compare with"
-            )
-        if kind == "size":
-            fields["sizes"].append({"title": title, "values": sorted(int(v) for v in values)})
-        elif kind == "parameter":
-            fields["parameters"].append(
-                {"title": title, "name": settings[0].name, "values": values}
-            )
-        else:
-            fields["faults"].append(_faults(file, title, table))
-    try:
-        return Specification(**fields)
-    except StudyError as error:
-        raise StudyError(f"{file}: {error}") from error
-
-
-def _faults(file: Path, title: str, table: list[_Row]) -> dict[str, Any]:
-    for policy in dict.fromkeys(row.policy for row in table):
-        if not any(row.setting == NO_FAULT for row in table if row.policy == policy):
-            raise StudyError(f"{file}: {policy} has faults, but no row without one (name none)")
-    swarms = {row.n_robots for row in table}
-    if len(swarms) > 1:
-        raise StudyError(f"{file}: faults in swarms of several sizes {sorted(map(str, swarms))}")
-    failing = [row.setting for row in table if row.setting != NO_FAULT]
-    return {
-        "title": title,
-        "modes": list(dict.fromkeys(lv.name for lv in failing if lv.name != "removed")),
-        "robots": sorted({int(setting.value) for setting in failing}),
-        "scenario": {"n_robots": swarms.pop()},
-    }

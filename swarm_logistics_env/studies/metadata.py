@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.studies.runs import seeds_in_words
+from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task_choice import DEFAULT
 
 if TYPE_CHECKING:
@@ -47,13 +48,6 @@ class _Specified(Record):
     task: str = DEFAULT
 
 
-class _Origin(Record):
-    file: str
-    digest: str
-    paired: bool
-    seeds: tuple[int, ...] = ()
-
-
 # These are read as JSON.
 _FORMS: dict[str, TypeAdapter[Any]] = {
     SPECIFICATION: TypeAdapter(_Specified),
@@ -61,7 +55,7 @@ _FORMS: dict[str, TypeAdapter[Any]] = {
     DECLARED_SEEDS: TypeAdapter(_Count),
     DECLARED_FIRST_SEED: TypeAdapter(_Seed),
     DECLARED_LOOKS: TypeAdapter(tuple[_Count, ...]),
-    IMPORTED: TypeAdapter(_Origin),
+    IMPORTED: TypeAdapter(Origin),
 }
 
 

@@ -26,7 +26,8 @@ class Resilience:
     """The measures of one fault that begins during the run.
 
     Attributes:
-        comparison: FT's: no fault, the robots removed at the onset, the fault.
+        comparison: FT's: no fault, the robots removed at the onset, the fault; R's where there are
+            no runs with the robots removed.
         against_removed: deliveries after the onset over those with the robots removed: FT local
             in time, above 1; None: undefined.
         against_whole: over those of the whole swarm: R local in time, above 1 - m/N.
@@ -71,26 +72,25 @@ class SingleRepairs(NamedTuple):
 def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
     for comparison in mid_run_faults(results):
-        assert comparison.removed is not None
         m, n = comparison.changed.setting.value, comparison.original.condition.size
-        faulty, removed, whole = (
-            results.times_of(arm)
-            for arm in (comparison.changed, comparison.removed, comparison.original)
-        )
-        if faulty is None or removed is None or whole is None:
+        faulty, whole = map(results.times_of, (comparison.changed, comparison.original))
+        removed = results.times_of(comparison.removed) if comparison.removed else None
+        if faulty is None or whole is None or (comparison.removed and removed is None):
             continue
         onset = comparison.changed.setting.onset
         repair: SelfRepair | None = None
         single: SingleRepairs | None = None
         problem: str | None = None
         try:
+            if removed is None:
+                raise StudyError("no runs with the robots removed are there to compare with")
             repair, single = _self_repair(comparison, (faulty, removed), _null(results, comparison))
         except (StudyError, spi.IndicatorError) as error:
             problem = str(error)
         yield Resilience(
             comparison,
-            _index(faulty, removed, onset, 1.0),
-            _index(faulty, whole, onset, 1.0 - m / n),
+            None if removed is None else _index(results, faulty, removed, onset, 1.0),
+            _index(results, faulty, whole, onset, 1.0 - m / n),
             repair,
             single,
             problem,
@@ -98,15 +98,23 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
 
 
 def mid_run_faults(results: StudyResults) -> Iterator[Comparison]:
-    """Yield FT's comparison of every fault that begins during the run."""
-    for comparison in results.plan.comparisons:
-        if comparison.removed is not None and comparison.changed.setting.onset > 0:
+    """Yield one comparison of every fault that begins during the run: FT's, or else R's."""
+    late = [c for c in results.plan.comparisons if c.changed.setting.onset > 0]
+    with_removed = {(c.policy, c.table, c.changed) for c in late if c.removed}
+    for comparison in late:
+        key = comparison.policy, comparison.table, comparison.changed
+        if comparison.removed is not None or key not in with_removed:
             yield comparison
 
 
-def _index(faulty: Times, reference: Times, onset: float, threshold: float) -> Estimate | None:
+def _index(
+    results: StudyResults, faulty: Times, reference: Times, onset: float, threshold: float
+) -> Estimate | None:
+    paired = results.plan.paired
     try:
-        return spi.resilience_index(faulty, reference, onset=onset, threshold=threshold)
+        return spi.resilience_index(
+            faulty, reference, onset=onset, threshold=threshold, paired=paired
+        )
     except spi.IndicatorError:  # nothing is delivered after the onset in the reference
         return None
 
@@ -185,7 +193,6 @@ def window_of(comparison: Comparison) -> float:
 
 def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurve, ...]:
     """Return the delivery rates without fault, with the robots removed, and with the fault."""
-    assert comparison.removed is not None
     arms = {
         "no fault": comparison.original,
         "removed": comparison.removed,
@@ -196,7 +203,7 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
     seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
     curves = []
     for label, arm in arms.items():
-        if (times := results.times_of(arm)) is not None:
+        if arm is not None and (times := results.times_of(arm)) is not None:
             counts = np.array([_in_window(run, seconds, window) for run in times])
             rates = tuple(spi.mean_interval(column) for column in counts.T)
             curves.append(RateCurve(label, tuple(seconds.tolist()), rates))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -45,6 +45,7 @@ class Plan:
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.
         imported_seeds: those that the file names; empty: it names none, or results are run here.
+        setup: name and value of what is stated about the conditions of imported results.
     """
 
     specification: Specification
@@ -55,6 +56,7 @@ class Plan:
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
+    setup: tuple[tuple[str, str], ...] = ()
 
     @property
     def seeds(self) -> Sequence[int]:
@@ -158,7 +160,7 @@ def _asked(
         for sizes in specification.sizes:
             yield from scalability(base, sizes, policy, task)
         for faults in specification.faults:
-            yield from robustness(base, faults, policy, task)
+            yield from robustness(base, faults, policy, task, specification.indicators)
         for parameter in specification.parameters:
             yield from adaptability(base, parameter, policy, task)
         for ablation, part in lesser:
@@ -208,9 +210,16 @@ def scalability(base: Any, sizes: Sizes, policy: StudiedPolicy, task: Task) -> I
 
 
 def robustness(
-    base: Any, faults: Faults, policy: StudiedPolicy, task: Task
+    base: Any,
+    faults: Faults,
+    policy: StudiedPolicy,
+    task: Task,
+    indicators: Collection[str] = DEFINITIONS,
 ) -> Iterator[Comparison | NullPair]:
-    """Yield the indicators of every mode, m and onset; the null pair where faults start late."""
+    """Yield the indicators of every mode, m and onset; the null pair where faults start late.
+
+    An indicator that needs robots removed is left out where the task cannot remove any.
+    """
     scenario = task.vary(base, faults.scenario)
     table = _title(faults, "Fault tolerance and robustness")
     for m in faults.robots:
@@ -240,6 +249,8 @@ def robustness(
             for m in faults.robots:
                 failed = arm(mode, m, onset, faults.duration)
                 for definition in comparing("fault"):
+                    if definition.symbol not in indicators:
+                        continue
                     third = None
                     if definition.needs_removed:
                         if task.removed is None:

@@ -22,9 +22,9 @@ CellKey = tuple[str, str, Arm]  # policy, table, arm
 Value = str | float | int | bool | list[float] | None
 Times = tuple[NDArray[np.float64], ...]
 POWER = 0.8
-LEVEL = 0.95
+CONFIDENCE = 0.95
 _LEAST_ALPHA = (
-    1e-12  # a float cannot hold a level much nearer to 1, and an early look may ask for one
+    1e-12  # a float cannot hold a confidence much nearer to 1, and an early look may ask for one
 )
 
 
@@ -188,7 +188,7 @@ class IndicatorTest:
             "value": estimate.value if estimate else None,
             "low": estimate.low if estimate else None,
             "high": estimate.high if estimate else None,
-            "level": estimate.level if estimate else None,
+            "confidence": estimate.confidence if estimate else None,
             "probability": estimate.probability if estimate else None,
             "p_value": estimate.p_value if estimate else None,
             "p_holm": self.adjusted_p,
@@ -224,7 +224,7 @@ class StudyResults:
         exploratory: seeds that were not declared at the study's start, or a look that was not,
             so the verdicts' error level is not the nominal one.
         outcomes: of the plan's runs, by key, for what P alone does not tell.
-        level: confidence level of the indicators' intervals and verdicts; above 0.95 at a
+        confidence: of the indicators' intervals and verdicts; above 0.95 at a
             declared look, so that all looks together err in 5 %.
         looks: numbers of seeds at which the study was declared to be judged, before its first run.
     """
@@ -235,19 +235,21 @@ class StudyResults:
     tests: tuple[IndicatorTest, ...]
     exploratory: bool
     outcomes: Mapping[str, Outcome]
-    level: float = LEVEL
+    confidence: float = CONFIDENCE
     looks: tuple[int, ...] = ()
 
     def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...] | None:
         """Return an arm's outcomes by seed; None where one failed, is missing or has no times."""
         runs = (arm.condition.run(self.plan.code, seed) for seed in self.plan.seeds)
         found = [self.outcomes.get(run.key) for run in runs]
+        if not self.plan.paired:  # such results need not be equally many everywhere
+            found = [outcome for outcome in found if outcome is not None]
         complete = tuple(
             outcome
             for outcome in found
             if outcome is not None and outcome.error is None and outcome.untimed is None
         )
-        return complete if len(complete) == len(found) else None
+        return complete if complete and len(complete) == len(found) else None
 
     def times_of(self, arm: Arm) -> Times | None:
         """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""
@@ -289,9 +291,9 @@ def judge(
     cells = tuple(_cell(*key, plan, outcomes, reference) for key in plan.cells)
     by_arm = _by_arm(cells)
     declared = range(declared_first_seed, declared_first_seed + declared_seeds)
-    level, exploratory = _level(plan, Declaration(declared, declared_looks))
+    confidence, exploratory = _confidence(plan, Declaration(declared, declared_looks))
     tests = [
-        _indicator_test(comparison, by_arm, reference, level=level, paired=plan.paired)
+        _indicator_test(comparison, by_arm, reference, confidence=confidence, paired=plan.paired)
         for comparison in plan.comparisons
     ]
     return StudyResults(
@@ -301,17 +303,17 @@ def judge(
         _adjusted(tests),
         exploratory=exploratory,
         outcomes=outcomes,
-        level=level,
+        confidence=confidence,
         looks=declared_looks,
     )
 
 
-def _level(plan: Plan, declared: Declaration) -> tuple[float, bool]:
+def _confidence(plan: Plan, declared: Declaration) -> tuple[float, bool]:
     if not declared.covers(plan):
-        return LEVEL, True
+        return CONFIDENCE, True
     if not declared.looks:
-        return LEVEL, False
-    alphas = spi.look_levels(declared.looks, 1 - LEVEL)
+        return CONFIDENCE, False
+    alphas = spi.look_alphas(declared.looks, 1 - CONFIDENCE)
     return 1 - max(alphas[declared.looks.index(len(plan.seeds))], _LEAST_ALPHA), False
 
 
@@ -357,7 +359,11 @@ def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool
 
 
 def estimate_of(
-    comparison: Comparison, cells: Mapping[CellKey, Cell], *, paired: bool, level: float = LEVEL
+    comparison: Comparison,
+    cells: Mapping[CellKey, Cell],
+    *,
+    paired: bool,
+    confidence: float = CONFIDENCE,
 ) -> Estimate | str:
     """Return the estimate of a comparison from a study's cells, or why there is none."""
     used = {arm: cells[comparison.policy, comparison.table, arm] for arm in comparison.arms}
@@ -368,7 +374,7 @@ def estimate_of(
     try:
         return comparison.estimate(
             lambda arm: used[arm].performance,
-            level=level,
+            confidence=confidence,
             paired=paired,
             saturated=[arm for arm, cell in used.items() if cell.saturated],
             identical=comparison.removed is None and same_runs(before.digests, after.digests),
@@ -382,10 +388,10 @@ def _indicator_test(
     cells: Mapping[CellKey, Cell],
     reference: Reference | None,
     *,
-    level: float,
+    confidence: float,
     paired: bool,
 ) -> IndicatorTest:
-    found = estimate_of(comparison, cells, paired=paired, level=level)
+    found = estimate_of(comparison, cells, paired=paired, confidence=confidence)
     estimate = None if isinstance(found, str) else found
     published = reference.estimate(comparison) if reference else None
     claim = comparison.claim

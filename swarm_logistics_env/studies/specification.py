@@ -23,7 +23,12 @@ from pydantic import (
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label, policy_name
+from swarm_logistics_env.tasks.policy_choice import (
+    PolicySource,
+    policy_label,
+    policy_name,
+    runs_code,
+)
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import (
     DEFAULT,
@@ -297,11 +302,11 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise StudyError(f"{path}: {error}") from error
     named = [*specification.policies, *(ablation.policy for ablation in specification.ablations)]
-    for policy in map(policy_name, named):
-        if ":" in policy and not trust_code:
+    for policy in filter(runs_code, named):
+        if not trust_code:
             raise StudyError(
-                f"{path}: policy {policy!r} is a class, and to load it runs code: should be a "
-                "policy's name, or be allowed by --trust-code (trust_code=True)"
+                f"{path}: policy {policy_name(policy)!r} is code, which runs when it is loaded: "
+                "should be a policy's name, or be allowed by --trust-code (trust_code=True)"
             )
     return specification
 

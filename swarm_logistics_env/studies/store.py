@@ -40,8 +40,8 @@ CREATE TABLE runs (
     condition TEXT NOT NULL REFERENCES conditions,
     code TEXT NOT NULL,
     seed INTEGER NOT NULL,
-    delivered INTEGER,           -- NULL, like all of the result, where the run failed
-    delivery_times BLOB,         -- float64, little-endian [s]; NULL: only their number is known
+    delivered INTEGER,           -- P, a REAL where a task measures fractions; NULL: the run failed
+    delivery_times BLOB,         -- float64, little-endian [s]; NULL: no times are known
     ended_at REAL,               -- [s]
     all_delivered INTEGER,
     failed_robots TEXT,          -- JSON
@@ -148,7 +148,8 @@ class Store:
             outcome.digest,
         )
         if outcome.untimed is not None:
-            result = (outcome.untimed, *(None,) * (len(result) - 1))
+            known = result[2:] if outcome.digest else (None,) * (len(result) - 2)
+            result = (outcome.untimed, None, *known)
         with self._transaction():
             self._database.execute(
                 "INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?, ?)",
@@ -231,18 +232,19 @@ class Store:
                 if error is not None:
                     found[run] = Outcome(run, error=str(error), wall_seconds=float(wall))
                     continue
-                if times is None:
-                    found[run] = Outcome(run, untimed=_whole(count))
+                if times is None and digest is None:  # imported
+                    found[run] = Outcome(run, untimed=_performance(count))
                     continue
                 found[run] = Outcome(
                     run,
-                    delivery_times=_times(times, count),
+                    delivery_times=np.empty(0) if times is None else _times(times, count),
                     ended_at=float(ended_at),
                     all_delivered=bool(all_delivered),
                     failed_robots=tuple(json.loads(robots)),
-                    anchoring_seconds=float(anchoring),
+                    anchoring_seconds=None if anchoring is None else float(anchoring),
                     digest=None if digest is None else str(digest),
                     wall_seconds=float(wall),
+                    untimed=_performance(count) if times is None else None,
                 )
         return found
 
@@ -366,8 +368,8 @@ def _refuse_unmerged(path: Path) -> None:
         )
 
 
-def _whole(number: object) -> int:
-    if not isinstance(number, int) or number < 0:
+def _performance(number: object) -> float:
+    if not isinstance(number, int | float) or not 0 <= number < float("inf"):
         raise ValueError(f"delivered = {number!r}")
     return number
 
@@ -375,7 +377,7 @@ def _whole(number: object) -> int:
 def _times(blob: bytes, delivered: object) -> NDArray[np.float64]:
     """Return the delivery times that a row holds, if they are what `add` can have written."""
     times = np.frombuffer(blob, dtype="<f8")
-    if len(times) != _whole(delivered):
+    if len(times) != _performance(delivered):
         raise ValueError(f"{len(times)} delivery times of {delivered} items")
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("delivery times that do not rise")

@@ -13,7 +13,7 @@ from weakref import finalize
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.engines import Engine, engine_named
-from swarm_logistics_env.studies.importing import Origin, imported_plan
+from swarm_logistics_env.studies.importing import imported_plan
 from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
@@ -26,6 +26,7 @@ from swarm_logistics_env.studies.specification import (
     read_study_file,
 )
 from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -126,7 +127,7 @@ class Study:
         )
         study = cls._of(specification, out)
         if imported is not None:
-            study._plan = imported_plan(study.specification, Origin(**json.loads(imported)))
+            study._plan = imported_plan(study.specification, Origin.from_json(imported))
             return study
         study._plan = make_plan(
             study.specification,

@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Callable, Mapping
 from functools import lru_cache
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
@@ -14,7 +15,9 @@ from pydantic import BeforeValidator, Field, JsonValue, PlainSerializer, field_v
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies import Policy
+from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
 from swarm_logistics_env.records import Record
+from swarm_logistics_env.tasks.parallel_policies import StableBaselinesModel
 
 Known = Mapping[str, Callable[..., Policy]]
 NONE: Known = MappingProxyType({})
@@ -50,6 +53,12 @@ def policy_name(source: object) -> str:
     return source.name if isinstance(source, PolicyChoice) else policy_label(source)
 
 
+def runs_code(source: object) -> bool:
+    """Return whether to load a policy by its name runs code that the name leads to."""
+    name = policy_name(source)
+    return isinstance(source, str | PolicyChoice) and (":" in name or name.endswith(SB3_SUFFIX))
+
+
 def policy_label(source: object) -> str:
     """Return how a study calls a policy: its label, the name it was asked for, or its class's."""
     if isinstance(source, PolicyChoice):
@@ -62,7 +71,8 @@ def policy_of(source: object, known: Known = NONE) -> Policy:
     """Return a policy that no run has used: an object is copied, a name loaded.
 
     Args:
-        known: what makes the policies that the task knows by name.
+        known: what makes the policies that the task knows by name; none for the warehouse, to which
+            `policies.load` belongs.
 
     Raises:
         PolicyError: it cannot be found or built.
@@ -71,6 +81,8 @@ def policy_of(source: object, known: Known = NONE) -> Policy:
         name, parameters = policy_name(source), getattr(source, "parameters", {})
         if name in known:
             return _made(known[name], name, parameters)
+        if known and name.endswith(SB3_SUFFIX):
+            return copy.deepcopy(_model(name))
         if known and name in policies.NAMES:
             raise PolicyError(f"the task has no policy {name!r}{suggest(name, known)}")
         return copy.deepcopy(_loaded(name, _canonical(parameters)))
@@ -115,6 +127,11 @@ def _made(make: Callable[..., Policy], name: str, parameters: dict[str, Any]) ->
         return make(**parameters)
     except TypeError as error:
         raise PolicyError(f"policy {name!r} cannot be made: {error}") from None
+
+
+@lru_cache(maxsize=8)
+def _model(name: str) -> Policy:
+    return StableBaselinesModel(Path(name))
 
 
 @lru_cache(maxsize=8)

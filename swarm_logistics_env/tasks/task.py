@@ -20,7 +20,8 @@ class Outcome:
         ended_at: [s].
         all_delivered: whether no item was left, so that more robots could not have delivered more.
         failed_robots: numbers of the robots that any fault names.
-        anchoring_seconds: robot-seconds that working robots spent in contact range of failed ones.
+        anchoring_seconds: robot-seconds that working robots spent in contact range of failed ones;
+            None: the task does not tell.
         digest: of the trajectory and the deliveries (`Episode.digest`); None: not known.
         error: traceback; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
@@ -32,7 +33,7 @@ class Outcome:
     ended_at: float = 0.0
     all_delivered: bool = False
     failed_robots: tuple[int, ...] = ()
-    anchoring_seconds: float = 0.0
+    anchoring_seconds: float | None = 0.0
     digest: str | None = None
     error: str | None = None
     wall_seconds: float = 0.0

@@ -14,6 +14,10 @@ DEFAULT = "warehouse"
 NAMES = {
     DEFAULT: "swarm_logistics_env.tasks.warehouse_task:WAREHOUSE",
     "foraging": "swarm_logistics_env.tasks.foraging_task:FORAGING",
+    "recorded trials": "swarm_logistics_env.tasks.recorded_trials:RECORDED",
+    "rware": "swarm_logistics_env.tasks.rware_task:RWARE",
+    "simple-spread": "swarm_logistics_env.tasks.spread_task:SPREAD",
+    "dispersion": "swarm_logistics_env.tasks.dispersion_task:DISPERSION",
 }
 
 
@@ -33,7 +37,8 @@ def task_of(source: object) -> Task:
         try:
             found = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError, ValueError) as error:
-            raise StudyError(f"task {source!r} cannot be imported: {error}") from None
+            remedy = "; pip install 'swarm-logistics-env[tasks]'" if source in NAMES else ""
+            raise StudyError(f"task {source!r} cannot be imported: {error}{remedy}") from None
     if not isinstance(found, Task):
         raise StudyError(f"{source!r} is no task: should have the attributes of tasks.Task")
     return found

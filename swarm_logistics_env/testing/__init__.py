@@ -1,7 +1,7 @@
 """Checks to run on an environment with wrappers or a policy of one's own.
 
-Each takes `make`, a function that returns a new parallel environment, plays one episode of it, and
-raises an AssertionError of its own kind with one sentence about the first thing that is wrong.
+Each check takes `make`, a function that returns a new parallel environment. It plays one episode
+and raises its own subclass of AssertionError, with a sentence about the first thing that is wrong.
 
 Example:
     >>> import functools
@@ -10,7 +10,8 @@ Example:
     >>> testing.check_spaces(make, steps=20)
 """
 
-from swarm_logistics_env.testing.conformance_errors import (
+from swarm_logistics_env.testing.determinism import check_determinism
+from swarm_logistics_env.testing.playing import (
     ConformanceError,
     ConservationError,
     DeterminismError,
@@ -18,11 +19,12 @@ from swarm_logistics_env.testing.conformance_errors import (
     OverlapError,
     SpaceError,
 )
-from swarm_logistics_env.testing.determinism import check_determinism
-from swarm_logistics_env.testing.fault_check import check_faults
-from swarm_logistics_env.testing.items import check_conservation
-from swarm_logistics_env.testing.overlap import check_overlap
 from swarm_logistics_env.testing.space_check import check_spaces
+from swarm_logistics_env.testing.world_checks import (
+    check_conservation,
+    check_faults,
+    check_overlap,
+)
 
 __all__ = [
     "ConformanceError",

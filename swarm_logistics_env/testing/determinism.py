@@ -15,8 +15,7 @@ import numpy as np
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.testing.conformance_errors import DeterminismError
-from swarm_logistics_env.testing.playing import Make, Moment, played
+from swarm_logistics_env.testing.playing import DeterminismError, Make, Moment, played
 
 HASH_SEEDS = ("0", "20240229")
 
@@ -33,9 +32,9 @@ def check_determinism(
     Args:
         make: returns a new parallel environment; fresh processes must be able to import it (a
             function of a module, or functools.partial of one, not a lambda).
-        policy: who steers, by name, path or as an object.
-        seed: of the episode.
-        steps: at most so many.
+        policy: the policy that plays: a name, a path, or the object.
+        seed: the episode's seed.
+        steps: the largest number of steps to play.
 
     Raises:
         DeterminismError: two trajectories part; it names the first step.

@@ -1,4 +1,4 @@
-"""Plays an episode of whatever a factory makes, through the dicts that everybody has."""
+"""Plays episodes for the checks, through the dict methods; the errors that checks raise."""
 
 from __future__ import annotations
 
@@ -13,12 +13,37 @@ from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import Policy, decide, start
 from swarm_logistics_env.warehouse import Warehouse
 
+
+class ConformanceError(AssertionError):
+    """An environment does not hold what this package promises of one."""
+
+
+class DeterminismError(ConformanceError):
+    """The same seed gave two trajectories."""
+
+
+class SpaceError(ConformanceError):
+    """An observation or a state that its space does not contain."""
+
+
+class ConservationError(ConformanceError):
+    """An item was lost, doubled or created."""
+
+
+class OverlapError(ConformanceError):
+    """Two robots stand in one place."""
+
+
+class FaultsError(ConformanceError):
+    """A failed robot did what it can no longer do, or nobody failed at all."""
+
+
 Make = Callable[[], Any]
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What a reset or a step returned. `expected` are the agents that should be answered."""
+    """What a reset or a step returned; `expected` are the agents that it should answer."""
 
     env: Any
     step: int
@@ -40,12 +65,12 @@ def played(make: Make, policy: Policy | str, seed: int, steps: int) -> Iterator[
 
     Args:
         make: returns a new parallel environment: a `SwarmLogisticsEnv` in any wrappers.
-        policy: who steers, by name, path or as an object.
-        seed: of the episode and the policy.
-        steps: at most so many.
+        policy: the policy that plays: a name, a path, or the object.
+        seed: the seed of the episode and of the policy.
+        steps: the largest number of steps to play.
 
     Raises:
-        SetupError: what it makes is no such environment.
+        SetupError: `make` returns no such environment.
         PolicyError: there is no such policy.
     """
     env = make()

@@ -8,8 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box
 
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.testing.conformance_errors import SpaceError
-from swarm_logistics_env.testing.playing import Make, Moment, played
+from swarm_logistics_env.testing.playing import Make, Moment, SpaceError, played
 
 
 def check_spaces(
@@ -19,9 +18,9 @@ def check_spaces(
 
     Args:
         make: returns a new parallel environment.
-        policy: who steers, by name, path or as an object.
-        seed: of the episode.
-        steps: at most so many.
+        policy: the policy that plays: a name, a path, or the object.
+        seed: the episode's seed.
+        steps: the largest number of steps to play.
 
     Raises:
         SpaceError: the first value, and the bounds it should be within.

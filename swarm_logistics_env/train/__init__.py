@@ -3,7 +3,6 @@
 Nothing here is imported by the rest of the package; `trainer` and what it uses load torch.
 """
 
-from swarm_logistics_env.train.preset_files import load_training, preset_names
-from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.train.training import Training, load_training, preset_names
 
 __all__ = ["Training", "load_training", "preset_names"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,23 +21,39 @@ from swarm_logistics_env.warehouse import Fault
 FIRST_SEED = 1_000_000
 
 
-@dataclass(frozen=True)
-class Evaluated:
-    """Means over the evaluation's seeds.
+class Evaluated(NamedTuple):
+    """What was delivered on the evaluation's seeds.
 
     Attributes:
-        performance: P without faults [items].
-        under_faults: mode -> P_F [items].
-        robustness: mode -> R; nan where nothing was delivered without faults.
+        n_robots: the swarm size N.
+        faults: mode -> number m of faulty robots.
+        p_o: P_o of each seed, without faults (seeds,) [items].
+        p_f: mode -> P_F of each seed (seeds,) [items].
     """
 
-    performance: float
-    under_faults: dict[str, float]
-    robustness: dict[str, float]
+    n_robots: int
+    faults: dict[str, int]
+    p_o: NDArray[np.float64]
+    p_f: dict[str, NDArray[np.float64]]
 
-    def __str__(self) -> str:
-        shown = [f"R({mode}) = {value:+.2f}" for mode, value in self.robustness.items()]
-        return ", ".join([f"P = {self.performance:.1f}", *shown])
+    def robustness(self, mode: str) -> float:
+        """Return R; nan where nothing was delivered without faults."""
+        if not self.p_o.any():
+            return float("nan")
+        return spi.robustness(self.p_o, self.p_f[mode], n=self.n_robots, m=self.faults[mode]).value
+
+    def fault_tolerance(self, mode: str) -> float:
+        """Return FT, by the same robots "removed"; nan where nothing was delivered without."""
+        if not self.p_o.any():
+            return float("nan")
+        return spi.fault_tolerance(self.p_o, self.p_f[mode], self.p_f["removed"]).value
+
+    def means(self) -> dict[str, float]:
+        """Return the mean P, and for each mode the mean P_F and R: "P", "P_FM1", "R_FM1"."""
+        means = {"P": float(self.p_o.mean())}
+        for mode, p_f in self.p_f.items():
+            means |= {f"P_{mode}": float(p_f.mean()), f"R_{mode}": self.robustness(mode)}
+        return means
 
 
 def evaluate(policy: Policy, scenario: Scenario, asked: Evaluation, threads: int = 1) -> Evaluated:
@@ -46,15 +62,7 @@ def evaluate(policy: Policy, scenario: Scenario, asked: Evaluation, threads: int
     kinds: list[Sequence[Fault]] = [(), *((Fault(m, k),) for m, k in asked.faults.items())]
     seeds = range(FIRST_SEED, FIRST_SEED + asked.seeds)
     p_o, *p_f = performances(policy, scenario, kinds, seeds, threads)
-    by_mode = dict(zip(asked.faults, p_f))
-    return Evaluated(
-        performance=float(p_o.mean()),
-        under_faults={mode: float(p.mean()) for mode, p in by_mode.items()},
-        robustness={
-            mode: _robustness(p_o, p, asked.n_robots, asked.faults[mode])
-            for mode, p in by_mode.items()
-        },
-    )
+    return Evaluated(asked.n_robots, asked.faults, p_o, dict(zip(asked.faults, p_f)))
 
 
 def performances(
@@ -75,7 +83,3 @@ def performances(
     with ThreadPoolExecutor(threads) as pool:
         delivered = np.array(list(pool.map(played, jobs)), np.float64)
     return delivered.reshape(len(kinds), len(seeds))
-
-
-def _robustness(p_o: NDArray[np.float64], p_f: NDArray[np.float64], n: int, m: int) -> float:
-    return spi.robustness(p_o, p_f, n=n, m=m).value if p_o.any() else float("nan")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,15 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 
 from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.train.critic import AsymmetricPolicy
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.training import Training
 
 ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
+
+# What an untrained network says whatever it reads: it drives ahead, so that it meets things. One
+# that trembles on the spot would learn very slowly that searching pays.
+FIRST_OUTPUTS = (0.8, 0.0, 0.0)
 
 
 def make_learner(
@@ -27,7 +33,7 @@ def make_learner(
     ppo, network = training.ppo, training.network
     first, last = ppo.learning_rate, ppo.final_learning_rate
     learner = PPO(
-        "MlpPolicy",
+        AsymmetricPolicy,
         view,
         learning_rate=lambda left: last + left * (first - last),
         n_steps=ppo.n_steps,
@@ -49,6 +55,7 @@ def make_learner(
     )
     with torch.no_grad():
         learner.policy.log_std.copy_(torch.tensor(ppo.deviations).log())
+        learner.policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
     return learner
 
 
@@ -79,21 +86,18 @@ def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
     return tensors
 
 
+def take_tensors(policy: Any, tensors: Mapping[str, NDArray[np.float32]]) -> None:
+    """Give PPO's policy the layers of a policy file; its deviations stay as they are."""
+    with torch.no_grad():
+        for layer, linear in enumerate(linears(policy)):
+            linear.weight.copy_(torch.from_numpy(tensors[f"layers.{layer}.weight"]))
+            linear.bias.copy_(torch.from_numpy(tensors[f"layers.{layer}.bias"]))
+
+
 def linears(policy: Any) -> list[torch.nn.Linear]:
     """Return the layers from inputs to outputs of PPO's policy."""
     hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
     return [*hidden, policy.action_net]
-
-
-def actor_parameters(policy: Any) -> list[torch.nn.Parameter]:
-    """Return what there is to learn between inputs and outputs."""
-    return [parameter for linear in linears(policy) for parameter in linear.parameters()]
-
-
-def outputs_of(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
-    """Return the most likely outputs (N, outputs) of PPO's policy, with their gradient."""
-    outputs: torch.Tensor = policy.action_net(policy.mlp_extractor.forward_actor(inputs))
-    return outputs
 
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float32]:

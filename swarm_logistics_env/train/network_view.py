@@ -15,12 +15,14 @@ from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key, row_keys
+from swarm_logistics_env.train.critic import KNOWN, read_known
 
 
 class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environment of the type check
     """Turns observation rows into a network's inputs, and its outputs into commands.
 
-    By the code that plays the policy afterwards, so that both see the same.
+    By the code that plays the policy afterwards, so that both see the same. What the critic alone
+    reads stands behind these inputs (see `critic`).
 
     Args:
         worlds: every robot is a row.
@@ -35,10 +37,11 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def __init__(self, worlds: SwarmVecEnv, scenario: Scenario, listens: bool = True) -> None:
         self.frame = MotionFrame(scenario, listens)
         self.observations = np.zeros((worlds.num_envs, 0), np.float32)
+        self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)
         self._begun, self._seed = 0, 0
         super().__init__(
             worlds,
-            Box(-np.inf, np.inf, (len(INPUTS),), np.float32),
+            Box(-np.inf, np.inf, (len(INPUTS) + len(KNOWN),), np.float32),
             Box(-1.0, 1.0, (len(OUTPUTS),), np.float32),
         )
 
@@ -62,7 +65,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         """Begin an episode in every world."""
         self.observations = self.venv.reset()
         self.frame.begin(self._keys())
-        return self.frame.read(self.observations)
+        return self._read()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
@@ -74,10 +77,18 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         over = np.flatnonzero(dones)
         if over.size:
             last = np.stack([infos[row]["terminal_observation"] for row in over.tolist()])
-            for row, read in zip(over.tolist(), self.frame.peek(last, over)):
+            # What the critic knows is of one step before: the next episode has begun already.
+            ends = np.hstack([self.frame.peek(last, over), self._known[over]])
+            for row, read in zip(over.tolist(), ends):
                 infos[row]["terminal_observation"] = read
             self.frame.begin_rows(over, self._keys()[over])
-        return self.frame.read(self.observations), rewards, dones, infos
+        return self._read(), rewards, dones, infos
+
+    def _read(self) -> NDArray[np.float32]:
+        inputs = self.frame.read(self.observations)
+        for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
+            read_known(world.warehouse, self.frame.turned[rows], self._known[rows])
+        return np.hstack([inputs, self._known])
 
     def _keys(self) -> NDArray[np.uint64]:
         # Every episode of every row gets a stream of its own.

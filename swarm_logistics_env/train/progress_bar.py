@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from rich.console import Console
-
-if TYPE_CHECKING:
-    from rich.progress import Progress as Bar
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 LINE_EVERY = 30.0  # seconds between plain lines
 
@@ -28,23 +31,23 @@ class ProgressBar:
         self._label, self._total, self._unit = label, total, unit
         self._first = self._done = done
         self._console = Console(stderr=True, highlight=False)
-        self._bar: Bar | None = None
+        self._bar: Progress | None = None
         self._start = self._last_line = time.monotonic()
 
     def __enter__(self) -> Self:
         self._start = self._last_line = time.monotonic()
         if self._console.is_terminal:
-            self._bar = _bar(self._console)
+            self._bar = Progress(
+                *(TextColumn("{task.description}"), BarColumn()),
+                TextColumn("{task.percentage:3.0f} %  {task.fields[note]}"),
+                *(TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()),
+                console=self._console,
+            )
             self._bar.add_task(self._label, total=self._total, completed=self._done, note="")
             self._bar.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._bar:
             self._bar.stop()
 
@@ -71,23 +74,3 @@ class ProgressBar:
             what,
         ]
         self._console.print(f"{self._label}: {', '.join(part for part in parts if part)}")
-
-
-def _bar(console: Console) -> Bar:
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %  {task.fields[note]}"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-    )

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.train.preset_files import load_training
+from swarm_logistics_env.train.training import load_training
 from swarm_logistics_env.train.tuning import RESULT, Trial, Tuning, tune
 
 

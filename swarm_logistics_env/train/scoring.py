@@ -49,35 +49,26 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
 
 def scores_of(results: StudyResults) -> tuple[Score, ...]:
     """Return every P and every indicator of a study with its interval."""
-    scores = []
-    for cell in results.cells:
-        mean = cell.mean
-        if mean is None:
-            continue
-        scores.append(
-            Score(
-                measure="P",
-                condition=_in_words(cell.arm),
-                value=mean.value,
-                low=mean.low,
-                high=mean.high,
-                seeds=cell.performance.size,
-            )
+    found: list[tuple[str, Arm, Any, int]] = [
+        ("P", cell.arm, cell.mean, cell.performance.size) for cell in results.cells
+    ]
+    found += [
+        (test.comparison.indicator, test.comparison.changed, estimate, estimate.n_seeds)
+        for test in results.tests
+        if (estimate := test.estimate) is not None
+    ]
+    scores = (
+        Score(
+            measure=measure,
+            condition=_in_words(arm),
+            value=estimate.value,
+            low=estimate.low,
+            high=estimate.high,
+            seeds=seeds,
         )
-    for test in results.tests:
-        estimate, comparison = test.estimate, test.comparison
-        if estimate is None:
-            continue
-        scores.append(
-            Score(
-                measure=comparison.indicator,
-                condition=_in_words(comparison.changed),
-                value=estimate.value,
-                low=estimate.low,
-                high=estimate.high,
-                seeds=estimate.n_seeds,
-            )
-        )
+        for measure, arm, estimate, seeds in found
+        if estimate is not None
+    )
     return tuple(dict.fromkeys(scores))
 
 

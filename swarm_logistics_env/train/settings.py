@@ -1,7 +1,8 @@
-"""The tables of a training file: conditions, imitation, PPO and what is measured."""
+"""The tables of a training file: worlds, conditions, PPO and what is measured."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -20,7 +21,6 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
 
-Share = Annotated[float, Field(ge=0, le=1)]
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 
@@ -38,6 +38,27 @@ class Part(Record):
     """A table of a training, or all of it."""
 
     error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
+
+
+class WorldKind(Part):
+    """Worlds of one kind, among those that stand side by side.
+
+    Args:
+        count: how many.
+        n_robots: the swarm size.
+        scenario: fields in which they differ from the training's scenario.
+    """
+
+    count: PositiveInt = 1
+    n_robots: PositiveInt = 25
+    scenario: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("scenario")
+    @classmethod
+    def _possible(cls, fields: dict[str, Any]) -> dict[str, Any]:
+        if "n_robots" in fields:
+            raise ValueError("the swarm size is a field of its own, `n_robots`")
+        return fields
 
 
 class Conditions(Part):
@@ -69,7 +90,7 @@ class Conditions(Part):
     def _possible(cls, fields: dict[str, list[Any]]) -> dict[str, list[Any]]:
         for name, values in fields.items():
             if name == "n_robots":
-                raise ValueError("swarm sizes belong in `sizes` of the training")
+                raise ValueError("swarm sizes belong in `worlds` of the training")
             for value in values:
                 Scenario(**{name: value})
         return fields
@@ -96,41 +117,6 @@ class Indicators(Part):
     constant: bool = True
 
 
-class Imitation(Part):
-    """A start from imitating the scripted policy `homing`, the expert, by DAgger.
-
-    Args:
-        rounds: of play and fit.
-        seconds: of play in a round [s].
-        sizes: swarm sizes that play side by side.
-        beta: the share of decisions that the expert takes, round by round; 0 in later rounds.
-        noise: standard deviation of what is added to the outputs played, one for each.
-        common_share: the share that is kept of the moments in which nothing rare happens.
-        fit, last_fit: gradient steps after a round, and after the last.
-        batch: samples in each.
-        learning_rate: of Adam; a fifth of it in the last 30 % of the steps.
-    """
-
-    rounds: PositiveInt = 6
-    seconds: PositiveFloat = 60.0
-    sizes: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (25, 10, 50, 5, 25, 15, 40)
-    beta: tuple[Share, ...] = (1.0, 0.3)
-    noise: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat] = (0.15, 0.15, 0.05)
-    common_share: Share = 0.12
-    fit: PositiveInt = 1200
-    last_fit: PositiveInt = 3000
-    batch: PositiveInt = 1024
-    learning_rate: PositiveFloat = 2e-3
-
-    @model_validator(mode="before")
-    @classmethod
-    def _older_name(cls, given: Any) -> Any:
-        # Training files that were written before the field had DAgger's own name.
-        if isinstance(given, dict) and "teacher_share" in given and "beta" not in given:
-            return {"beta" if name == "teacher_share" else name: given[name] for name in given}
-        return given
-
-
 class PPOSettings(Part):
     """Proximal Policy Optimization (Schulman et al. 2017), as stable-baselines3 has it.
 
@@ -146,10 +132,14 @@ class PPOSettings(Part):
         entropy, value_weight: weights of these losses beside the policy's.
         max_grad_norm: gradients longer than that are shortened to it.
         target_kl: an update stops early beyond 1.5 times that divergence; None: never.
-        deviations: of the outputs' exploration noise at the start, one for each.
-        value_warmup: updates at the start in which the value network alone learns, so that a start
-            from imitation is not spoilt by values that mean nothing yet.
-        value_hidden: widths of the value network, which is not shipped.
+        deviations: of the outputs' exploration noise at the start, one for each; they are learned.
+        least_deviation: what no deviation falls below, at the start and at the end; geometric in
+            between. Without it the noise dies out long before the policy is good.
+        least_until: the share of the training after which the end of it holds.
+        value_warmup: updates at the start in which the value network alone learns, so that what a
+            training goes on from is not spoilt by values that mean nothing yet.
+        value_hidden: widths of the value network, which is not shipped. It reads more than a robot
+            can sense, see `critic`.
     """
 
     n_steps: PositiveInt = 128
@@ -165,8 +155,15 @@ class PPOSettings(Part):
     max_grad_norm: PositiveFloat = 0.5
     target_kl: PositiveFloat | None = None
     deviations: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (0.5, 0.5, 0.5)
+    least_deviation: tuple[PositiveFloat, PositiveFloat] = (0.001, 0.001)
+    least_until: Fraction = 1.0
     value_warmup: NonNegativeInt = 0
     value_hidden: tuple[PositiveInt, ...] = (128, 128)
+
+    def floor(self, done: float) -> float:
+        """Return the least deviation once a share `done` of the training is over."""
+        first, last = self.least_deviation
+        return first * math.pow(last / first, min(1.0, done / self.least_until))
 
 
 class Evaluation(Part):
@@ -177,15 +174,12 @@ class Evaluation(Part):
         seeds: how many.
         n_robots: the swarm size.
         faults: mode -> m, each giving R.
-        keep: which policy the training ends with: the "last", or the "best" seen, by the mean
-            over conditions of P relative to that of the first evaluation.
     """
 
     every: PositiveInt = 1_000_000
     seeds: PositiveInt = 4
     n_robots: PositiveInt = 25
     faults: dict[str, PositiveInt] = Field(default_factory=dict)
-    keep: Literal["last", "best"] = "last"
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

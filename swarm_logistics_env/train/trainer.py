@@ -11,20 +11,21 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.logger import configure
 
-from swarm_logistics_env.policies.card import PolicyCard
+from swarm_logistics_env.errors import PolicyError, TrainingError
+from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.card import Network, PolicyCard
 from swarm_logistics_env.policies.files import write_policy
-from swarm_logistics_env.policies.learned import LearnedPolicy
+from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.checkpoint import (
     read_checkpoint,
     restore,
-    save_checkpoint,
     view_of,
 )
-from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import (
     device_of,
     make_learner,
+    take_tensors,
     tensors_of,
 )
 from swarm_logistics_env.train.network_view import NetworkView
@@ -59,6 +60,7 @@ def train(
     out = Path(out)
     # Everything that may be refused comes first, before anything is written.
     device, begun = device_of(device), _new_view(training)
+    first = None if training.start is None else _start(training.start, training.network)
     enter(out, training, command)
     # Small networks gain little from more threads and lose much if cores are shared; the sums would
     # depend on the number of threads as well.
@@ -72,11 +74,8 @@ def train(
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
         restore(learner, state)
-    elif training.imitation is not None:
-        imitate(learner.policy, training, training.imitation)
-        # Seeded anew, so that PPO does not depend on how long the imitation took.
-        learner.set_random_seed(training.seed)
-        save_checkpoint(out, learner, view, log)
+    elif first is not None:
+        take_tensors(learner.policy, first.tensors)
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
         with ProgressBar(training.name, training.agent_steps, learner.num_timesteps) as bar:
@@ -87,13 +86,23 @@ def train(
             callback.end()
     view.close()
     tensors = tensors_of(learner.policy)
-    if training.evaluation.keep == "best" and log.best is not None:
-        tensors = log.best[1]
     return _write(training, out, command, learner.num_timesteps, tensors, log.versions)
 
 
 def _new_view(training: Training) -> NetworkView:
     return NetworkView(make_worlds(training), training.scenario, training.network.listens)
+
+
+def _start(name: str, network: Network) -> LearnedPolicy:
+    policy = load(name)
+    if not isinstance(policy, LearnedPolicy):
+        raise TrainingError(f"start = {name!r}: should be a trained policy")
+    # What it hears and how it explores may differ; its tensors have to fit.
+    try:
+        check_tensors(network, policy.tensors)
+    except PolicyError as error:
+        raise TrainingError(f"start = {name!r}: {error}") from error
+    return policy
 
 
 def _write(

@@ -1,25 +1,30 @@
-"""The specification of a training: one validated record, read from TOML."""
+"""The specification of a training: one validated record, read from TOML, and the presets."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
 from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
-    Imitation,
     Indicators,
     Part,
     PPOSettings,
     Scores,
+    WorldKind,
 )
+
+PRESETS = Path(__file__).parent / "presets"
 
 # stable-baselines3 shuffles with numpy's global generator, which takes seeds of 32 bits.
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
@@ -49,8 +54,9 @@ class Training(Part):
         name: of the policy.
         about: what it is, for its card.
         scenario: the conditions; a table of fields makes one.
-        sizes: swarm sizes that the worlds have in turn.
-        worlds: how many run side by side.
+        start: name or path of a trained policy that this one goes on from; none: from nothing.
+        worlds: those that run side by side, kind by kind: easy ones beside hard ones are what lets
+            a training from nothing begin.
         threads: in which worlds step, and processes that measure scores; no result depends on it.
         seed: of everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
@@ -58,7 +64,6 @@ class Training(Part):
             added to them.
         indicators: pays them instead of the task.
         conditions: kinds of episodes that are mixed; none: nobody fails.
-        imitation: what comes before PPO; none: it learns from scratch.
         network: what the policy reads and commands.
         ppo, evaluation, scores: see there.
 
@@ -69,15 +74,16 @@ class Training(Part):
     name: str = "policy"
     about: str = ""
     scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
-    sizes: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (25,)
-    worlds: PositiveInt = 6
+    start: str | None = None
+    worlds: Annotated[
+        tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(_each(WorldKind))
+    ] = (WorldKind(count=6),)
     threads: PositiveInt = 2
     seed: Seed = 0
     agent_steps: PositiveInt = 2_000_000
     rewards: dict[str, float] = Field(default_factory=lambda: {"delivery": 1.0})
     indicators: Annotated[Indicators | None, BeforeValidator(_one(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(_each(Conditions))] = ()
-    imitation: Annotated[Imitation | None, BeforeValidator(_one(Imitation))] = None
     network: Annotated[Network, BeforeValidator(_one(Network))] = Network()
     ppo: Annotated[PPOSettings, BeforeValidator(_one(PPOSettings))] = PPOSettings()
     evaluation: Annotated[Evaluation, BeforeValidator(_one(Evaluation))] = Evaluation()
@@ -98,27 +104,18 @@ class Training(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if len(self.sizes) > self.worlds:
-            raise ValueError(
-                f"worlds = {self.worlds}: should be at least {len(self.sizes)}, one for each size"
-            )
-        if self.scenario.message_size:
+        scenarios = self.world_scenarios
+        if any(scenario.message_size for scenario in scenarios):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         played = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
-        if self.imitation is not None:
-            played |= set(self.imitation.sizes)
-            if self.imitation.seconds < self.scenario.control_period:
-                raise ValueError(
-                    f"imitation.seconds = {self.imitation.seconds}: should be at least the "
-                    f"control period, {self.scenario.control_period} s"
-                )
         for size in sorted(played):
             self.scenario.replace(n_robots=size)
+        smallest = min(scenario.n_robots for scenario in scenarios)
         most = max((max(kind.robots) for kind in self.conditions if kind.modes), default=0)
-        if most > min(self.sizes):
+        if most > smallest:
             raise ValueError(
                 f"conditions.robots = {most}: should be at most the smallest swarm, "
-                f"{min(self.sizes)} robots"
+                f"{smallest} robots"
             )
         rows = self.rows * self.ppo.n_steps
         if rows % self.ppo.n_minibatches:
@@ -129,6 +126,42 @@ class Training(Part):
         return self
 
     @property
+    def world_scenarios(self) -> tuple[Scenario, ...]:
+        """The scenario of every world."""
+        return tuple(
+            self.scenario.replace(n_robots=kind.n_robots, **kind.scenario)
+            for kind in self.worlds
+            for _ in range(kind.count)
+        )
+
+    @property
     def rows(self) -> int:
         """Robots in all worlds together."""
-        return sum(self.sizes[world % len(self.sizes)] for world in range(self.worlds))
+        return sum(kind.count * kind.n_robots for kind in self.worlds)
+
+
+def preset_names() -> list[str]:
+    """Return the names of the trainings that come with the package."""
+    return sorted(path.stem for path in PRESETS.glob("*.toml"))
+
+
+def load_training(asked: str, **fields: object) -> Training:
+    """Return a preset by its name, or the training in a TOML file, with some fields changed.
+
+    Raises:
+        TrainingError: there is none, it is not TOML, or a field of it is unknown or cannot be.
+    """
+    path = Path(asked) if asked.endswith(".toml") else PRESETS / f"{asked}.toml"
+    if path.parent == PRESETS and path.stem not in preset_names():
+        raise TrainingError(f"no training preset {asked!r}{suggest(asked, preset_names())}")
+    try:
+        given = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TrainingError(f"cannot read the training {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = str(error).splitlines()[0]
+        raise TrainingError(f"the training {path} is not TOML: {reason}") from error
+    try:
+        return Training(**{"name": path.stem, **given, **fields})
+    except SwarmLogisticsError as error:  # whichever record of it refuses
+        raise TrainingError(f"{path.name}: {error}") from error

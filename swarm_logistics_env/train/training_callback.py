@@ -1,4 +1,4 @@
-"""The callback between a training's updates: evaluate, keep the best, write checkpoints."""
+"""The callback between a training's updates: evaluate, write checkpoints."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
+import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_logistics_env.policies.card import PolicyCard
 from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.train.checkpoint import save_checkpoint
-from swarm_logistics_env.train.evaluation import Evaluated, evaluate
-from swarm_logistics_env.train.learner import actor_parameters, tensors_of
+from swarm_logistics_env.train.evaluation import evaluate
+from swarm_logistics_env.train.learner import linears, tensors_of
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.training import Training
@@ -31,20 +30,18 @@ class TrainingLog:
     """What a training keeps beside the learner.
 
     Attributes:
-        curve: (agent-steps, seconds of training, what was measured) of each evaluation.
-        best: score and tensors of the best policy so far.
+        curve: of each evaluation "agent_steps", "seconds" of training and what was measured.
         seconds: trained before this session.
         versions: that it learned with last.
     """
 
-    curve: list[tuple[int, float, Evaluated]] = field(default_factory=list)
-    best: tuple[float, dict[str, NDArray[np.float32]]] | None = None
+    curve: list[dict[str, float]] = field(default_factory=list)
     seconds: float = 0.0
     versions: dict[str, str] | None = None
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
-    """Evaluates between updates, keeps the best policy, writes checkpoints, shows progress."""
+    """Evaluates between updates, writes checkpoints, shows progress."""
 
     def __init__(
         self, training: Training, view: NetworkView, log: TrainingLog, out: Path, bar: ProgressBar
@@ -61,17 +58,25 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def _on_rollout_start(self) -> None:
         is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
-        for parameter in (*actor_parameters(self.model.policy), self.model.policy.log_std):
-            parameter.requires_grad_(is_free)
+        policy = self.model.policy
+        for layer in linears(policy):
+            layer.requires_grad_(is_free)
+        policy.log_std.requires_grad_(is_free)
+        floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
+        with torch.no_grad():
+            policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve
-        if not curve or self.num_timesteps >= curve[-1][0] + self._training.evaluation.every:
+        if (
+            not curve
+            or self.num_timesteps >= curve[-1]["agent_steps"] + self._training.evaluation.every
+        ):
             self._evaluate()
         if time.monotonic() - self._saved_at >= CHECKPOINT_EVERY:
             self._save()
 
     def end(self) -> None:
         """Evaluate and save the policy at the end of the training."""
-        if self._log.curve[-1][0] < self.num_timesteps:
+        if self._log.curve[-1]["agent_steps"] < self.num_timesteps:
             self._evaluate()
         self._save()
 
@@ -85,36 +90,18 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         training, log = self._training, self._log
         tensors = tensors_of(self.model.policy)
         card = PolicyCard(name=training.name, network=training.network)
-        found = evaluate(
+        means = evaluate(
             LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads
-        )
-        seconds = self._before + time.monotonic() - self._start
-        log.curve.append((self.num_timesteps, seconds, found))
-        value = _score(found, log.curve[0][2])
-        if log.best is None or value > log.best[0]:
-            log.best = (value, tensors)
-        self.logger.record("evaluation/P", found.performance)
-        for mode, robustness in found.robustness.items():
-            self.logger.record(f"evaluation/R_{mode}", robustness)
-            self.logger.record(f"evaluation/P_{mode}", found.under_faults[mode])
-        self._progress_bar.say(str(found))
-        _write_curve(self._out / CURVE, log)
-
-
-def _score(found: Evaluated, first: Evaluated) -> float:
-    pairs = [(found.performance, first.performance)]
-    pairs += [(p, first.under_faults[mode]) for mode, p in found.under_faults.items()]
-    return math.fsum(p / max(p_first, 1.0) for p, p_first in pairs) / len(pairs)
-
-
-def _write_curve(path: Path, log: TrainingLog) -> None:
-    modes = list(log.curve[0][2].robustness)
-    part = path.with_name(f"{path.name}.part")
-    with part.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        names = [name for mode in modes for name in (f"P_{mode}", f"R_{mode}")]
-        writer.writerow(["agent_steps", "seconds", "P", *names])
-        for steps, seconds, found in log.curve:
-            values = [v for m in modes for v in (found.under_faults[m], found.robustness[m])]
-            writer.writerow([steps, f"{seconds:.1f}", found.performance, *values])
-    part.replace(path)
+        ).means()
+        seconds = round(self._before + time.monotonic() - self._start, 1)
+        log.curve.append({"agent_steps": self.num_timesteps, "seconds": seconds, **means})
+        for name, value in means.items():
+            self.logger.record(f"evaluation/{name}", value)
+        self._progress_bar.say(", ".join(f"{n} = {value:.4g}" for n, value in means.items()))
+        path = self._out / CURVE
+        part = path.with_name(f"{CURVE}.part")
+        with part.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, log.curve[0])
+            writer.writeheader()
+            writer.writerows(log.curve)
+        part.replace(path)

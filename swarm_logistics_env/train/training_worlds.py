@@ -22,11 +22,13 @@ def make_worlds(training: Training) -> SwarmVecEnv:
         TrainingError, SetupError, ScenarioError, FaultError: they cannot be.
     """
     make_env: Callable[[int], Wrapper] = partial(_make_env, training, _references(training))
-    return SwarmVecEnv(make_env=make_env, n_worlds=training.worlds, threads=training.threads)
+    return SwarmVecEnv(
+        make_env=make_env, n_worlds=len(training.world_scenarios), threads=training.threads
+    )
 
 
 def _make_env(training: Training, references: References, world: int) -> Wrapper:
-    scenario = training.scenario.replace(n_robots=training.sizes[world % len(training.sizes)])
+    scenario = training.world_scenarios[world]
     env = EpisodeMix(SwarmLogisticsEnv(scenario, rewards=training.rewards), training.conditions)
     asked = training.indicators
     if asked is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -21,9 +21,8 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate, performances
 from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, versions
-from swarm_logistics_env.train.settings import Evaluation
+from swarm_logistics_env.train.settings import Evaluation, Modes
 from swarm_logistics_env.train.training import Seed, as_scenario
-from swarm_logistics_env.warehouse.faults import Fault
 
 if TYPE_CHECKING:
     import optuna
@@ -69,7 +68,7 @@ class Tuning(Record):
     trials: PositiveInt = 60
     seeds: PositiveInt = 8
     scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
-    modes: Annotated[tuple[str, ...], Field(min_length=1)] = ("FM1", "FM2", "FM3", "FM4")
+    modes: Annotated[Modes, Field(min_length=1)] = ("FM1", "FM2", "FM3", "FM4")
     robots: PositiveInt = 2
     seed: Seed = 0
     threads: PositiveInt = 2
@@ -82,13 +81,6 @@ class Tuning(Record):
         if policy not in known:
             raise ValueError(f"no policy to tune{suggest(policy, known)}")
         return policy
-
-    @field_validator("modes")
-    @classmethod
-    def _known(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
-        for mode in modes:
-            Fault(mode)
-        return modes
 
 
 @dataclass(frozen=True)
@@ -152,14 +144,14 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
 
 def values_of(asked: Tuning, found: Evaluated) -> tuple[float, ...]:
     """Return the objectives' values, nothing delivered counting as the worst."""
-    p_o, p_s = found.performance, found.under_faults.get("removed", 0.0)
-    modes = list(asked.modes)
-    values = {
-        "P": p_o,
-        "R": np.mean([found.robustness[mode] for mode in modes]) if p_o else -1.0,
-        "FT": np.mean([found.under_faults[mode] - p_s for mode in modes]) / p_o if p_o else -1.0,
+    if not found.p_o.any():
+        return tuple(0.0 if objective == "P" else -1.0 for objective in asked.objectives)
+    values: dict[str, Callable[[], Any]] = {
+        "P": found.p_o.mean,
+        "R": lambda: np.mean([found.robustness(mode) for mode in asked.modes]),
+        "FT": lambda: np.mean([found.fault_tolerance(mode) for mode in asked.modes]),
     }
-    return tuple(float(values[objective]) for objective in asked.objectives)
+    return tuple(float(values[objective]()) for objective in asked.objectives)
 
 
 def confirm(
@@ -173,27 +165,24 @@ def confirm(
         performances(made, scenario, [()], range(n_seeds), threads)[0]
         for made in (policies.load(policy), policies.load(policy, **parameters))
     )
-    condition = f"N = {scenario.n_robots}, no fault"
-    scores = [
-        Score(measure="P", condition=f"{condition}, {whose}", seeds=n_seeds, **interval._asdict())
-        for whose, interval in (
-            ("tuned", spi.mean_interval(p_best)),
-            ("own parameters", spi.mean_interval(p_own)),
-        )
+    measured: list[tuple[str, str, Any]] = [
+        ("P", "tuned", spi.mean_interval(p_best)),
+        ("P", "own parameters", spi.mean_interval(p_own)),
     ]
     if p_own.any():
         change = spi.relative_change(p_own, p_best)
-        scores.append(
-            Score(
-                measure="change",
-                condition=f"{condition}, tuned against own parameters",
-                value=change.value,
-                low=change.low,
-                high=change.high,
-                seeds=n_seeds,
-            )
+        measured.append(("change", "tuned against own parameters", change))
+    return tuple(
+        Score(
+            measure=measure,
+            condition=f"N = {scenario.n_robots}, no fault, {which}",
+            value=found.value,
+            low=found.low,
+            high=found.high,
+            seeds=n_seeds,
         )
-    return tuple(scores)
+        for measure, which, found in measured
+    )
 
 
 def _try(study: optuna.Study, asked: Tuning, done: int) -> tuple[float, ...]:

@@ -17,7 +17,7 @@ from swarm_logistics_env.warehouse.structs import (
     STORED,
     Engine,
     Items,
-    NumberRows,
+    Numbers,
     Parameters,
     Robots,
     World,
@@ -46,9 +46,7 @@ def build(address: int) -> None:
 
 
 @inlined_kernel
-def build_solids(
-    engine: Engine, static: int, parameters: Parameters, obstacles: NumberRows
-) -> None:
+def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles: Numbers) -> None:
     """Make walls and obstacles."""
     call, space = engine.functions, engine.space[0]
     width, height = parameters.warehouse_width, parameters.warehouse_height

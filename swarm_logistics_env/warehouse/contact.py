@@ -8,7 +8,7 @@ from swarm_logistics_env.warehouse.structs import (
     Grid,
     Items,
     Nearby,
-    NumberRows,
+    Numbers,
     Parameters,
     Robots,
 )
@@ -17,7 +17,7 @@ GAP = 0.01  # [m], gap below which two things touch
 
 
 @inlined_kernel
-def touches_solid(pose: Pose, parameters: Parameters, obstacles: NumberRows) -> bool:
+def touches_solid(pose: Pose, parameters: Parameters, obstacles: Numbers) -> bool:
     """Return whether a robot touches a wall or an obstacle."""
     reach = parameters.robot_radius + GAP
     away_x = min(pose.x, parameters.warehouse_width - pose.x)

@@ -9,7 +9,7 @@ import math
 
 from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.native import call_at, store_at
-from swarm_logistics_env.warehouse.structs import Batch, Engine, IntegerRows, NumberRows, Parameters
+from swarm_logistics_env.warehouse.structs import Batch, Engine, Integers, Numbers, Parameters
 
 _ROBOT, _SOLID, _ITEM = 1, 2, 4  # categories of shapes
 _MASK = 32  # bits of the categories in a filter's second word, below those of its mask
@@ -75,7 +75,7 @@ def read(engine: Engine, batch: Batch) -> None:
 
 
 @inlined_kernel
-def follow(engine: Engine, events: IntegerRows, n_events: int, item_position: NumberRows) -> None:
+def follow(engine: Engine, events: Integers, n_events: int, item_position: Numbers) -> None:
     """Let bodies collide as they must after these events (kind, robot, item)."""
     for event in range(n_events):
         kind, robot, item = events[event, 0], events[event, 1], events[event, 2]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.structs import Flags, Grid, Nearby, NumberRows
+from swarm_logistics_env.warehouse.structs import Flags, Grid, Nearby, Numbers
 
 
 def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:
@@ -40,31 +40,18 @@ def cell_along(coordinate: float, cell: float, n_cells: int) -> int:
 
 
 @inlined_kernel
-def cells_around(grid: Grid, x: float, y: float, reach: float) -> tuple[int, int, int, int]:
-    """Return the first and last column and the first and last row within `reach` of (x, y)."""
-    left = cell_along(x - reach, grid.cell, grid.n_columns)
-    right = cell_along(x + reach, grid.cell, grid.n_columns)
-    bottom = cell_along(y - reach, grid.cell, grid.n_rows)
-    top = cell_along(y + reach, grid.cell, grid.n_rows)
-    return left, right, bottom, top
-
-
-@inlined_kernel
-def run_of(grid: Grid, row: int, left: int, right: int) -> tuple[int, int]:
-    """Return where the points of a row's cells begin and end in `grid.members`."""
-    first = row * grid.n_columns
-    return grid.start[first + left], grid.start[first + right + 1]
-
-
-@inlined_kernel
 def look_around(grid: Grid, x: float, y: float, reach: float, left_out: int, nearby: Nearby) -> int:
     """List in `nearby` the points within `reach` [m] of (x, y), but for `left_out`; how many."""
     if grid.start[-1] <= _FEW:
         return look_through(grid, (0, grid.start[-1]), (x, y), reach, left_out, nearby, 0)
     n_found = 0
-    left, right, bottom, top = cells_around(grid, x, y, reach)
+    left = cell_along(x - reach, grid.cell, grid.n_columns)
+    right = cell_along(x + reach, grid.cell, grid.n_columns)
+    bottom = cell_along(y - reach, grid.cell, grid.n_rows)
+    top = cell_along(y + reach, grid.cell, grid.n_rows)
     for row in range(bottom, top + 1):
-        run = run_of(grid, row, left, right)
+        first = row * grid.n_columns
+        run = grid.start[first + left], grid.start[first + right + 1]
         n_found = look_through(grid, run, (x, y), reach, left_out, nearby, n_found)
     return n_found
 
@@ -94,7 +81,7 @@ def look_through(
 
 
 @inlined_kernel
-def fill(grid: Grid, position: NumberRows, included: Flags) -> None:
+def fill(grid: Grid, position: Numbers, included: Flags) -> None:
     """Sort the included points of `position` (n, 2) into the grid's cells."""
     start, cell = grid.start, grid.cell
     start[:] = 0

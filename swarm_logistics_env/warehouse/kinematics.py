@@ -8,7 +8,7 @@ from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.structs import (
     NOBODY,
     Capabilities,
-    NumberRows,
+    Numbers,
     Parameters,
     Robots,
 )
@@ -17,7 +17,7 @@ FORWARD, LEFT, TURN, GRIPPER, MESSAGE = range(5)  # columns of a command row; me
 
 
 @inlined_kernel
-def refused_command(commands: NumberRows, robots: Robots, able: Capabilities) -> int:
+def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> int:
     """Return the place, row by row, of the first command that is not finite; NOBODY if all are.
 
     Rows of robots that ignore their commands may hold anything.
@@ -33,11 +33,11 @@ def refused_command(commands: NumberRows, robots: Robots, able: Capabilities) ->
 
 @inlined_kernel
 def drive(
-    commands: NumberRows,
+    commands: Numbers,
     robots: Robots,
     able: Capabilities,
     parameters: Parameters,
-    wanted_velocity: NumberRows,
+    wanted_velocity: Numbers,
 ) -> None:
     """Turn the robots and fill their wanted velocities (N, 2) [m/s] for one control period.
 

@@ -6,11 +6,13 @@ Kernels change the world's arrays and list what the physics must know as events
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse.engine import CAME_BACK, DELIVERED_IT, LIFTED, PUT_DOWN
-from swarm_logistics_env.warehouse.grid import cells_around, run_of
+from swarm_logistics_env.warehouse.grid import look_around
 from swarm_logistics_env.warehouse.kinematics import GRIPPER
 from swarm_logistics_env.warehouse.layout import draw_order, place_restocked
 from swarm_logistics_env.warehouse.structs import (
@@ -18,12 +20,8 @@ from swarm_logistics_env.warehouse.structs import (
     DELIVERED,
     NOBODY,
     STORED,
-    Capabilities,
-    Grid,
-    IntegerRows,
-    Items,
-    NumberRows,
-    Robots,
+    Integers,
+    Numbers,
     World,
 )
 
@@ -31,7 +29,7 @@ _HOLD, _OPEN = 0.5, -0.5
 
 
 @inlined_kernel
-def note_event(events: IntegerRows, n_events: int, kind: int, robot: int, item: int) -> int:
+def note_event(events: Integers, n_events: int, kind: int, robot: int, item: int) -> int:
     """Write an event; returns the number of events so far."""
     events[n_events, 0] = kind
     events[n_events, 1] = robot
@@ -40,11 +38,12 @@ def note_event(events: IntegerRows, n_events: int, kind: int, robot: int, item: 
 
 
 @inlined_kernel
-def carry_along(robots: Robots, items: Items, delivery_edge: float) -> None:
+def carry_along(world: World) -> None:
     """Bring carried items to where their carriers are and note who is in the delivery area."""
+    robots, items = world.robots, world.items
     for robot in range(len(robots.item)):
         x = robots.position[robot, 0]
-        robots.in_delivery[robot] = robots.present[robot] and x >= delivery_edge
+        robots.in_delivery[robot] = robots.present[robot] and x >= world.parameters.storage_width
         item = robots.item[robot]
         if item != NOBODY:
             items.position[item, 0] = x
@@ -52,25 +51,18 @@ def carry_along(robots: Robots, items: Items, delivery_edge: float) -> None:
 
 
 @inlined_kernel
-def open_grippers(
-    commands: NumberRows,
-    robots: Robots,
-    able: Capabilities,
-    items: Items,
-    requested: int,
-    events: IntegerRows,
-) -> int:
+def open_grippers(world: World, commands: Numbers) -> int:
     """Put down what robots let go of, covered; returns the number of events written.
 
     The requested item is let go of anywhere, another one only outside the delivery area.
     """
-    n_events = 0
+    robots, able, items, n_events = world.robots, world.able, world.items, 0
     for robot in range(len(commands)):
         item = robots.item[robot]
         is_able = robots.present[robot] and able.obeys[robot]
         if item == NOBODY or not is_able or commands[robot, GRIPPER] >= _OPEN:
             continue
-        if robots.in_delivery[robot] and item != requested:
+        if robots.in_delivery[robot] and item != world.progress.requested[0]:
             continue
         if robots.in_delivery[robot] and not able.releases_inside[robot]:
             continue
@@ -79,12 +71,12 @@ def open_grippers(
         items.status[item] = STORED
         items.carrier[item] = NOBODY
         items.covered[item] = 1
-        n_events = note_event(events, n_events, PUT_DOWN, robot, item)
+        n_events = note_event(world.claims.events, n_events, PUT_DOWN, robot, item)
     return n_events
 
 
 @inlined_kernel
-def remember(memory: IntegerRows, robot: int, item: int) -> None:
+def remember(memory: Integers, robot: int, item: int) -> None:
     """Put `item` in front of a robot's memory, which forgets its oldest."""
     for place in range(memory.shape[1] - 1, 0, -1):
         memory[robot, place] = memory[robot, place - 1]
@@ -93,7 +85,7 @@ def remember(memory: IntegerRows, robot: int, item: int) -> None:
 
 
 @inlined_kernel
-def is_remembered(memory: IntegerRows, robot: int, item: int) -> bool:
+def is_remembered(memory: Integers, robot: int, item: int) -> bool:
     """Return whether `item` is in a robot's memory."""
     found = False
     for place in range(memory.shape[1]):
@@ -102,43 +94,33 @@ def is_remembered(memory: IntegerRows, robot: int, item: int) -> bool:
 
 
 @inlined_kernel
-def wanted_item(
-    robot: int, robots: Robots, items: Items, item_grid: Grid, requested: int, reach: float
-) -> tuple[int, float]:
+def wanted_item(world: World, robot: int) -> tuple[int, float]:
     """Return the item that `robot` would lift now, or NOBODY, and the square of its distance.
 
-    The requested item within `reach` [m] comes first, else the nearest that is not in its memory.
+    The requested item in reach comes first, else the nearest that is not in its memory.
     """
+    robots, grid, nearby = world.robots, world.item_grid, world.nearby
     x, y = robots.position[robot, 0], robots.position[robot, 1]
-    best, best_square = NOBODY, reach * reach
-    left, right, bottom, top = cells_around(item_grid, x, y, reach)
-    for row in range(bottom, top + 1):
-        first, end = run_of(item_grid, row, left, right)
-        for place in range(first, end):
-            item = item_grid.members[place]
-            if items.status[item] != STORED:
-                continue
-            dx, dy = items.position[item, 0] - x, items.position[item, 1] - y
-            square = dx * dx + dy * dy
-            if square > reach * reach:
-                continue
-            if item == requested:
-                return item, square
-            if square > best_square or (square == best_square and best != NOBODY):
-                continue
-            if not is_remembered(robots.memory, robot, item):
-                best, best_square = item, square
+    n_found = look_around(grid, x, y, world.parameters.pickup_range, NOBODY, nearby)
+    best, best_square = NOBODY, math.inf
+    for index in range(n_found):
+        item, square = grid.members[nearby.place[index]], nearby.square[index]
+        if world.items.status[item] != STORED:
+            continue
+        if item == world.progress.requested[0]:
+            return item, square
+        if square < best_square and not is_remembered(robots.memory, robot, item):
+            best, best_square = item, square
     return best, best_square
 
 
 @inlined_kernel
-def close_grippers(world: World, commands: NumberRows, requested: int, n_events: int) -> int:
+def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
     """Lift what empty robots hold on to; returns the number of events so far.
 
     Where several want the same item the nearest able one gets it, and the others choose again.
     """
     robots, able, items, claims = world.robots, world.able, world.items, world.claims
-    reach = world.parameters.pickup_range
     while True:
         n_before = n_events
         for robot in range(len(commands)):
@@ -146,7 +128,7 @@ def close_grippers(world: World, commands: NumberRows, requested: int, n_events:
             is_free = robots.item[robot] == NOBODY
             if not is_free or not is_able or commands[robot, GRIPPER] <= _HOLD:
                 continue
-            item, square = wanted_item(robot, robots, items, world.item_grid, requested, reach)
+            item, square = wanted_item(world, robot)
             if item != NOBODY and (claims.robot[item] == NOBODY or square < claims.square[item]):
                 claims.robot[item] = robot
                 claims.square[item] = square

@@ -6,8 +6,8 @@ Each array handed to a kernel costs as much time as a robot's timers; a control 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from typing import Any, TypeVar, cast, get_args, get_type_hints
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
@@ -21,16 +21,29 @@ S = TypeVar("S", bound=tuple[Any, ...])
 _WORD = ir.IntType(64)
 
 
+def hints(structure: type) -> dict[str, Any]:
+    """Return the annotation of each field."""
+    return get_type_hints(structure, include_extras=True)
+
+
 @functools.cache
 def field_kinds(structure: type) -> dict[str, Any]:
-    """Return by field `float`, `int`, `bool`, a structure, or (dtype, dimensions) of an array."""
+    """Return by field `float`, `int`, `bool`, a structure, or (dtype, shape) of an array."""
     kinds: dict[str, Any] = {}
-    for name, hint in get_type_hints(structure, include_extras=True).items():
-        kinds[name] = hint
-        if metadata := getattr(hint, "__metadata__", None):
-            scalar = get_args(get_args(get_args(hint)[0])[1])[0]
-            kinds[name] = (np.dtype(scalar), metadata[0])
+    for name, hint in hints(structure).items():
+        kinds[name] = getattr(hint, "__origin__", hint)
+        if get_origin(kinds[name]) is np.ndarray:
+            scalar = get_args(get_args(kinds[name])[1])[0]
+            kinds[name] = (np.dtype(scalar), hint.__metadata__)
     return kinds
+
+
+def blank(structure: type[S], lengths: Mapping[str, int]) -> S:
+    """Return a structure of arrays of zeros; its shapes name their lengths."""
+    kinds = field_kinds(structure).values()
+    return structure(
+        *(np.zeros([lengths.get(n, n) for n in shape], dtype) for dtype, shape in kinds)
+    )
 
 
 def packed(value: tuple[Any, ...]) -> NDArray[np.int64]:
@@ -49,9 +62,10 @@ def packed(value: tuple[Any, ...]) -> NDArray[np.int64]:
 def _append_words(value: tuple[Any, ...], words: list[int]) -> None:
     for (name, kind), part in zip(field_kinds(type(value)).items(), value, strict=True):
         if isinstance(kind, tuple):
-            if (part.dtype, part.ndim) != kind or not part.flags.carray:
+            dtype, shape = kind
+            if (part.dtype, part.ndim) != (dtype, len(shape)) or not part.flags.carray:
                 what = f"{type(value).__name__}.{name}"
-                raise TypeError(f"{what}: should be a {kind[1]}-d array of {kind[0]}, without gaps")
+                raise TypeError(f"{what}: should be {shape} numbers of {dtype}, without gaps")
             words.append(part.__array_interface__["data"][0])  # faster than part.ctypes
             words += part.shape
         elif kind is float:
@@ -85,7 +99,7 @@ def _compiled_type(structure: type) -> Any:
     for kind in field_kinds(structure).values():
         if isinstance(kind, tuple):
             dtype = types.boolean if kind[0] == np.bool_ else getattr(types, kind[0].name)
-            parts.append(types.Array(dtype, kind[1], "C"))
+            parts.append(types.Array(dtype, len(kind[1]), "C"))
         else:
             parts.append(scalars.get(kind) or _compiled_type(kind))
     return cast("Any", types).NamedTuple(parts, structure)

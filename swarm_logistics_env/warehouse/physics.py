@@ -21,33 +21,8 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.building import N_WALLS, build, free
 from swarm_logistics_env.warehouse.engine import EMPTY_ROBOT, NO_ONE, collide_with, move
-from swarm_logistics_env.warehouse.packing import packed
+from swarm_logistics_env.warehouse.packing import hints, packed
 from swarm_logistics_env.warehouse.structs import Batch, Engine, Functions
-
-_FUNCTIONS = {
-    "step": "cpSpaceStep",
-    "set_iterations": "cpSpaceSetIterations",
-    "each_body": "cpSpaceEachBody",
-    "read_body": "pmSpaceBodyGetIteratorFuncBatched",
-    "write_body": "pmSpaceBodySetIteratorFuncBatched",
-    "set_filter": "cpShapeSetFilter",
-    "set_offset": "cpCircleShapeSetOffset",
-    "reindex": "cpSpaceReindexShape",
-    "new_space": "cpSpaceNew",
-    "static_body": "cpSpaceGetStaticBody",
-    "set_slop": "cpSpaceSetCollisionSlop",
-    "set_bias": "cpSpaceSetCollisionBias",
-    "new_body": "cpBodyNew",
-    "set_position": "cpBodySetPosition",
-    "set_velocity": "cpBodySetVelocity",
-    "new_circle": "cpCircleShapeNew",
-    "new_segment": "cpSegmentShapeNew",
-    "add_body": "cpSpaceAddBody",
-    "add_shape": "cpSpaceAddShape",
-    "free_space": "cpSpaceFree",
-    "free_body": "cpBodyFree",
-    "free_shape": "cpShapeFree",
-}
 
 
 class Physics:
@@ -63,13 +38,6 @@ class Physics:
 
     def __init__(self, scenario: Scenario) -> None:
         n = scenario.n_robots
-        lengths = {
-            "space": 1,
-            "robot_bodies": n,
-            "robot_shapes": n,
-            "item_shapes": scenario.n_items,
-            "solid_shapes": N_WALLS + scenario.n_obstacles,
-        }
         # A batch call reads and writes every body: of N robots, and the static one.
         state = _Memory(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY)
         velocities = _Memory(n + 1, 2, BodyFields.VELOCITY)
@@ -77,7 +45,11 @@ class Physics:
         self._kept = state, velocities, forces
         self.engine = Engine(
             functions=_FUNCTION_ADDRESSES,
-            **{name: np.zeros(length, np.int64) for name, length in lengths.items()},
+            space=np.zeros(1, np.int64),
+            robot_bodies=np.zeros(n, np.int64),
+            robot_shapes=np.zeros(n, np.int64),
+            item_shapes=np.zeros(scenario.n_items, np.int64),
+            solid_shapes=np.zeros(N_WALLS + scenario.n_obstacles, np.int64),
             bodies=state.batch,
             velocities=velocities.batch,
             forces=forces.batch,
@@ -138,8 +110,8 @@ def _function_addresses() -> Functions:
     if sys.maxsize < 2**32 or sys.byteorder != "little":
         raise SetupError("this machine's words: should be of 64 bits, lowest byte first")
     try:
-        found = {row: _address(ffi.addressof(lib, name)) for row, name in _FUNCTIONS.items()}
-        return Functions(**found)
+        names = [kind.__metadata__[0] for kind in hints(Functions).values()]
+        return Functions(*(_address(ffi.addressof(lib, name)) for name in names))
     except AttributeError as error:
         # Not pymunk.version, which pymunk 7.0 gives as that of something else.
         raise SetupError(f"pymunk {version('pymunk')} lacks a function: {error}") from None

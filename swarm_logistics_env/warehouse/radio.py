@@ -13,7 +13,7 @@ from swarm_logistics_env.warehouse.structs import (
     Capabilities,
     Grid,
     Nearby,
-    NumberRows,
+    Numbers,
     Parameters,
     Robots,
     World,
@@ -32,7 +32,7 @@ def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: 
 
 
 @inlined_kernel
-def send_messages(commands: NumberRows, robots: Robots, able: Capabilities, step: int) -> None:
+def send_messages(commands: Numbers, robots: Robots, able: Capabilities, step: int) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
     message, before = robots.message, robots.message_before
     n, n_kept = len(message), len(robots.told_before)

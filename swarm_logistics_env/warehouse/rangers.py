@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.structs import Grid, Nearby, NumberRows, Parameters
+from swarm_logistics_env.warehouse.structs import Grid, Nearby, Numbers, Parameters
 
 _N_BEAMS = row.N_BEAMS
 _BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
@@ -112,7 +112,7 @@ def scan_solids(
     pose: Pose,
     reach: float,
     parameters: Parameters,
-    obstacles: NumberRows,
+    obstacles: Numbers,
     scan: NDArray[np.float32],
 ) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""

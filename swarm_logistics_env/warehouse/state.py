@@ -8,16 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.packing import blank
 from swarm_logistics_env.warehouse.structs import (
     CARRIED,
     DELIVERED,
     NOBODY,
     STORED,
+    Capabilities,
+    Items,
     Progress,
-    blank_capabilities,
-    blank_items,
-    blank_progress,
     blank_robots,
+    lengths_of,
 )
 
 __all__ = ["CARRIED", "DELIVERED", "NOBODY", "STORED", "WarehouseState"]
@@ -113,10 +114,12 @@ class WarehouseState:
     anchoring_seconds = Count[float]()
 
     def __init__(self, scenario: Scenario) -> None:
-        self.robots = blank_robots(scenario)
-        self.able = blank_capabilities(scenario)
-        self.items = blank_items(scenario)
-        self.progress = blank_progress()
+        lengths = lengths_of(scenario)
+        self.robots = blank_robots(lengths)
+        self.able = blank(Capabilities, lengths)
+        self.items = blank(Items, lengths)
+        self.items.carrier[:], self.items.order[:] = NOBODY, np.arange(scenario.n_items)
+        self.progress = blank(Progress, lengths)
         self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
         # Per robot, the failure modes that hold.
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots

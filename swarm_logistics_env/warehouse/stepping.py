@@ -25,7 +25,7 @@ from swarm_logistics_env.warehouse.structs import (
     NOBODY,
     STORED,
     Commands,
-    NumberRows,
+    Numbers,
     World,
 )
 
@@ -115,12 +115,11 @@ def log_command(commands: Commands) -> None:
 
 
 @inlined_kernel
-def move(world: World, commands: NumberRows) -> None:
+def move(world: World, commands: Numbers) -> None:
     """Turn and move the robots as commanded and as far as bodies let them."""
     robots, engine, parameters = world.robots, world.engine, world.parameters
     drive(commands, robots, world.able, parameters, engine.wanted_velocity)
-    reach = parameters.robot_radius + parameters.item_radius
-    unmask_left(engine, reach, robots, world.items, world.robot_grid, world.item_grid)
+    unmask_left(world)
     advance(engine, parameters, int(np.count_nonzero(robots.contact)))
     bodies = engine.bodies.numbers
     for robot in range(len(robots.item)):
@@ -131,15 +130,12 @@ def move(world: World, commands: NumberRows) -> None:
 
 
 @inlined_kernel
-def handle_items(world: World, commands: NumberRows) -> tuple[int, bool]:
+def handle_items(world: World, commands: Numbers) -> tuple[int, bool]:
     """Carry along, let go, lift and deliver; returns how many, and whether there was room."""
-    robots, able, items, parameters = world.robots, world.able, world.items, world.parameters
-    events, requested = world.claims.events, world.progress.requested[0]
-    carry_along(robots, items, parameters.storage_width)
-    n_events = open_grippers(commands, robots, able, items, requested, events)
-    n_events = close_grippers(world, commands, requested, n_events)
-    reach = parameters.robot_radius + parameters.item_radius
-    mask_below_lifters(world.engine, events, n_events, reach, robots, items, world.item_grid)
+    carry_along(world)
+    n_events = open_grippers(world, commands)
+    n_events = close_grippers(world, commands, n_events)
+    mask_below_lifters(world, n_events)
     n_events, n_delivered, is_room = deliver(world, n_events)
-    follow(world.engine, events, n_events, items.position)
+    follow(world.engine, world.claims.events, n_events, world.items.position)
     return n_delivered, is_room

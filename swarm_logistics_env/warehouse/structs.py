@@ -1,10 +1,12 @@
 """The arrays of one world: what each holds, its shape and its unit.
 
-N robots, I items. The row of a robot that is absent holds zeros and `NOBODY`.
+Lengths are numbers or names, see `lengths_of`: N robots, I items, C columns of a command. The row
+of a robot that is absent holds zeros and `NOBODY`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
@@ -12,18 +14,16 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.observations import N_BEAMS
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.packing import blank
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
 LONGEST_RADIO_DELAY = 2.0  # [s] for which broadcasts are kept
 NOBODY = -1
 
-# Arrays of one and of two dimensions, as the annotation tells compiled code.
-Numbers: TypeAlias = Annotated[NDArray[np.float64], 1]
-NumberRows: TypeAlias = Annotated[NDArray[np.float64], 2]
-Integers: TypeAlias = Annotated[NDArray[np.int64], 1]
-IntegerRows: TypeAlias = Annotated[NDArray[np.int64], 2]
-Flags: TypeAlias = Annotated[NDArray[np.bool_], 1]
-Keys: TypeAlias = Annotated[NDArray[np.uint64], 1]
+Numbers: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int64]
+Flags: TypeAlias = NDArray[np.bool_]
+Keys: TypeAlias = NDArray[np.uint64]
 
 
 class Parameters(NamedTuple):
@@ -58,70 +58,70 @@ class Parameters(NamedTuple):
 class Robots(NamedTuple):
     """The robots; a row is one robot for good."""
 
-    position: NumberRows  # (N, 2) [m]
-    velocity: NumberRows  # (N, 2) [m/s]
-    heading: Numbers  # (N,) [rad] from +x to the left, within +-pi
-    heading_drift: Numbers  # (N,) [rad/s] at which its body turns, whatever is commanded
-    present: Flags  # (N,) False once it was removed
-    failed: Flags  # (N,) any failure mode holds
-    in_delivery: Flags  # (N,) its centre is in the delivery area
-    last_in_delivery: Integers  # (N,) the last control step in which it was, or NOBODY
-    contact: Flags  # (N,) touches something solid to it
-    item: Integers  # (N,) item carried, or NOBODY
-    memory: IntegerRows  # (N, memory_size) items put down, newest first, or NOBODY
-    timer: Numbers  # (N,) [s] since the delivery area, NaN when silent
-    told: Numbers  # (N,) [s] the timer it broadcasts, NaN when silent
-    heard: Numbers  # (N,) [s] the lowest timer it heard, NaN when none
-    message: NumberRows  # (N, message_size) in [-1, 1], broadcast
-    told_before: NumberRows  # (L, N) [s] timers of the last L steps, that of step s in row s % L
-    message_before: NumberRows  # (L N, message_size) of the last L steps, step after step
-    frozen_beams: NumberRows  # (N, 3 N_BEAMS) [m] what frozen rangers repeat, NaN when they work
-    sensor_key: Keys  # (N,) of the streams of its sensors' noise
+    position: Annotated[Numbers, "N", 2]  # [m]
+    velocity: Annotated[Numbers, "N", 2]  # [m/s]
+    heading: Annotated[Numbers, "N"]  # [rad] from +x to the left, within +-pi
+    heading_drift: Annotated[Numbers, "N"]  # [rad/s] at which its body turns unasked
+    present: Annotated[Flags, "N"]  # False once it was removed
+    failed: Annotated[Flags, "N"]  # any failure mode holds
+    in_delivery: Annotated[Flags, "N"]  # its centre is in the delivery area
+    last_in_delivery: Annotated[Integers, "N"]  # the last step in which it was, or NOBODY
+    contact: Annotated[Flags, "N"]  # touches something solid to it
+    item: Annotated[Integers, "N"]  # item carried, or NOBODY
+    memory: Annotated[Integers, "N", "memory_size"]  # items put down, newest first, or NOBODY
+    timer: Annotated[Numbers, "N"]  # [s] since the delivery area, NaN when silent
+    told: Annotated[Numbers, "N"]  # [s] the timer it broadcasts, NaN when silent
+    heard: Annotated[Numbers, "N"]  # [s] the lowest timer it heard, NaN when none
+    message: Annotated[Numbers, "N", "message_size"]  # in [-1, 1], broadcast
+    told_before: Annotated[Numbers, "K", "N"]  # [s] timers of K steps, of step s in row s % K
+    message_before: Annotated[Numbers, "K N", "message_size"]  # of the same steps
+    frozen_beams: Annotated[Numbers, "N", "beams"]  # [m] that frozen rangers repeat, or NaN
+    sensor_key: Annotated[Keys, "N"]  # of the streams of its sensors' noise
 
 
 class Capabilities(NamedTuple):
     """What each robot can do now; failures take from it."""
 
-    max_speed: Numbers  # (N,) [m/s]
-    max_turn_rate: Numbers  # (N,) [rad/s]
-    ranger_range: Numbers  # (N,) [m], 0 when blind
-    view_range: Numbers  # (N,) [m]
-    lifts: Flags  # (N,)
-    delivers: Flags  # (N,)
-    sends: Flags  # (N,)
-    hears: Flags  # (N,)
-    honest: Flags  # (N,) False: tells timer 0 always
-    obeys: Flags  # (N,) False: ignores its commands, the gripper's too
-    releases_inside: Flags  # (N,) False: lets nothing go inside the delivery area
-    rangers_refresh: Flags  # (N,) False: its rangers repeat one reading
-    ranger_bias: Numbers  # (N,) [m] that its rangers read too far
-    radio_delay: Integers  # (N,) control steps that its broadcasts come too late
+    max_speed: Annotated[Numbers, "N"]  # [m/s]
+    max_turn_rate: Annotated[Numbers, "N"]  # [rad/s]
+    ranger_range: Annotated[Numbers, "N"]  # [m], 0 when blind
+    view_range: Annotated[Numbers, "N"]  # [m]
+    lifts: Annotated[Flags, "N"]
+    delivers: Annotated[Flags, "N"]
+    sends: Annotated[Flags, "N"]
+    hears: Annotated[Flags, "N"]
+    honest: Annotated[Flags, "N"]  # False: tells timer 0 always
+    obeys: Annotated[Flags, "N"]  # False: ignores its commands, the gripper's too
+    releases_inside: Annotated[Flags, "N"]  # False: lets nothing go inside the delivery area
+    rangers_refresh: Annotated[Flags, "N"]  # False: its rangers repeat one reading
+    ranger_bias: Annotated[Numbers, "N"]  # [m] that its rangers read too far
+    radio_delay: Annotated[Integers, "N"]  # control steps that its broadcasts come too late
 
 
 class Items(NamedTuple):
     """The items, and in which order they are asked for."""
 
-    position: NumberRows  # (I, 2) [m], its carrier's while carried
-    status: Integers  # (I,) STORED, CARRIED or DELIVERED
-    carrier: Integers  # (I,) robot, or NOBODY
-    covered: Integers  # (I,) 1: stored, yet no obstacle; or 0
-    order: Integers  # (I,) items in the order of this cycle's requests
-    request_key: Keys  # (I,) of the streams that decide the order of every cycle
-    restock_key: Keys  # (1,) of the streams that decide where delivered items come back
+    position: Annotated[Numbers, "I", 2]  # [m], its carrier's while carried
+    status: Annotated[Integers, "I"]  # STORED, CARRIED or DELIVERED
+    carrier: Annotated[Integers, "I"]  # robot, or NOBODY
+    covered: Annotated[Integers, "I"]  # 1: stored, yet no obstacle; or 0
+    order: Annotated[Integers, "I"]  # items in the order of this cycle's requests
+    request_key: Annotated[Keys, "I"]  # of the streams that decide the order of every cycle
+    restock_key: Annotated[Keys, 1]  # of the streams that decide where delivered items come back
 
 
 class Progress(NamedTuple):
     """How far the episode is; each an array of one number that a step changes."""
 
-    step: Integers  # control steps since the start
-    time: Numbers  # [s] since the start
-    requested: Integers  # the item asked for now, or NOBODY when all are delivered
-    n_asked: Integers  # requests before this one
-    n_delivered: Integers  # items delivered
-    anchoring_seconds: Numbers  # robot-seconds of working robots touching failed ones
-    last_step: Integers  # the step in which the time is up
-    pause_step: Integers  # the step that ends before anything is sensed, as faults begin or end
-    is_changed: Flags  # faults or conditions changed since the step before
+    step: Annotated[Integers, 1]  # control steps since the start
+    time: Annotated[Numbers, 1]  # [s] since the start
+    requested: Annotated[Integers, 1]  # the item asked for now, or NOBODY when all are delivered
+    n_asked: Annotated[Integers, 1]  # requests before this one
+    n_delivered: Annotated[Integers, 1]  # items delivered
+    anchoring_seconds: Annotated[Numbers, 1]  # of working robots that touch failed ones, summed
+    last_step: Annotated[Integers, 1]  # the step in which the time is up
+    pause_step: Annotated[Integers, 1]  # it ends before anything is sensed, as faults change then
+    is_changed: Annotated[Flags, 1]  # faults or conditions changed since the step before
 
 
 class Grid(NamedTuple):
@@ -130,63 +130,63 @@ class Grid(NamedTuple):
     cell: float  # side of a cell [m]
     n_columns: int  # cells along x
     n_rows: int  # cells along y
-    start: Integers  # (n_columns * n_rows + 1,) where each cell's points begin in `members`
-    members: Integers  # (n,) point numbers, cell by cell, row by row of cells
-    places: NumberRows  # (n, 2) [m], in the same order
+    start: Annotated[Integers, "cells + 1"]  # where each cell's points begin in `members`
+    members: Annotated[Integers, "points"]  # point numbers, cell by cell, row by row of cells
+    places: Annotated[Numbers, "points", 2]  # [m], in the same order
 
 
 class Nearby(NamedTuple):
     """What stands near one robot: working space, filled anew for every robot and sense."""
 
-    place: Integers  # (n,) where it stands in `Grid.members`
-    square: Numbers  # (n,) [m^2] of its distance
-    is_heard: Flags  # (n,) of robots, on the radio
-    chosen: Integers  # (n,) numbers of robots or items that are seen or heard
-    chosen_square: Numbers  # (n,) [m^2]
-    chosen_heard: Flags  # (n,) of robots, whether it is heard
-    nearest: Integers  # (n,) indices into `chosen` of the nearest, nearest first
-    scanned: Integers  # (n,) indices into `place` of what the rangers may meet
-    forward: Numbers  # (n,) [m] of what is scanned, in the robot's frame
-    left: Numbers  # (n,) [m]
-    scanned_square: Numbers  # (n,) [m^2]
-    beam: Integers  # (n,) that looks nearest to its centre
-    distance: Numbers  # (n,) [m] where that beam meets it, infinite if it does not
+    place: Annotated[Integers, "nearby"]  # where it stands in `Grid.members`
+    square: Annotated[Numbers, "nearby"]  # [m^2] of its distance
+    is_heard: Annotated[Flags, "nearby"]  # of robots, on the radio
+    chosen: Annotated[Integers, "nearby"]  # numbers of robots or items that are seen or heard
+    chosen_square: Annotated[Numbers, "nearby"]  # [m^2]
+    chosen_heard: Annotated[Flags, "nearby"]  # of robots, whether it is heard
+    nearest: Annotated[Integers, "nearby"]  # indices into `chosen` of the nearest, nearest first
+    scanned: Annotated[Integers, "nearby"]  # indices into `place` of what the rangers may meet
+    forward: Annotated[Numbers, "nearby"]  # [m] of what is scanned, in the robot's frame
+    left: Annotated[Numbers, "nearby"]  # [m]
+    scanned_square: Annotated[Numbers, "nearby"]  # [m^2]
+    beam: Annotated[Integers, "nearby"]  # that looks nearest to its centre
+    distance: Annotated[Numbers, "nearby"]  # [m] where that beam meets it, infinite if it does not
 
 
 class Claims(NamedTuple):
     """Working space of the logistics."""
 
-    robot: Integers  # (I,) who is going to lift the item, NOBODY before and after
-    square: Numbers  # (I,) [m^2] of the distance between the two
-    events: IntegerRows  # (4 N, 3) kind, robot, item: what the bodies must be told
-    delivered_by: Integers  # (N,) robots that delivered in this step
+    robot: Annotated[Integers, "I"]  # who is going to lift the item, NOBODY before and after
+    square: Annotated[Numbers, "I"]  # [m^2] of the distance between the two
+    events: Annotated[Integers, "4 N", 3]  # kind, robot, item: what the bodies must be told
+    delivered_by: Annotated[Integers, "N"]  # robots that delivered in this step
 
 
 class Functions(NamedTuple):
-    """Addresses of the engine's functions; `physics` has their names in C."""
+    """Addresses of the engine's functions, with their names in C."""
 
-    step: int
-    set_iterations: int
-    each_body: int
-    read_body: int
-    write_body: int
-    set_filter: int
-    set_offset: int
-    reindex: int
-    new_space: int
-    static_body: int
-    set_slop: int
-    set_bias: int
-    new_body: int
-    set_position: int
-    set_velocity: int
-    new_circle: int
-    new_segment: int
-    add_body: int
-    add_shape: int
-    free_space: int
-    free_body: int
-    free_shape: int
+    step: Annotated[int, "cpSpaceStep"]
+    set_iterations: Annotated[int, "cpSpaceSetIterations"]
+    each_body: Annotated[int, "cpSpaceEachBody"]
+    read_body: Annotated[int, "pmSpaceBodyGetIteratorFuncBatched"]
+    write_body: Annotated[int, "pmSpaceBodySetIteratorFuncBatched"]
+    set_filter: Annotated[int, "cpShapeSetFilter"]
+    set_offset: Annotated[int, "cpCircleShapeSetOffset"]
+    reindex: Annotated[int, "cpSpaceReindexShape"]
+    new_space: Annotated[int, "cpSpaceNew"]
+    static_body: Annotated[int, "cpSpaceGetStaticBody"]
+    set_slop: Annotated[int, "cpSpaceSetCollisionSlop"]
+    set_bias: Annotated[int, "cpSpaceSetCollisionBias"]
+    new_body: Annotated[int, "cpBodyNew"]
+    set_position: Annotated[int, "cpBodySetPosition"]
+    set_velocity: Annotated[int, "cpBodySetVelocity"]
+    new_circle: Annotated[int, "cpCircleShapeNew"]
+    new_segment: Annotated[int, "cpSegmentShapeNew"]
+    add_body: Annotated[int, "cpSpaceAddBody"]
+    add_shape: Annotated[int, "cpSpaceAddShape"]
+    free_space: Annotated[int, "cpSpaceFree"]
+    free_body: Annotated[int, "cpBodyFree"]
+    free_shape: Annotated[int, "cpShapeFree"]
 
 
 class Batch(NamedTuple):
@@ -194,39 +194,39 @@ class Batch(NamedTuple):
 
     address: int  # of the engine's structure
     count_address: int  # of how many numbers it has read or written
-    numbers: NumberRows  # (bodies, columns)
+    numbers: Annotated[Numbers, "bodies", "columns"]
 
 
 class Engine(NamedTuple):
     """The engine's things of one world, by their addresses, and what it reads and writes."""
 
     functions: Functions
-    space: Integers  # (1,)
-    robot_bodies: Integers  # (N,)
-    robot_shapes: Integers  # (N,)
-    item_shapes: Integers  # (I,)
-    solid_shapes: Integers  # (4 + n_obstacles,) walls, then obstacles
+    space: Annotated[Integers, 1]
+    robot_bodies: Annotated[Integers, "N"]
+    robot_shapes: Annotated[Integers, "N"]
+    item_shapes: Annotated[Integers, "I"]
+    solid_shapes: Annotated[Integers, "4 + n_obstacles"]  # walls, then obstacles
     bodies: Batch  # (N + 1, 4) x, y [m] and velocity [m/s]
     velocities: Batch  # (N + 1, 2) [m/s]
     forces: Batch  # (N + 1, 2) [N], written to the bodies for one substep
-    wanted_velocity: NumberRows  # (N, 2) [m/s] what the drives aim at
+    wanted_velocity: Annotated[Numbers, "N", 2]  # [m/s] what the drives aim at
 
 
 class Commands(NamedTuple):
     """The commands of the next step, and of those that a pickle replays; C columns."""
 
-    now: NumberRows  # (N, C)
-    log: NumberRows  # (L N, C) of the last steps, step after step
-    n_logged: Integers  # (1,) steps in `log`
+    now: Annotated[Numbers, "N", "C"]
+    log: Annotated[Numbers, "L N", "C"]  # of the L last steps, step after step
+    n_logged: Annotated[Integers, 1]  # steps in `log`
 
 
 class Outcome(NamedTuple):
     """What the last step has to tell beside the state; each an array of one."""
 
-    refused: Integers  # place, row by row, of the command that is not finite; NOBODY: step taken
-    n_delivered: Integers  # deliveries in this step, by `Claims.delivered_by`
-    is_paused: Flags  # nothing was sensed yet, as faults begin or end now
-    is_room: Flags  # all items that came back to the storage found room
+    refused: Annotated[Integers, 1]  # place, row by row, of a command that is not finite; or NOBODY
+    n_delivered: Annotated[Integers, 1]  # deliveries in this step, by `Claims.delivered_by`
+    is_paused: Annotated[Flags, 1]  # nothing was sensed yet, as faults begin or end now
+    is_room: Annotated[Flags, 1]  # all items that came back to the storage found room
 
 
 class World(NamedTuple):
@@ -237,7 +237,7 @@ class World(NamedTuple):
     robots: Robots
     able: Capabilities
     items: Items
-    obstacles: NumberRows  # (n_obstacles, 2) [m]
+    obstacles: Annotated[Numbers, "n_obstacles", 2]  # [m]
     progress: Progress
     outcome: Outcome
     robot_grid: Grid
@@ -252,119 +252,29 @@ def parameters_of(scenario: Scenario) -> Parameters:
     return Parameters(*(getattr(scenario, name) for name in Parameters._fields))
 
 
-def blank_robots(scenario: Scenario) -> Robots:
-    """Return robots without places, sound, silent and with empty hands."""
-    n = scenario.n_robots
-    n_kept = round(LONGEST_RADIO_DELAY / scenario.control_period) + 1
-    return Robots(
-        position=np.zeros((n, 2)),
-        velocity=np.zeros((n, 2)),
-        heading=np.zeros(n),
-        heading_drift=np.zeros(n),
-        present=np.ones(n, np.bool_),
-        failed=np.zeros(n, np.bool_),
-        in_delivery=np.zeros(n, np.bool_),
-        last_in_delivery=np.full(n, NOBODY),
-        contact=np.zeros(n, np.bool_),
-        item=np.full(n, NOBODY),
-        memory=np.full((n, scenario.memory_size), NOBODY),
-        timer=np.full(n, np.nan),
-        told=np.full(n, np.nan),
-        heard=np.full(n, np.nan),
-        message=np.zeros((n, scenario.message_size)),
-        told_before=np.full((n_kept, n), np.nan),
-        message_before=np.zeros((n_kept * n, scenario.message_size)),
-        frozen_beams=np.full((n, 3 * N_BEAMS), np.nan),
-        sensor_key=np.zeros(n, np.uint64),
-    )
-
-
-def blank_capabilities(scenario: Scenario) -> Capabilities:
-    """Return full capabilities but for speeds and ranges, which `faults` fills."""
-    n = scenario.n_robots
-    return Capabilities(
-        max_speed=np.zeros(n),
-        max_turn_rate=np.zeros(n),
-        ranger_range=np.zeros(n),
-        view_range=np.zeros(n),
-        lifts=np.ones(n, np.bool_),
-        delivers=np.ones(n, np.bool_),
-        sends=np.ones(n, np.bool_),
-        hears=np.ones(n, np.bool_),
-        honest=np.ones(n, np.bool_),
-        obeys=np.ones(n, np.bool_),
-        releases_inside=np.ones(n, np.bool_),
-        rangers_refresh=np.ones(n, np.bool_),
-        ranger_bias=np.zeros(n),
-        radio_delay=np.zeros(n, np.int64),
-    )
-
-
-def blank_items(scenario: Scenario) -> Items:
-    """Return stored items without places."""
-    n = scenario.n_items
-    return Items(
-        position=np.zeros((n, 2)),
-        status=np.full(n, STORED),
-        carrier=np.full(n, NOBODY),
-        covered=np.zeros(n, np.int64),
-        order=np.arange(n),
-        request_key=np.zeros(n, np.uint64),
-        restock_key=np.zeros(1, np.uint64),
-    )
-
-
-def blank_progress() -> Progress:
-    """Return an episode before its first step, in which item 0 is asked for."""
-    return Progress(
-        step=np.zeros(1, np.int64),
-        time=np.zeros(1),
-        requested=np.zeros(1, np.int64),
-        n_asked=np.zeros(1, np.int64),
-        n_delivered=np.zeros(1, np.int64),
-        anchoring_seconds=np.zeros(1),
-        last_step=np.zeros(1, np.int64),
-        pause_step=np.full(1, NOBODY),
-        is_changed=np.zeros(1, np.bool_),
-    )
-
-
-def blank_outcome() -> Outcome:
-    """Return what an uneventful step tells."""
-    return Outcome(
-        refused=np.full(1, NOBODY),
-        n_delivered=np.zeros(1, np.int64),
-        is_paused=np.zeros(1, np.bool_),
-        is_room=np.ones(1, np.bool_),
-    )
-
-
-def blank_nearby(scenario: Scenario) -> Nearby:
-    """Return working space for as many things as there may be near a robot."""
-    n = max(scenario.n_robots, scenario.n_items) + 1
-    return Nearby(
-        place=np.zeros(n, np.int64),
-        square=np.zeros(n),
-        is_heard=np.zeros(n, np.bool_),
-        chosen=np.zeros(n, np.int64),
-        chosen_square=np.zeros(n),
-        chosen_heard=np.zeros(n, np.bool_),
-        nearest=np.zeros(n, np.int64),
-        scanned=np.zeros(n, np.int64),
-        forward=np.zeros(n),
-        left=np.zeros(n),
-        scanned_square=np.zeros(n),
-        beam=np.zeros(n, np.int64),
-        distance=np.zeros(n),
-    )
-
-
-def blank_claims(scenario: Scenario) -> Claims:
-    """Return working space in which nobody claims anything."""
+def lengths_of(scenario: Scenario) -> dict[str, int]:
+    """Return the lengths of a world's arrays by the names that their shapes have."""
     n, n_items = scenario.n_robots, scenario.n_items
-    return Claims(
-        robot=np.full(n_items, NOBODY),
-        square=np.zeros(n_items),
-        events=np.zeros((4 * n, 3), np.int64),
-        delivered_by=np.zeros(n, np.int64),
-    )
+    n_kept = round(LONGEST_RADIO_DELAY / scenario.control_period) + 1
+    return {
+        "N": n,
+        "4 N": 4 * n,
+        "I": n_items,
+        "K": n_kept,
+        "K N": n_kept * n,
+        "beams": 3 * N_BEAMS,
+        "nearby": max(n, n_items) + 1,
+        "memory_size": scenario.memory_size,
+        "message_size": scenario.message_size,
+    }
+
+
+def blank_robots(lengths: Mapping[str, int]) -> Robots:
+    """Return robots without places, sound, silent and with empty hands."""
+    robots = blank(Robots, lengths)
+    robots.present[:] = True
+    for unknown in (robots.item, robots.memory, robots.last_in_delivery):
+        unknown[...] = NOBODY
+    for unset in (robots.timer, robots.told, robots.heard, robots.told_before, robots.frozen_beams):
+        unset[...] = np.nan
+    return robots

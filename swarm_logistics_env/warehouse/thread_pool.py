@@ -27,7 +27,7 @@ from swarm_logistics_env.warehouse.atomic import add, exchange, load, replace
 from swarm_logistics_env.warehouse.kinematics import refused_command
 from swarm_logistics_env.warehouse.native import pointer_at
 from swarm_logistics_env.warehouse.packing import unpacked_at
-from swarm_logistics_env.warehouse.structs import NOBODY, NumberRows, World
+from swarm_logistics_env.warehouse.structs import NOBODY, Numbers, World
 from swarm_logistics_env.warehouse.warehouse import Warehouse
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
@@ -168,7 +168,7 @@ def job_at(queue: int, place: int) -> int:
 
 
 @kernel
-def submit(queue: int, commands: NumberRows, rows: NDArray[np.float32]) -> int:
+def submit(queue: int, commands: Numbers, rows: NDArray[np.float32]) -> int:
     """Give out the jobs of a step, but none if a command is refused.
 
     Args:
@@ -186,6 +186,7 @@ def submit(queue: int, commands: NumberRows, rows: NDArray[np.float32]) -> int:
         now = world.commands.now
         now[:, :] = commands[first : first + len(now)]
         refused = refused_command(now, world.robots, world.able)
+        world.outcome.refused[0] = NOBODY
         if refused != NOBODY:
             return int(first * commands.shape[1] + refused)
     for place in range(n_jobs):

@@ -17,15 +17,16 @@ from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.warehouse import layout, stepping
 from swarm_logistics_env.warehouse.faults import GRACE, Fault, Occurrence, apply_faults
 from swarm_logistics_env.warehouse.grid import blank_grid
-from swarm_logistics_env.warehouse.packing import packed
+from swarm_logistics_env.warehouse.packing import blank, packed
 from swarm_logistics_env.warehouse.physics import Physics
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 from swarm_logistics_env.warehouse.structs import (
+    Claims,
     Commands,
+    Nearby,
+    Outcome,
     World,
-    blank_claims,
-    blank_nearby,
-    blank_outcome,
+    lengths_of,
     parameters_of,
 )
 
@@ -368,6 +369,7 @@ class Warehouse:
         scenario, state = self.scenario, self.state
         n, n_columns = self._command_shape
         state.progress.last_step[0] = scenario.n_steps
+        lengths = lengths_of(scenario)
         self._physics = Physics(scenario)
         self._world = World(
             parameters=parameters_of(scenario),
@@ -381,13 +383,14 @@ class Warehouse:
             items=state.items,
             obstacles=state.obstacle_position,
             progress=state.progress,
-            outcome=blank_outcome(),
+            outcome=blank(Outcome, lengths),
             robot_grid=self._robot_grid,
             item_grid=self._item_grid,
-            nearby=blank_nearby(scenario),
-            claims=blank_claims(scenario),
+            nearby=blank(Nearby, lengths),
+            claims=blank(Claims, lengths),
             engine=self._physics.engine,
         )
+        self._world.claims.robot[:] = NOBODY
         words = packed(self._world)
         # In the same place as before, so that others need not ask where after each step.
         self._words = words if len(self._words) == 0 else self._words

@@ -1,4 +1,4 @@
-"""Runs that one watches in the browser and interferes with, and films of runs."""
+"""Live runs in the browser, with failures and changes by hand, and films of runs."""
 
 from swarm_logistics_env.watch.session import Session
 

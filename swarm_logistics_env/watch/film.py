@@ -10,6 +10,7 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering.canvas import new_canvas, to_array
 from swarm_logistics_env.rendering.curves import Curve, Event
@@ -19,11 +20,10 @@ from swarm_logistics_env.rendering.projection import LARGEST_SIZE, LEAST_SIZE
 from swarm_logistics_env.rendering.sprites import words
 from swarm_logistics_env.rendering.strip import draw_strip
 from swarm_logistics_env.warehouse.faults import failed_robots
-from swarm_logistics_env.watch.play import Play
 
 MOST_TAKES = 4
-LAST_FRAME = 2.0  # [s] that it stays, so that a loop can be read
-_STRIP_HEIGHT = 0.3  # of a picture's longer side
+LAST_FRAME = 2.0  # [s] it stays so long, so that a looping film can be read
+_STRIP_HEIGHT = 0.3  # a part of a picture's longer side
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Take:
     """One of the runs that a film shows.
 
     Attributes:
-        name: what stands above it.
+        name: the title above it.
         play: the run, at its beginning.
     """
 
@@ -43,18 +43,18 @@ class Film:
     """Frames of runs side by side; the same runs give the same frames.
 
     Args:
-        takes: at most `MOST_TAKES`.
-        until: where the film ends [s of the runs].
-        speed: times real time.
-        frame_rate: [1/s].
-        size: longer side of each warehouse [px].
-        trails, all_links: as `Renderer` has them.
+        takes: the runs, at most `MOST_TAKES`.
+        until: the time of the runs at which the film ends [s].
+        speed: how many times real time it plays.
+        frame_rate: the number of frames per second of film [1/s].
+        size: the longer side of each warehouse [px].
+        trails, all_links: as in `Renderer`.
 
     Attributes:
-        n_frames: how many there will be, if the runs last until the end.
+        n_frames: the number of frames, if the runs last until the end.
 
     Raises:
-        SetupError: an argument cannot be.
+        SetupError: an argument is not allowed.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Film:
         """Play the runs and return their pictures: (H, W, 3), red, green, blue, even sides.
 
         Raises:
-            PolicyError: the commands of a policy cannot be.
+            PolicyError: a policy returned commands of the wrong shape, or not finite.
         """
         frame, count, time = self._draw(), 0, 0.0
         yield frame

@@ -6,8 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, suggest
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.curves import Curve, Event
@@ -15,35 +14,34 @@ from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
-from swarm_logistics_env.watch.play import Play
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 WIDTH_STEP = 0.25  # [m]
 
 
 class Session:
-    """A run and its twin: same seed, same policy, same conditions, but no fault ever.
+    """A run and its twin, which has the same seed, policy and conditions but no faults.
 
     Args:
         scenario: the conditions.
-        make_policy: called once for each of the two.
-        seed: of the first episode.
-        faults: scheduled in the run in every episode, besides the faults that one adds by hand.
-        speed: times real time, one of `SPEEDS`.
+        make_policy: returns a policy; it is called once for the run and once for the twin.
+        seed: the seed of the first episode.
+        faults: faults of the run in every episode, in addition to those that are added by hand.
+        speed: how many times real time it plays; one of `SPEEDS`.
 
     Attributes:
-        run, twin: the two.
-        seed: of this episode.
+        run, twin: the run and its twin.
+        seed: the seed of this episode.
         paused: whether time stands still.
         mode: the failure mode that `break_robot` uses.
         selected: the robot that is inspected, or None.
-        events: what was done to robots in this episode.
-        note: the last thing that happened, a sentence.
-        trails: where the run's robots were in every step of late, however few are shown.
+        events: the failures and repairs of robots in this episode.
+        note: a sentence about what happened last.
+        trails: the paths of the run's robots, with every step, also of steps that are not shown.
 
     Raises:
         FaultError, ScenarioError: as `Warehouse.reset`.
-        SetupError: no such speed.
+        SetupError: `speed` is not one of `SPEEDS`.
     """
 
     def __init__(
@@ -88,11 +86,11 @@ class Session:
     # Time
 
     def play(self, elapsed: float, budget: float = math.inf) -> int:
-        """Let run and twin go on for so much wall time; return the steps that took.
+        """Let run and twin go on for some wall time; return the number of steps taken.
 
         Args:
-            elapsed: since the last call [s].
-            budget: of computing [s]; what does not fit into it is not caught up with.
+            elapsed: wall time since the last call [s].
+            budget: the most time to compute [s]; steps that do not fit into it are left out.
         """
         if self.paused or self.is_over:
             return 0
@@ -108,11 +106,11 @@ class Session:
         return steps
 
     def pause(self) -> None:
-        """Stop time, or let it go on."""
+        """Pause, or go on."""
         self.paused = not self.paused
 
     def step(self) -> None:
-        """Stop time, and take one control period."""
+        """Pause, and take one control period."""
         self.paused = True
         self._advance()
 
@@ -136,16 +134,8 @@ class Session:
 
     # Robots
 
-    def robot_at(self, x: float, y: float, reach: float) -> int | None:
-        """Return the robot nearest to a position [m] and within `reach` [m] of it, if any."""
-        state = self.run.world.state
-        away = np.hypot(state.robot_position[:, 0] - x, state.robot_position[:, 1] - y)
-        away[~state.robot_present] = np.inf
-        nearest = int(np.argmin(away))
-        return nearest if away[nearest] <= reach else None
-
     def select(self, robot: int | None) -> None:
-        """Inspect `robot`, or none."""
+        """Inspect `robot`; None ends the inspection."""
         if robot is not None:
             self._check_there(robot)
         self.selected = robot
@@ -162,7 +152,7 @@ class Session:
         self.mode = modes[(modes.index(self.mode) + (1 if forward else -1)) % len(modes)]
 
     def break_robot(self, robot: int | None = None) -> None:
-        """Let a robot, the selected one if None, fail from now on in the chosen mode."""
+        """Let `robot` fail from now on in the chosen mode; None means the selected robot."""
         robot = self._meant(robot)
         if robot is None:
             return
@@ -177,7 +167,7 @@ class Session:
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
 
     def repair_robot(self, robot: int | None = None) -> None:
-        """End every failure that holds of a robot, the selected one if None."""
+        """End all failures of `robot`; None means the selected robot."""
         robot = self._meant(robot)
         if robot is None:
             return

@@ -15,7 +15,7 @@ from swarm_logistics_env.warehouse.faults import failed_robots
 class Condition:
     """The difference of an episode from its reference: size, faults, a changed parameter.
 
-    When a fault begins is no part of it: where onsets are drawn, P_F is the mean over them.
+    The onset of a fault is no part of it: if onsets are drawn, P_F is the mean over them.
 
     Args:
         n_robots: the swarm size N.

@@ -1,4 +1,4 @@
-"""Robots that fail."""
+"""A wrapper that lets robots fail."""
 
 from __future__ import annotations
 
@@ -22,30 +22,32 @@ if TYPE_CHECKING:
 
 
 class FaultInjection(Wrapper):
-    """Lets robots fail in every episode, besides those that fail anyway.
+    """Lets robots fail in every episode, in addition to the environment's own faults.
 
-    Robots do not sense that they failed; `infos` say who has "failed", and
-    `warehouse.state.failure_modes` names the modes while they hold. Faults among a reset's options
-    replace those that the environment was made with; this wrapper's are added to either.
+    Robots do not sense that they failed. `infos` tell it by the key "failed", and
+    `warehouse.state.failure_modes` names the modes while they hold. Faults in the options of a
+    reset replace the environment's own; the faults of this wrapper are added to either.
 
     Args:
         env: the environment, or a wrapper of one.
         mode: a key of `FAILURE_MODES`.
-        robots: how many fail, chosen by the episode's seed alone: sets of 1, 2, 3, .. are nested,
-            and the same for every mode; or the robots' numbers.
-        onset: when [s]: a time, a list to draw from in each episode, or a function of a numpy
-            Generator, that returns one time or an array of any number of them. At each further
-            onset so many more robots fail, while there are any; named robots fail anew.
-        duration: for how long [s]; None: for good.
-        factor: for `motor_slow` and `view_reduced`: what is left, in [0, 1).
+        robots: how many robots fail, or the numbers of those that do. A number of robots is
+            chosen by the episode's seed alone: sets of 1, 2, 3, .. are nested, and are the same
+            for every mode.
+        onset: the time of the failure [s]; a list to draw from in each episode; or a function of
+            a numpy Generator that returns one time or an array of times. At each further time
+            as many robots more fail, as long as there are any; robots given by number fail anew.
+        duration: how long a failure lasts [s]; None means until the end.
+        factor: the part of speed (`motor_slow`) or of view (`view_reduced`) that is left, in
+            [0, 1).
 
     Attributes:
         injected: this episode's faults of this wrapper, with the robots' numbers.
 
     Raises:
-        FaultError: no such mode, robots, times or factor; more robots than there may be. For what
-            a distribution gives: at the reset.
-        SetupError: `env` is none.
+        FaultError: mode, robots, times or factor are not allowed, or there may be fewer robots
+            than that. If a function gives such times, the reset raises it.
+        SetupError: `env` is not such an environment.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0
@@ -102,7 +104,7 @@ class FaultInjection(Wrapper):
         """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
-            FaultError: it has fewer robots than are to fail.
+            FaultError: `scenario` has fewer robots than are to fail.
         """
         self._check(scenario)
         self.env.declare_spaces(scenario)

@@ -1,4 +1,4 @@
-"""The same agents from the first step to the last, for trainers that expect it."""
+"""A wrapper that keeps the same agents from the first step to the last."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
 
 
 class FixedAgents(Wrapper):
-    """Keeps all possible agents in every episode until its end, for trainers of a fixed number.
+    """Keeps all possible agents until the end of every episode, as some trainers require.
 
-    Arrays have a row for each of the P `possible_agents`. An agent whose robot is not in this
-    episode, or has left, stays: its observation is zeros, its reward 0, its command is ignored,
-    and its infos say "active" 0 instead of 1. All agents end together: truncated when the time is
-    up, terminated when everything is delivered or no robot is left. It goes around all other
-    wrappers.
+    Arrays have a row for each of the P `possible_agents`. If the robot of an agent is not in this
+    episode, or has left it, the agent stays: its observation is zeros, its reward is 0, its command
+    is ignored, and its infos say "active" 0 instead of 1. All agents end together. They are
+    truncated when the time is up, and terminated when everything is delivered or no robot is
+    left. This wrapper has to be the outermost.
 
     Args:
         env: the environment, or a wrapper of one.
 
     Raises:
-        SetupError: it is something else, or has such a wrapper already.
+        SetupError: `env` is something else, or has such a wrapper already.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0

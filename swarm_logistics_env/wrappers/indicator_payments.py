@@ -137,7 +137,7 @@ def _derivative(
     if condition != compared.reference:
         return -compared.scale / p_o
     if means.performance(condition) < means.least:
-        return 0.0  # where it counts as `least` it moves nothing
+        return 0.0  # it counts as `least`, so that a change of it moves nothing
     if compared.against != compared.reference:
         p_tested -= means.performance(compared.against)
     return -compared.scale * p_tested / p_o**2

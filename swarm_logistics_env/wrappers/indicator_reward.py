@@ -45,21 +45,22 @@ class IndicatorReward(Wrapper):
     P         1                  0                    any conditions
     ========= ================== ==================== ===================================
 
-    What an episode is about (its `Condition`) is read from the warehouse, so that it does not
-    matter who asked for it: reset options, or wrappers inside or outside of this one. Removed
-    robots are no faulty ones. A parameter that changes in mid-run makes up for what was
-    paid before, so the return is A all the same.
+    The `Condition` of an episode is read from the warehouse. So it may come from the options of a
+    reset or from wrappers inside or outside of this one. Removed robots do not count as faulty.
+    When a parameter changes in mid-run, the next reward corrects what was paid before, so that
+    the return is still A.
 
-    *References as numbers.* P_o of the environment's own scenario, or a performance per condition,
-    for instance the means of a study. Episodes without faults and changes pay nothing then (but
-    P). Beware: **R, FT, S and A rise when P_o falls**, and nothing in such a reward holds P_o up.
-    So P_o is reported beside them, the one given and, where such episodes are played, the
-    one measured: look at both, or add P to the weights.
+    *References as numbers.* Give P_o of the environment's own scenario, or a performance for each
+    condition, for instance the means of a study. Then episodes without faults and changes pay
+    nothing (except P). Beware: **R, FT, S and A rise when P_o falls**, and nothing in such a
+    reward holds P_o up. So infos report P_o beside them: the value given and, if such episodes are
+    played, the value measured. Look at both, or add P to the weights.
 
-    *References as running means* of episodes of the policy in training, played in between: give a
-    `RunningMeans`. Its means at the start of an episode hold for all of that episode. The
-    indicator then depends on the policy through its references too, and reference episodes are
-    paid for that, by the derivative of the indicator with respect to their performance:
+    *References as running means.* Give a `RunningMeans` to measure references in episodes of the
+    policy in training, which are played in between. Its means at the start of an episode hold for
+    the whole episode. The indicator then depends on the policy through its references too.
+    Therefore reference episodes are paid the derivative of the indicator with respect to their
+    performance:
 
     * no faults: -(n_F / n_o) P_F / P_o^2 per delivery for R; -(n_F / n_o) (P_F - P_S) / P_o^2 for
       FT; the same as for R times N/m or 1/abs(dx), with P_(N+m) or P_new for P_F, for S and A;
@@ -74,22 +75,23 @@ class IndicatorReward(Wrapper):
         env: the environment, or a wrapper of one.
         weights: "R", or several with their weights, e.g. {"R": 1.0, "P": 0.02}.
         references: P_o [items], {condition: P}, or `RunningMeans`, which several may share.
-        credit: who gets the share: "team": everybody present, all of it, so that each robot's
-            return is the indicator; "deliverer": the robot that delivers; "carriers": in equal
-            parts, those that carried the item since it was asked for. In these two the constant
-            is divided among all, so that the sum of the robots' returns is the indicator.
+        credit: the robots that get the share of a delivery. "team": each robot present gets all
+            of it, so that the return of each is the indicator. "deliverer": the robot that
+            delivers. "carriers": those that carried the item since it was requested, in equal
+            parts. In the last two the constant is divided among all robots present, so that the
+            sum of all returns is the indicator.
         constant: whether to pay the constant.
         own_reward: weight of the wrapped environment's own reward, which is added, for shaping.
 
     Attributes:
-        condition: of this episode.
-        payments: of this episode, by indicator; unweighted.
-        measured: running means of all conditions played, also where references are numbers. An
+        condition: the condition of this episode.
+        payments: the payments of this episode by indicator, without weights.
+        measured: running means of all conditions played, also if references are numbers. An
             episode counts when the next one begins.
 
     Raises:
-        SetupError: an argument cannot be. At the reset, and from `payments_of`, which tells early:
-            a reference is missing or P_o = 0, or the indicator is undefined, as FT with m = N.
+        SetupError: an argument is not allowed. The reset, and `payments_of` before it, raise it
+            if a reference is missing, P_o = 0, or the indicator is undefined, as FT with m = N.
 
     Example:
         >>> from swarm_logistics_env import Fault, swarm_logistics_v0
@@ -163,11 +165,11 @@ class IndicatorReward(Wrapper):
     def episode_info(self) -> dict[str, float]:
         """The wrapped environment's infos, and the values of the indicators so far.
 
-        "n_robots", "n_failed", "n_removed": of its `condition`. For each indicator but P, here R:
-        "R", its value so far, constant included; "R_tested", 1 if the episode tests it, else 0,
-        and then all others are 0 too; "R_P_o" [items], the reference; "R_P_o_measured" [items],
-        its running mean, and "R_P_o_episodes", how many episodes of that condition were played.
-        Likewise for P_S of FT, and for P_N instead of P_o of S.
+        "n_robots", "n_failed" and "n_removed" are those of `condition`. Each indicator but P has
+        these entries, here for R: "R" is its value so far, constant included. "R_tested" is 1 if
+        the episode tests it; otherwise it and the following are 0. "R_P_o" is the reference
+        [items], "R_P_o_measured" its running mean [items], and "R_P_o_episodes" the number of
+        episodes of that condition so far. FT has the same for P_S, and S has P_N instead of P_o.
         """
         condition = self.condition
         info = {
@@ -194,7 +196,7 @@ class IndicatorReward(Wrapper):
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
-        """Begin an episode; the one before counts if it came to its end."""
+        """Begin an episode; the one before is counted in `measured` if it came to its end."""
         if self._is_over:
             self.measured.add(self.condition, self.unwrapped.warehouse.state.delivered)
             self._is_over = False
@@ -204,11 +206,11 @@ class IndicatorReward(Wrapper):
         """Store the condition of the episode and what it pays."""
         self._seed = seed
         self._paid, self._delivered = Payment(), 0
-        self._carriers = set[int]()  # of the requested item since it was asked for
+        self._carriers = set[int]()  # those that carried the requested item since its request
         self._take_condition()
 
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
-        """Pay for the step; everything else is as it was."""
+        """Return the result of the step with this wrapper's rewards."""
         observations, own, terminations, truncations = outcome
         world = self.unwrapped.warehouse
         state = world.state

@@ -1,4 +1,4 @@
-"""Changes of a scenario's parameters, in an episode or during it."""
+"""A wrapper that changes a parameter of the scenario, for an episode or during it."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ if TYPE_CHECKING:
 class ParameterChange(Wrapper):
     """Plays each episode with a parameter of the scenario changed, throughout or from a time on.
 
-    A parameter among a reset's options comes before the drawn one, until the time of the change.
+    If the options of a reset name the parameter, their value holds until the time of the change.
 
     Args:
         env: the environment, or a wrapper of one.
         name: a field of `Scenario`, e.g. "delivery_width".
-        values: the new value, a list to draw from in each episode (a tuple is one value, as of
-            `speed_mix`), or a function of a numpy Generator.
-        at: None: throughout the episode. Else the time [s] from which on it holds: the first step
-            that begins then or later is the first one under it; drawn like `values`.
-        within: (least, greatest) value that a function gives.
-        at_within: (earliest, latest) time that a function gives.
+        values: the new value; a list to draw from in each episode (a tuple is one value, as
+            `speed_mix` has them); or a function of a numpy Generator.
+        at: the time of the change [s], given like `values`; the value holds from the first step
+            that begins then or later. None means that it holds throughout the episode.
+        within: (least, greatest) value that a function returns; required with a function.
+        at_within: (earliest, latest) time that a function returns; required with a function.
 
     Attributes:
-        value: what the parameter is, or will be, in this episode.
-        time: when it changes [s], or None.
+        value: the value that the parameter has, or will have, in this episode.
+        time: the time of the change [s], or None.
 
     Raises:
         ScenarioError: there is no such parameter, it cannot change during a run, or its value or
-            time cannot be.
-        SetupError: a function without bounds, or a value that the spaces cannot be made for.
+            time is not allowed.
+        SetupError: a function comes without its bounds, or the spaces have no room for a value.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0

@@ -16,7 +16,7 @@ class GivenPerformances:
     """Performances that were given as numbers, for instance from a study.
 
     Raises:
-        SetupError: a performance is negative or not finite, or a key is no condition.
+        SetupError: a performance is negative or not finite, or a key is not a `Condition`.
     """
 
     def __init__(self, performances: Mapping[Condition, float]) -> None:
@@ -40,7 +40,7 @@ class GivenPerformances:
         return float(self._performances[condition])
 
     def divisor(self, condition: Condition) -> float:
-        """Return its P as one divides by it.
+        """Return its P as a divisor.
 
         Raises:
             SetupError: it was not given, or is 0.
@@ -52,20 +52,20 @@ class GivenPerformances:
 
 
 class RunningMeans:
-    """Items delivered under each condition: the mean over its last episodes.
+    """Mean number of items delivered under each condition, over its last episodes.
 
-    Environments may share one, so that a few reference episodes serve them all. They should play
-    the same scenario, but for the swarm size, and lie in one process. `SwarmVecEnv` lets them
-    report in the worlds' order, so that results do not depend on its threads.
+    Environments may share it, so that a few reference episodes serve them all. They should play
+    the same scenario, apart from the swarm size, in one process. `SwarmVecEnv` lets them report
+    in the order of its worlds, so that results do not depend on its threads.
 
     Args:
-        window: over how many episodes of a condition the mean is taken; the policy changes.
-        least: what a mean that divides counts as at least [items]: at the start of a training
-            nothing is delivered.
-        initial: what a mean that divides counts as before there is any; None: `least`.
+        window: the number of last episodes of a condition that its mean is over; it is limited
+            because the policy changes.
+        least: a divisor is at least this [items]; at the start of a training a mean may be 0.
+        initial: the divisor of a condition that was not played yet [items]; None means `least`.
 
     Raises:
-        SetupError: a window below 1, or numbers that are not positive.
+        SetupError: `window` is below 1, or `least` or `initial` is not positive.
 
     Example:
         >>> means = RunningMeans(window=2)
@@ -117,6 +117,6 @@ class RunningMeans:
         return self.mean(condition) or 0.0
 
     def divisor(self, condition: Condition) -> float:
-        """Return its mean P as one divides by it."""
+        """Return its mean P as a divisor: at least `least`, and `initial` if it was not played."""
         mean = self.mean(condition)
         return max(self.initial if mean is None else mean, self.least)

@@ -16,13 +16,13 @@ class Sampler:
     """Samples a value for each episode.
 
     Args:
-        name: what it is, for errors.
-        given: a value, always the same; a list or array of them, each as likely; or a function
-            of a numpy Generator.
-        within: (least, greatest) value of a function, which nobody can know of it.
+        name: the name of the quantity, for errors.
+        given: one value for all episodes; a list or array to draw from, each value equally
+            likely; or a function of a numpy Generator.
+        within: (least, greatest) value that the function returns; required with a function.
 
     Raises:
-        SetupError: an empty list, or a function without `within`.
+        SetupError: the list is empty, or a function comes without `within`.
     """
 
     def __init__(self, name: str, given: Any, within: tuple[Any, Any] | None = None) -> None:
@@ -48,7 +48,7 @@ class Sampler:
         """Return the value of an episode.
 
         Raises:
-            SetupError: a distribution gave one that is not within its bounds.
+            SetupError: the function returned a value that is not within its bounds.
         """
         if not callable(self._given):
             return self.ends[int(rng.integers(len(self.ends)))]

@@ -1,4 +1,4 @@
-"""Swarms of other sizes, and robots that leave."""
+"""A wrapper for swarms of several sizes, and for robots that leave."""
 
 from __future__ import annotations
 
@@ -24,24 +24,23 @@ if TYPE_CHECKING:
 class SwarmSize(Wrapper):
     """Plays each episode with a swarm size of its own, and lets robots leave.
 
-    `possible_agents` are those of the largest swarm, or as many as the environment's `max_robots`
-    if that is more. A robot that leaves terminates, and is gone from `agents` for the rest of the
-    episode; those that leave first are those that would fail first (see `Fault`), so that P_S and
-    P_F of one seed are about the same robots. A size among a reset's options comes before the
-    drawn one.
+    `possible_agents` are those of the largest swarm, or `max_robots` of the environment if that
+    is more. A robot that leaves terminates, and is gone from `agents` for the rest of the episode.
+    The robots that leave first are those that would fail first (see `Fault`), so that P_S and P_F
+    of one seed are about the same robots. A size in the options of a reset replaces the drawn one.
 
     Args:
         env: the environment, or a wrapper of one.
         sizes: the swarm size N, a list to draw from in each episode, or a function of a numpy
             Generator.
-        within: (smallest, largest) size that a function gives.
-        leave: (robots, time [s]) pairs: how many more robots leave, and when.
+        within: (smallest, largest) size that a function returns; required with a function.
+        leave: pairs (robots, time [s]): at each time that many more robots leave.
 
     Raises:
-        ScenarioError: such a swarm cannot be.
-        SetupError: a function without `within`, more robots leave than there are, or all of them
-            leave at 0 s.
-        FaultError: they leave at a time that cannot be.
+        ScenarioError: a swarm of such a size is not allowed.
+        SetupError: a function comes without `within`, more robots leave than there are, or all of
+            them leave at 0 s.
+        FaultError: a time of leaving is not allowed.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0
@@ -95,7 +94,7 @@ class SwarmSize(Wrapper):
         """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
-            SetupError: more robots are to leave than it has, or all of them at 0 s.
+            SetupError: more robots are to leave than `scenario` has, or all of them at 0 s.
         """
         if self._absent >= scenario.n_robots:
             raise SetupError(

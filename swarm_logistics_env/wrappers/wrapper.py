@@ -19,22 +19,22 @@ if TYPE_CHECKING:
 
 
 class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo ships no types
-    """An environment around an environment, which leaves everything as it is; for subclasses.
+    """An environment around an environment, which changes nothing; a base for subclasses.
 
-    They override `plan`, for what an episode should be like, `begun`, `before_step`, `after_step`
-    or the array methods themselves; the dict methods follow. Everything else is the wrapped
-    environment's. Threads share out the worlds of a vector environment only if no wrapper
-    overrides `step_arrays`.
+    A subclass overrides `plan`, which decides the conditions of an episode, `begun`,
+    `before_step`, `after_step`, or the array methods; the dict methods call these. All other
+    attributes are the wrapped environment's. `SwarmVecEnv` steps its worlds in threads only if
+    no wrapper overrides `step_arrays`.
 
     Args:
         env: a `SwarmLogisticsEnv` or a wrapper of one.
 
     Attributes:
-        is_outermost: whether no other wrapper may be put around it, as its arrays have other rows
-            than the warehouse's robots.
+        is_outermost: whether it has to be the outermost wrapper; it has to if the rows of its
+            arrays are not the robots of the warehouse.
 
     Raises:
-        SetupError: it is something else, or a wrapper that has to be the outermost one.
+        SetupError: `env` is something else, or a wrapper that has to be the outermost one.
 
     Example:
         >>> from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
@@ -59,21 +59,21 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         super().__init__(env)
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
-        """Return the options to reset the wrapped environment with, those given taken in.
+        """Return the options of the wrapped environment's reset, made from the given options.
 
-        Pure: asked twice with the same seed and options it answers the same.
+        The same seed and options have to give the same result, also when it is called twice.
         """
         return options
 
     def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
-        """Return the scenario of the episode that such a reset would begin; changes nothing."""
+        """Return the scenario of the episode that such a reset would begin; it begins nothing."""
         scenario: Scenario = self.env.scenario_of(seed, self.plan(seed, dict(options)))
         return scenario
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
-        """Begin an episode, as planned, and return the first observations (N, D)."""
+        """Begin the episode that `plan` describes and return the first observations (N, D)."""
         seed = self.env.next_seed if seed is None else checked_seed(seed)
         observations: NDArray[np.float32] = self.env.reset_arrays(
             seed, self.plan(seed, checked_options(options))
@@ -82,32 +82,32 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         return observations
 
     def begun(self, seed: int) -> None:
-        """Store what a subclass needs to know of the episode that has begun."""
+        """Is called when an episode has begun; a subclass stores here what it needs of it."""
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
         """Take one control period; see `SwarmLogisticsEnv.step_arrays`."""
         return self.after_step(self.env.step_arrays(self.before_step(commands)))
 
     def before_step(self, commands: ArrayLike) -> ArrayLike:
-        """Return the commands to step the wrapped environment with, of the same shape."""
+        """Return the commands for the wrapped environment, of the same shape."""
         return commands
 
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
-        """Return what to tell of the step that the wrapped environment has taken."""
+        """Return the result of a step, made from the result of the wrapped environment."""
         return outcome
 
     @property
     def episode_info(self) -> dict[str, float]:
-        """The part of every agent's infos that is about the episode; it always has the same keys.
+        """The entries of every agent's infos that are about the episode; keys never change.
 
-        For wrappers that have more to say: `{**self.env.episode_info, "key": number}`.
+        A subclass adds entries by returning `{**self.env.episode_info, "key": number}`.
         """
         info: dict[str, float] = self.env.episode_info
         return info
 
     @property
     def max_cycles(self) -> int | None:
-        """Steps after which an episode is truncated."""
+        """The number of steps after which an episode is truncated, or None."""
         cycles: int | None = self.env.max_cycles
         return cycles
 
@@ -116,7 +116,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         self.unwrapped.max_cycles = cycles
 
     def _place(self) -> int:
-        """Return how many wrappers of the same class lie inside, so that each draws for itself."""
+        """Return the number of wrappers of the same class inside; it gives each its own draws."""
         place, env = 0, self.env
         while env is not env.unwrapped:
             place += type(env) is type(self)

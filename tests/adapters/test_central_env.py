@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -186,3 +187,81 @@ def test_state_rendering_and_closing_are_the_environments() -> None:
     np.testing.assert_array_equal(central.state(), central.env.state())
     env.close()
     env.close()
+
+
+def test_flat_is_the_same_in_vectors() -> None:
+    flat: Any = CentralEnv(n_robots=3, flat=True, **SMALL)
+    rows: Any = CentralEnv(n_robots=3, **SMALL)
+    n_columns = rows.observation_space.shape[1]
+    assert flat.observation_space.shape == (3 * n_columns,)
+    assert flat.action_space.shape == (12,)
+    assert (flat.observation_space.high == rows.observation_space.high.ravel()).all()
+    np.testing.assert_array_equal(flat.reset(seed=3)[0], rows.reset(seed=3)[0].ravel())
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        action = rng.uniform(-1, 1, 12).astype(np.float32)
+        seen, *ends, _ = flat.step(action)
+        wanted, *others, _ = rows.step(action.reshape(3, 4))
+        assert flat.observation_space.contains(seen)
+        np.testing.assert_array_equal(seen, wanted.ravel())
+        assert ends == others
+    with pytest.raises(CommandError, match=r"action of shape \(3, 4\) .* should be \(12,\)"):
+        flat.step(np.zeros((3, 4)))
+
+
+def test_gymnasiums_check_passes_for_flat() -> None:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*Not able to test alternative render modes")
+        sized = SwarmSize(SwarmLogisticsEnv(n_robots=2, **SMALL), [2, 4])
+        check_env(CentralEnv(sized, flat=True))
+
+
+def test_stable_baselines3_learns_from_flat_without_a_warning() -> None:
+    sb3 = pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.env_checker import check_env as check_for_sb3
+
+    env = CentralEnv(n_robots=2, flat=True, **SMALL)
+    check_for_sb3(env)
+    model = sb3.PPO("MlpPolicy", env, n_steps=32, batch_size=32, n_epochs=1, seed=0)
+    assert model.learn(64).num_timesteps == 64
+
+
+def test_np_random_seed_plays_an_episode_again() -> None:
+    env = CentralEnv(n_robots=3, **SMALL)
+    seeds = []
+    for given in (None, 7, None, None):
+        first, _ = env.reset(seed=given)
+        seeds.append(env.np_random_seed)
+        again, _ = CentralEnv(n_robots=3, **SMALL).reset(seed=env.np_random_seed)
+        np.testing.assert_array_equal(first, again)
+    assert seeds[1] == 7
+    assert len(set(seeds)) == 4
+
+
+def test_gymnasium_records_its_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = gymnasium.make("SwarmLogistics-v0", n_robots=2, render_mode="rgb_array_list", **SMALL)
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(env.action_space.sample())
+    pictures: Any = env.render()
+    assert len(pictures) == 4
+    assert len({picture.shape for picture in pictures}) == 1
+    assert len({picture.tobytes() for picture in pictures}) > 1
+    env.close()
+
+
+def test_gymnasium_writes_a_film(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("pygame")
+    pytest.importorskip("moviepy")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = gymnasium.make("SwarmLogistics-v0", n_robots=2, render_mode="rgb_array", **SMALL)
+    film: Any = gymnasium.wrappers.RecordVideo(env, str(tmp_path / "films"))
+    film.reset(seed=0)
+    for _ in range(5):
+        film.step(film.action_space.sample())
+    film.close()
+    [written] = (tmp_path / "films").iterdir()
+    assert written.suffix == ".mp4"
+    assert written.stat().st_size > 1000

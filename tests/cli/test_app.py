@@ -1,9 +1,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 
 import swarm_logistics_env
 from swarm_logistics_env import Scenario
@@ -33,7 +36,7 @@ SMALL = [
         (["run", "--policy", "swarm-td"], "did you mean 'swarm-dt'?"),
         (["run", "--fault", "FM9"], "no failure mode 'FM9'"),
         (["run", "--fault", "FM1:x"], "MODE[:ROBOTS][@ONSET]"),
-        (["run", "--fault", "FM1@1.2.3"], "number of seconds"),
+        (["run", "--fault", "FM1@1.2.3"], "MODE[:ROBOTS][@ONSET]"),
         (["run", "--fault", "FM1:99"], "at most n_robots = 25"),
         (["scenario", "--set", "delivery_width=10"], "leaves no storage"),
         (["study", "run", "papr", "--out", "x"], "did you mean 'paper'?"),
@@ -79,6 +82,26 @@ def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(Scenario, "sheet", broken)
     with pytest.raises(ZeroDivisionError):
         app.run(["scenario"])
+
+
+def command_lines(command: Any, *names: str) -> Iterator[tuple[list[str], Any]]:
+    yield [*names, "--help"], command
+    for name, below in getattr(command, "commands", {}).items():
+        yield from command_lines(below, *names, name)
+
+
+@pytest.mark.parametrize(("arguments", "command"), list(command_lines(typer.main.get_command(app))))
+def test_a_help_page_shows_each_help_text_in_full(
+    arguments: list[str],
+    command: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    assert app.run(arguments) == 0
+    page = " ".join(capsys.readouterr().out.split())
+    for text in [command.help, *(parameter.help for parameter in command.params)]:
+        assert " ".join((text or "").split()) in page
 
 
 def test_no_command_prints_the_help_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Any
 
 import gymnasium
 import pettingzoo
@@ -23,6 +24,35 @@ def test_gymnasium_makes_it_by_name_after_a_bare_import() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == ["4"]
+
+
+def test_gymnasium_imports_the_package_that_the_name_begins_with() -> None:
+    script = (
+        "import gymnasium;"
+        "name = 'swarm_logistics_env:SwarmLogistics-v0';"
+        "print(gymnasium.make(name, n_robots=4).observation_space.shape[0])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["4"]
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_gymnasium_makes_several_at_once(flat: bool) -> None:
+    vector: Any = gymnasium.make_vec(
+        "SwarmLogistics-v0", num_envs=2, n_robots=3, duration=1.0, flat=flat
+    )
+    alone: Any = gymnasium.make("SwarmLogistics-v0", n_robots=3, duration=1.0, flat=flat)
+    rows, _ = vector.reset(seed=[4, 5])
+    for place in range(2):
+        row, _ = alone.reset(seed=4 + place)
+        assert row.tobytes() == rows[place].tobytes()
+    for step in range(1, 12):  # one more than an episode has
+        rows, _, _, cut, infos = vector.step(vector.action_space.sample())
+        assert cut.tolist() == [step == 10] * 2
+    assert rows.shape == (2, *alone.observation_space.shape)
+    assert infos["failed"].shape == (2, 3)
 
 
 @pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="PettingZoo has no registry yet")

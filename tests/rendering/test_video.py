@@ -38,7 +38,7 @@ def test_film_holds_the_frames(suffix: str, tolerance: int, tmp_path: Path) -> N
     assert video.write_film(path, frames(), 10.0) == 6
     shown = read(path).astype(int)
     for nth, frame in enumerate(frames()):
-        # Where a colour meets another, half the resolution of MP4's colours smears it.
+        # MP4 has half the resolution for colours, so they are blurred where two of them meet.
         inner = slice(12, 36), slice(8 * nth + 2, 8 * nth + 6)
         assert np.abs(shown[nth][inner] - frame[inner]).max() <= tolerance
         assert np.abs(shown[nth][:, 56:] - 255).max() <= tolerance

@@ -51,7 +51,7 @@ def test_the_critical_value_is_the_largest_statistic_that_is_kept(alpha: float) 
     assert upper_p(pivots, np.nextafter(critical, np.inf)) < alpha / 2
 
 
-def test_a_level_beyond_its_resamples_rejects_nothing() -> None:
+def test_an_alpha_beyond_its_resamples_rejects_nothing() -> None:
     assert critical_value(resampled_pivots(RESIDUAL), 1e-6) == math.inf
 
 

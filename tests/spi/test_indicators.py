@@ -77,8 +77,8 @@ def test_one_seed_gives_the_value_and_nothing_else(name: str) -> None:
 
 
 def test_an_estimate_describes_its_input() -> None:
-    r = spi.robustness(P, LESS, n=25, m=2, threshold=0.1, level=0.9)
-    assert (r.indicator, r.threshold, r.level, r.n_seeds, r.paired) == ("R", 0.1, 0.9, 4, True)
+    r = spi.robustness(P, LESS, n=25, m=2, threshold=0.1, confidence=0.9)
+    assert (r.indicator, r.threshold, r.confidence, r.n_seeds, r.paired) == ("R", 0.1, 0.9, 4, True)
     assert r.pairing_correlation == pytest.approx(np.corrcoef(P, LESS)[0, 1])
     assert r.mean_denominator == np.mean(P)
     d = np.array(LESS) - P - (0.1 - 2 / 25) * np.array(P)
@@ -181,13 +181,13 @@ def test_an_undefined_change_of_x_is_an_error(x_o: Any, x_new: float, message: s
         spi.adaptability(P, P, x_o=x_o, x_new=x_new)
 
 
-def test_threshold_and_level_are_checked() -> None:
+def test_threshold_and_confidence_are_checked() -> None:
     with pytest.raises(IndicatorError, match="threshold = nan"):
         spi.relative_change(P, P, threshold=float("nan"))
-    levels: tuple[Any, ...] = (0.0, 1.0, 95.0, "0.95", None)
-    for level in levels:
-        with pytest.raises(IndicatorError, match="level"):
-            spi.relative_change(P, P, level=level)
+    confidences: tuple[Any, ...] = (0.0, 1.0, 95.0, "0.95", None)
+    for confidence in confidences:
+        with pytest.raises(IndicatorError, match="confidence"):
+            spi.relative_change(P, P, confidence=confidence)
 
 
 def test_an_ablation_that_costs_a_third_refutes_less() -> None:

@@ -51,9 +51,9 @@ def test_an_untested_member_counts_in_the_family() -> None:
     assert spi.adjust([estimate(0.04, 0.98), estimate(None)]) == ("inconclusive", "inconclusive")
 
 
-def test_one_family_has_one_level() -> None:
-    other = dataclasses.replace(estimate(0.01, 0.99), level=0.9)
-    with pytest.raises(IndicatorError, match="levels"):
+def test_one_family_has_one_confidence() -> None:
+    other = dataclasses.replace(estimate(0.01, 0.99), confidence=0.9)
+    with pytest.raises(IndicatorError, match="confidence"):
         spi.adjust([estimate(0.01, 0.99), other])
     assert spi.adjust([]) == ()
 

@@ -50,8 +50,8 @@ def test_minimum_detectable_effect_is_found_in_80_percent() -> None:
     assert spi.seeds_for_power(PILOT, -effect * 1.001) == 10
 
 
-def test_levels_of_early_looks_have_a_minimum_detectable_effect() -> None:
-    few = spi.robustness(P_O[:5], P_O[:5] - [3, 5, 2, 8, 4], n=25, m=2, level=1 - 1e-12)
+def test_early_looks_have_a_minimum_detectable_effect() -> None:
+    few = spi.robustness(P_O[:5], P_O[:5] - [3, 5, 2, 8, 4], n=25, m=2, confidence=1 - 1e-12)
     effect = spi.minimum_detectable_effect(few)
     assert effect is not None
     assert few.difference_sd is not None

@@ -16,14 +16,14 @@ P_S = np.array([34.0, 39, 35, 28, 43, 33, 37])
 MORE = np.array([1, 0, 2, 1, 0, 1, 2])
 
 
-@pytest.mark.parametrize("level", [0.8, 0.95, 0.99])
-def test_t_test_at_the_limits_has_the_level_as_p(level: float) -> None:
+@pytest.mark.parametrize("confidence", [0.8, 0.95, 0.99])
+def test_t_test_at_the_limits_has_one_minus_confidence_as_p(confidence: float) -> None:
     from scipy.stats import ttest_1samp
 
-    test = paired_ratio(P_F - P_O, P_O, offset=0.08, level=level)
+    test = paired_ratio(P_F - P_O, P_O, offset=0.08, confidence=confidence)
     for limit in (float(test.low), float(test.high)):
         d = (P_F - P_O) - (limit - 0.08) * P_O
-        assert ttest_1samp(d, 0.0).pvalue == pytest.approx(1 - level, rel=1e-9)
+        assert ttest_1samp(d, 0.0).pvalue == pytest.approx(1 - confidence, rel=1e-9)
 
 
 def test_limits_are_fiellers_quadratic_as_written() -> None:
@@ -93,9 +93,9 @@ def test_many_studies_at_once_are_the_studies_one_by_one() -> None:
         assert getattr(together, field)[2, 3] == pytest.approx(float(getattr(alone, field)))
 
 
-def test_level_moves_interval_and_verdict_together() -> None:
-    narrow = spi.fault_tolerance(P_O, P_F, P_S, level=0.5)
-    wide = spi.fault_tolerance(P_O, P_F, P_S, level=0.999)
+def test_confidence_moves_interval_and_verdict_together() -> None:
+    narrow = spi.fault_tolerance(P_O, P_F, P_S, confidence=0.5)
+    wide = spi.fault_tolerance(P_O, P_F, P_S, confidence=0.999)
     assert wide.low is not None
     assert narrow.low is not None
     assert wide.low < narrow.low

@@ -117,9 +117,9 @@ def test_the_interval_of_the_peak_covers() -> None:
     assert 0.89 <= held / 150 <= 0.99
 
 
-def test_higher_levels_widen_the_interval_of_the_peak() -> None:
-    narrow = spi.fit_scaling(SIZES, TABLE_I, law="power_exponential", level=0.8)
-    wide = spi.fit_scaling(SIZES, TABLE_I, law="power_exponential", level=0.95)
+def test_higher_confidence_widens_the_interval_of_the_peak() -> None:
+    narrow = spi.fit_scaling(SIZES, TABLE_I, law="power_exponential", confidence=0.8)
+    wide = spi.fit_scaling(SIZES, TABLE_I, law="power_exponential", confidence=0.95)
     assert None not in (wide.peak_low, narrow.peak_low, wide.peak_high, narrow.peak_high)
     assert wide.peak_low < narrow.peak_low < narrow.peak_high < wide.peak_high  # type: ignore[operator]
 
@@ -132,7 +132,7 @@ def test_table_1_sets_the_usl_no_upper_limit() -> None:
 
 
 def test_where_no_size_is_excluded_the_limits_are_0_and_infinity() -> None:
-    fit = spi.fit_scaling(SIZES, TABLE_I, law="usl", level=1 - 1e-7)
+    fit = spi.fit_scaling(SIZES, TABLE_I, law="usl", confidence=1 - 1e-7)
     assert (fit.peak_low, fit.peak_high) == (0.0, math.inf)
 
 
@@ -200,7 +200,7 @@ def test_a_size_that_delivers_nothing_is_fitted_unweighted_only() -> None:
         ([5, 10, 20, 30], [0, 0, 0, 0], {"weighting": "none"}, "p = 0 at every size"),
         ([5, 10, 20, 30], [1, 2, 3, 4], {"weighting": "P"}, "weighting = 'P'"),
         ([5, 10, 20, 30], [1, 2, 3, 4], {"law": "linear"}, "law = 'linear'"),
-        ([5, 10, 20, 30], [1, 2, 3, 4], {"level": 2}, "level = 2"),
+        ([5, 10, 20, 30], [1, 2, 3, 4], {"confidence": 2}, "confidence = 2"),
     ],
 )
 def test_what_cannot_be_fitted_is_named(

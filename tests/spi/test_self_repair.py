@@ -179,7 +179,7 @@ def test_faults_may_begin_with_the_run() -> None:
         ({"end": math.inf}, "should be 0 <= onset < end"),
         ({"onset": -1.0}, "onset = -1"),
         ({"end": 1_500.0}, "should not be after end = 1500 s"),
-        ({"level": 95}, "level = 95"),
+        ({"confidence": 95}, "confidence = 95"),
     ],
 )
 def test_bad_input_is_named(changes: dict[str, Any], message: str) -> None:

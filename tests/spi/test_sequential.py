@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,7 @@ def test_published_boundaries(looks: list[int], boundaries: list[float]) -> None
     """Lan and DeMets' O'Brien-Fleming type boundaries, two-sided .05 (Jennison, Turnbull 2000)."""
     from scipy.stats import norm
 
-    assert [norm.isf(p / 2) for p in spi.look_levels(looks)] == pytest.approx(boundaries, abs=1e-3)
+    assert [norm.isf(p / 2) for p in spi.look_alphas(looks)] == pytest.approx(boundaries, abs=1e-3)
 
 
 def test_looks_keep_the_error_that_peeking_inflates() -> None:
@@ -32,47 +30,27 @@ def test_looks_keep_the_error_that_peeking_inflates() -> None:
     from scipy.special import ndtr
 
     p = 2 * ndtr(-z)
-    declared = (p < np.array(spi.look_levels(looks))).any(axis=1).mean()
+    declared = (p < np.array(spi.look_alphas(looks))).any(axis=1).mean()
     assert declared == pytest.approx(0.05, abs=0.003)
     assert (p < 0.05).any(axis=1).mean() > 0.1
 
 
-def test_levels_rise_and_the_last_is_nearly_the_whole() -> None:
-    levels = spi.look_levels((10, 20, 40), alpha=0.1)
-    assert list(levels) == sorted(levels)
-    assert 0.09 < levels[-1] < 0.1
+def test_alphas_rise_and_the_last_is_nearly_the_whole() -> None:
+    alphas = spi.look_alphas((10, 20, 40), alpha=0.1)
+    assert list(alphas) == sorted(alphas)
+    assert 0.09 < alphas[-1] < 0.1
 
 
 def test_a_very_early_look_practically_never_stops() -> None:
-    assert spi.look_levels((1, 1_000))[0] < 1e-15
-
-
-def estimate(n: int, p_value: float) -> spi.Estimate:
-    blank = spi.robustness([39, 40], [35, 30], n=25, m=1)
-    return dataclasses.replace(blank, n_seeds=n, p_value=p_value, probability=1 - p_value / 2)
-
-
-def test_an_early_look_asks_for_more() -> None:
-    early = spi.verdict_at_look(estimate(10, 0.01), looks=(10, 20))
-    assert (early.verdict, early.exploratory) == ("inconclusive", False)
-    assert early.alpha == pytest.approx(0.00305, abs=1e-5)
-    assert spi.verdict_at_look(estimate(20, 0.01), looks=(10, 20)).verdict == "supported"
-    assert spi.verdict_at_look(estimate(10, 0.001), looks=(10, 20)).verdict == "supported"
-
-
-@pytest.mark.parametrize("n", [15, 25])
-def test_an_undeclared_look_is_exploratory(n: int) -> None:
-    look = spi.verdict_at_look(estimate(n, 0.04), looks=(10, 20))
-    assert (look.verdict, look.exploratory) == ("supported", True)
-    assert look.alpha == pytest.approx(0.05)
+    assert spi.look_alphas((1, 1_000))[0] < 1e-15
 
 
 @pytest.mark.parametrize("looks", [(), (0, 10), (10, 10), (20, 10)])
 def test_looks_must_rise(looks: tuple[int, ...]) -> None:
     with pytest.raises(IndicatorError, match="look"):
-        spi.look_levels(looks)
+        spi.look_alphas(looks)
 
 
 def test_alpha_out_of_range() -> None:
     with pytest.raises(IndicatorError, match="alpha = 5"):
-        spi.look_levels((10,), alpha=5)
+        spi.look_alphas((10,), alpha=5)

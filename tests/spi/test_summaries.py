@@ -15,7 +15,7 @@ P = [31.0, 38, 35, 44, 40, 29, 36]
 def test_mean_interval_is_students() -> None:
     from scipy.stats import sem, t
 
-    interval = spi.mean_interval(P, level=0.9)
+    interval = spi.mean_interval(P, confidence=0.9)
     assert interval.value == pytest.approx(np.mean(P))
     assert interval[1:] == pytest.approx(t.interval(0.9, 6, np.mean(P), sem(P)))
 
@@ -102,11 +102,11 @@ def test_comparisons_need_the_same_seeds(compare: Callable[..., Any]) -> None:
         compare(P, P[:3])
 
 
-def test_level_out_of_range() -> None:
-    with pytest.raises(IndicatorError, match="level = 95"):
-        spi.mean_interval(P, level=95)
-    with pytest.raises(IndicatorError, match="level = 95"):
-        spi.probability_of_improvement(P, P, level=95)
+def test_confidence_out_of_range() -> None:
+    with pytest.raises(IndicatorError, match="confidence = 95"):
+        spi.mean_interval(P, confidence=95)
+    with pytest.raises(IndicatorError, match="confidence = 95"):
+        spi.probability_of_improvement(P, P, confidence=95)
 
 
 def test_no_interval_of_p_reaches_below_0() -> None:

@@ -37,8 +37,10 @@ def test_no_event_leaves_an_empty_curve_without_median() -> None:
     assert curve.median() is None
 
 
-def test_level_widens() -> None:
-    narrow, wide = (spi.kaplan_meier(WEEKS, SEEN, level=level) for level in (0.8, 0.99))
+def test_confidence_widens() -> None:
+    narrow, wide = (
+        spi.kaplan_meier(WEEKS, SEEN, confidence=confidence) for confidence in (0.8, 0.99)
+    )
     assert (wide.low < narrow.low).all()
     assert (wide.high > narrow.high).all()
     assert np.array_equal(wide.share, narrow.share)

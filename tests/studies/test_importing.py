@@ -3,11 +3,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study, paper
 from swarm_logistics_env.studies.importing import import_results
+from swarm_logistics_env.studies.mid_run_faults import resiliences
+from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 
@@ -52,6 +56,140 @@ def test_the_papers_own_tables_give_its_values_unpaired_and_without_intervals(
     report = (tmp_path / "out" / "report.md").read_text()
     assert "imported from table.csv. Unpaired: it names no seeds." in report
     assert "the same seeds for every condition" not in report
+
+
+# Own names for the fault and the parameter, decimals with a comma, no seeds.
+LAB = """Roboter;Fehler;Defekt;Geliefert;Breite
+8;;;12,5;2
+8;;;11,25;2
+8;;;13,1;2
+8;Radbruch;1;10,5;2
+8;Radbruch;1;9,75;2
+8;Radbruch;1;11,5;2
+8;entfernt;1;10,2;2
+8;entfernt;1;11,0;2
+8;;;9,5;1,5
+8;;;10,55;1,5
+8;;;10,75;1,5
+4;;;6,5;2
+4;;;7,5;2
+4;;;6,25;2
+"""
+WHOLE, BROKEN, REMOVED = [12.5, 11.25, 13.1], [10.5, 9.75, 11.5], [10.2, 11.0]
+NARROW, FEW = [9.5, 10.55, 10.75], [6.5, 7.5, 6.25]
+
+
+def test_indicators_of_a_lab_file_are_those_of_spi_by_hand(tmp_path: Path) -> None:
+    study = imported(tmp_path, LAB)
+    by_hand = {
+        "S": spi.scalability(FEW, WHOLE, n=4, m=4, paired=False),
+        "FT": spi.fault_tolerance(WHOLE, BROKEN, REMOVED, n=8, m=1, paired=False),
+        "R": spi.robustness(WHOLE, BROKEN, n=8, m=1, paired=False),
+        "A": spi.adaptability(WHOLE, NARROW, x_o=2.0, x_new=1.5, paired=False),
+    }
+    found = study.indicators().set_index("indicator")
+    assert sorted(found.index) == sorted(by_hand)
+    for symbol, estimate in by_hand.items():
+        for name in ("value", "low", "high", "p_value", "probability"):
+            assert found.loc[symbol, name] == getattr(estimate, name)
+        assert found.loc[symbol, "verdict"] == estimate.verdict
+    assert found.loc["R", "comparison"] == "Radbruch, m = 1"
+    assert found.loc["A", "comparison"] == "Breite 2 -> 1.5"
+
+
+def test_trials_without_removed_robots_ask_for_robustness_alone(tmp_path: Path) -> None:
+    rows = [row for row in LAB.splitlines() if "entfernt" not in row]
+    study = imported(tmp_path, "\n".join(rows))
+    assert set(study.indicators()["indicator"]) == {"S", "R", "A"}
+
+
+def test_each_value_of_what_else_varies_has_a_table_of_its_own(tmp_path: Path) -> None:
+    rows = ["policy,robots,fault,faulty,p"]
+    for n in (8, 16):
+        rows += [f"ours,{n},none,0,{n + k}" for k in (0, 1, 2)]
+        rows += [f"ours,{n},jam,1,{n - k}" for k in (1, 2, 3)]
+    table = imported(tmp_path, "\n".join(rows)).indicators()
+    assert table[["table", "indicator"]].to_numpy().tolist() == [
+        ["Scalability", "S"],
+        ["Fault tolerance and robustness (N = 8)", "R"],
+        ["Fault tolerance and robustness (N = 16)", "R"],
+    ]
+
+
+LATE = Study(
+    name="late",
+    seeds=3,
+    policies=["swarm-dt"],
+    scenario={
+        "n_robots": 8,
+        "warehouse_width": 4.0,
+        "warehouse_height": 4.0,
+        "duration": 300.0,
+        "restock": True,
+    },
+    faults=[{"modes": ["FM4"], "robots": [2], "onsets": [100.0]}],
+)
+
+
+def event_log(results: StudyResults, *, seeds: bool = True) -> str:
+    """One delivery a row; a run that delivers nothing is a row without a time."""
+    rows = ["policy;Roboter;fault;m;onset [s];seed;trial;time [s];duration"]
+    for _, _, arm in results.plan.cells:
+        setting = arm.setting
+        for number, seed in enumerate(results.plan.seeds):
+            outcome = results.outcomes[arm.condition.run(results.plan.code, seed).key]
+            named = (
+                f"swarm-dt;{arm.condition.size};{setting.name};{setting.value:g};{setting.onset:g}"
+            )
+            shown = f"{seed if seeds else ''};{setting.name} {number}"
+            times = outcome.delivery_times.tolist() or [""]
+            rows += [f"{named};{shown};{time};300".replace(".", ",") for time in times]
+    return "\n".join(rows)
+
+
+def test_an_event_log_has_the_resilience_of_the_simulators_own_rows(tmp_path: Path) -> None:
+    LATE.run()
+    ours = LATE.findings()
+    study = imported(tmp_path, event_log(ours))
+    (own,), (theirs,) = resiliences(ours), resiliences(study.findings())
+    assert theirs.against_removed == own.against_removed
+    assert theirs.against_whole == own.against_whole
+    assert own.repair is not None
+    assert theirs.repair == own.repair
+    assert own.single is not None
+    assert theirs.single is not None
+    for one, other in zip(own.single, theirs.single):
+        assert np.array_equal(np.array(one.curve), np.array(other.curve))
+    study.report()
+    report = (tmp_path / "out" / "report.md").read_text()
+    assert "Resilience: deliveries after the onset" in report
+    assert "Anchoring" not in report  # nobody recorded it
+
+
+def test_an_event_log_without_seeds_and_removed_robots_has_the_index_alone(tmp_path: Path) -> None:
+    LATE.run()
+    log = event_log(LATE.findings(), seeds=False).splitlines()
+    # One run fewer, so that the two conditions have not equally many.
+    kept = [row for row in log if "removed" not in row and row.split(";")[6] != "FM4 2"]
+    study = imported(tmp_path, "\n".join(kept))
+    (found,) = resiliences(study.findings())
+    assert found.against_whole is not None
+    assert not found.against_whole.paired
+    assert found.against_removed is None
+    assert found.repair is None
+    assert found.problem == "no runs with the robots removed are there to compare with"
+    study.report()
+
+
+def test_the_report_states_the_set_up_and_no_simulators(tmp_path: Path) -> None:
+    (tmp_path / "lab.csv").write_text(LAB)
+    import_results(tmp_path / "lab.csv", tmp_path / "out", setup={"arena": "4 m x 4 m"})
+    Study.stored(tmp_path / "out").report()
+    report = (tmp_path / "out" / "report.md").read_text()
+    assert "| arena | 4 m x 4 m |" in report
+    assert "Welch's t-test for independent samples" in report
+    assert "heading_drift" not in report
+    assert "code version" not in report
 
 
 MANY = """kind,name,value,delivered
@@ -101,27 +239,17 @@ HEAD = "kind,name,value,n_robots,delivered\n"
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "has no column 'kind'"),
-        ("kind,name,value\nsize,n_robots,5\n", "has no column 'delivered'"),
-        ("kind,name,value,delivered,sede\n", "has a column 'sede'; did you mean 'seed'?"),
-        (HEAD, "holds no run"),
-        (HEAD + "size,n_robots,5,,-3\n", "line 2: delivered = -3"),
-        (HEAD + "size,n_robots,5,,9.5\n", "line 2: delivered = 9.5"),
-        (HEAD + "size,n_robots,5,,nan\n", "line 2: delivered = nan"),
-        (HEAD + "size,n_robots,5\n", "line 2: delivered = nothing"),
-        (HEAD + "size,n_robots,5,,9,9\n", "line 2: has more values"),
-        (HEAD + "size,n_robots,five,,9\n", "line 2: value = 'five'"),
-        (HEAD + "sise,n_robots,5,,9\n", "kind = 'sise'; did you mean 'size'?"),
-        (HEAD + "size,n_robots,5,,9\n", "stands alone"),
-        (HEAD + "fault,FM1,1,25,9\n", "no row without one"),
-        (HEAD + "fault,none,0,,9\n", "n_robots is missing"),
-        (HEAD + "fault,none,0,25,9\nfault,FM9,1,25,9\n", "no failure mode 'FM9'"),
-        (HEAD + "fault,none,0,25,9\nfault,FM1,1,20,9\n", "swarms of several sizes"),
-        (HEAD + "parameter,width,1,,9\nparameter,width,2,,9\n", "no numeric scenario field"),
-        ("kind,name,value,seed,delivered\nsize,n,5,0,9\nsize,n,6,,9\n", "line 3: has no seed"),
-        ("kind,name,value,seed,delivered\nsize,n,5,0,9\nsize,n,6,1,9\n", "the same seeds"),
-        ("kind,name,value,seed,delivered\nsize,n,5,0,9\nsize,n,5,0,9\n", "two rows of one seed"),
-        ("\udcff", "not a CSV file in UTF-8"),
+        ("", "is empty"),
+        (HEAD + "size,n_robots,5,,-3\n", "line 2, column 'delivered': '-3'"),
+        (HEAD + "size,n_robots,five,,9\n", "line 2, column 'value': 'five'"),
+        (HEAD + "size,n_robots,5,,9\n", "line 2: stands alone"),
+        (HEAD + "fault,FM1,1,25,9\n", "no row without one (fault none)"),
+        (HEAD + "fault,none,0,25,9\nfault,FM1,1,20,9\n", "line 3: has the fault 'FM1', but no row"),
+        (HEAD + "parameter,width,0,,9\nparameter,width,2,,9\n", "line 2: width = 0 is x_o"),
+        (
+            "robots,weight,slope,delivered\n4,1,0,9\n4,2,3,9\n",
+            "or one parameter alone; columns taken for parameters: 'weight', 'slope'",
+        ),
     ],
 )
 def test_bad_file_is_refused_in_one_sentence_and_leaves_nothing(
@@ -145,5 +273,5 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
     with Store.existing(tmp_path / "out") as store:
         assert len(store) == 5
     assert [path.name for path in (tmp_path / "out").iterdir()] == [FILE_NAME]
-    with pytest.raises(StudyError, match="code version imported"):
+    with pytest.raises(StudyError, match="was imported: run into a new directory"):
         Study.stored(tmp_path / "out").run()

@@ -10,6 +10,7 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.spi.estimate import verdict_at
 from swarm_logistics_env.studies import Study
 
 FIELDS: dict[str, Any] = {
@@ -26,24 +27,20 @@ FIELDS: dict[str, Any] = {
 
 def test_each_declared_look_is_taken_at_its_level(tmp_path: Path) -> None:
     looks = (3, 6)
-    for seeds, alpha in zip(looks, spi.look_levels(looks), strict=True):
+    for seeds, alpha in zip(looks, spi.look_alphas(looks), strict=True):
         study = Study(out=tmp_path, seeds=seeds, looks=looks, **FIELDS)
         study.run()
         results = study.findings()
         assert not results.exploratory
-        assert results.level == pytest.approx(1 - alpha)
+        assert results.confidence == pytest.approx(1 - alpha)
         (test,) = results.tests
         assert test.estimate is not None
-        assert test.estimate.level == results.level
-        assert test.estimate.verdict == (
-            spi.verdict_at_look(
-                spi.scalability(
-                    *(cell.performance for cell in results.cells), n=2, m=4, level=0.95
-                ),
-                looks,
-            ).verdict
+        assert test.estimate.confidence == results.confidence
+        plain = spi.scalability(
+            *(cell.performance for cell in results.cells), n=2, m=4, confidence=0.95
         )
-    assert results.level < 0.96
+        assert test.estimate.verdict == verdict_at(alpha, plain.p_value, plain.probability)
+    assert results.confidence < 0.96
 
 
 def test_first_look_of_very_many_has_a_level_below_1() -> None:
@@ -52,7 +49,7 @@ def test_first_look_of_very_many_has_a_level_below_1() -> None:
     study.run()
     results = study.findings()
     assert not results.exploratory
-    assert 0.9999 < results.level < 1.0
+    assert 0.9999 < results.confidence < 1.0
     (test,) = results.tests
     assert test.estimate is not None
     assert test.estimate.verdict == "inconclusive"
@@ -66,7 +63,7 @@ def test_look_that_was_not_declared_is_exploratory(tmp_path: Path) -> None:
         study = Study(out=tmp_path, **fields, **FIELDS)
         study.run()
         assert study.findings().exploratory
-        assert study.findings().level == 0.95
+        assert study.findings().confidence == 0.95
 
 
 def test_a_look_at_other_seeds_than_the_declared_ones_is_exploratory(tmp_path: Path) -> None:
@@ -89,7 +86,7 @@ def test_report_tells_the_declared_looks_and_their_levels(tmp_path: Path) -> Non
     study = Study(out=tmp_path, seeds=2, looks=(2, 4), **FIELDS)
     study.run()
     text = markdown(document(study.findings()))
-    first, last = spi.look_levels((2, 4))
+    first, last = spi.look_alphas((2, 4))
     assert f"| 1 of 2 | 2 | {first:.4f} | {100 * (1 - first):.4g} % | this report |" in text
     assert f"| 2 of 2 | 4 | {last:.4f} | {100 * (1 - last):.4g} % | to come |" in text
     assert f"| P [95 %] | one run [95 %] | S [{100 * (1 - first):.4g} %]" in text

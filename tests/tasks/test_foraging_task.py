@@ -77,6 +77,7 @@ def test_what_an_outcome_tells_fits_together() -> None:
     assert found.ended_at == 100.0
     assert not found.all_delivered
     assert len(found.failed_robots) == 3
+    assert found.anchoring_seconds is not None
     assert found.anchoring_seconds > 0.0
 
 

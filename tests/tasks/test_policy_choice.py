@@ -92,7 +92,7 @@ def test_file_may_not_name_code_by_way_of_parameters(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     policy = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
     path.write_text(f"policies = [{policy}]\n[[sizes]]\nvalues = [2, 3]\n")
-    with pytest.raises(StudyError, match="is a class, and to load it runs code"):
+    with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(path)
     assert Study.from_file(path, trust_code=True).plan().conditions
 

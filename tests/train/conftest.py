@@ -22,8 +22,7 @@ def small() -> Any:
             "scenario": Scenario(
                 warehouse_width=5.0, warehouse_height=4.0, n_items=8, duration=6.0, restock=True
             ),
-            "sizes": (3, 5),
-            "worlds": 2,
+            "worlds": [{"n_robots": 3}, {"n_robots": 5}],
             "threads": 1,
             "agent_steps": 640,
             "network": Network(hidden=(8,)),

@@ -18,13 +18,13 @@ import torch
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS
-from swarm_logistics_env.policies.homing import homing_commands
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
-from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
+from swarm_logistics_env.train.critic import KNOWN
+from swarm_logistics_env.train.learner import make_learner, tensors_of
 from swarm_logistics_env.train.request import train_as_asked
 from swarm_logistics_env.train.run_record import simulation
-from swarm_logistics_env.train.settings import Imitation, Indicators, Scores
+from swarm_logistics_env.train.settings import Indicators, Scores
 from swarm_logistics_env.train.trainer import train
 
 
@@ -86,14 +86,18 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
         for parameter in learner.policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
     tensors = tensors_of(learner.policy)
-    inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS))).astype(np.float32)
+    inputs = (
+        np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(KNOWN))).astype(np.float32)
+    )
     from swarm_logistics_env.policies.card import PolicyCard
     from swarm_logistics_env.policies.learned import LearnedPolicy
 
     policy = LearnedPolicy(PolicyCard(name="x", network=training.network), tensors)
     with torch.no_grad():
-        told = outputs_of(learner.policy, torch.from_numpy(inputs)).numpy()
-    np.testing.assert_allclose(policy._network(inputs), told, rtol=0, atol=1e-5)
+        told = learner.policy.get_distribution(torch.from_numpy(inputs)).mode().numpy()
+    np.testing.assert_allclose(
+        policy._network(inputs[:, : len(INPUTS)].copy()), told, rtol=0, atol=1e-5
+    )
     # What PPO takes for the most likely action is the same.
     likely, _ = learner.predict(inputs, deterministic=True)
     np.testing.assert_allclose(np.clip(told, -1.0, 1.0), likely, rtol=0, atol=1e-5)
@@ -103,19 +107,19 @@ def test_the_view_trains_what_the_policy_plays(small: Any) -> None:
     """One world in training and the policy file alone come to the same commands."""
     from swarm_logistics_env.motion.frame import MotionFrame
 
-    training: Training = small(sizes=(3,), worlds=1)
+    training: Training = small(worlds=[{"n_robots": 3}])
     view = trainer._new_view(training)
     view.seed(3)
     inputs = view.reset()
     frame = MotionFrame(training.scenario)
     frame.begin(view.frame.keys)
     rng = np.random.default_rng(0)
-    assert (frame.read(view.observations) == inputs).all()
+    assert (frame.read(view.observations) == inputs[:, : len(INPUTS)]).all()
     for _ in range(20):
         outputs = rng.uniform(-1, 1, (3, 3)).astype(np.float32)
         frame.command(outputs)
         inputs, *_ = view.step(outputs)
-        assert (frame.read(view.observations) == inputs).all()
+        assert (frame.read(view.observations) == inputs[:, : len(INPUTS)]).all()
 
 
 def test_the_same_seed_gives_the_same_policy(small: Any, tmp_path: Path) -> None:
@@ -128,8 +132,8 @@ def test_the_same_seed_gives_the_same_policy(small: Any, tmp_path: Path) -> None
 
 def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> None:
     train(small(), tmp_path)
-    with pytest.raises(TrainingError, match="holds a training with another seed, sizes"):
-        train(small(seed=1, sizes=(5, 3)), tmp_path)
+    with pytest.raises(TrainingError, match="holds a training with another seed, worlds"):
+        train(small(seed=1, worlds=[{"n_robots": 5}, {"n_robots": 3}]), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +142,8 @@ def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> Non
         ({}, "gpu", "device = 'gpu': should be 'cpu' or 'cuda'"),
         ({}, "cuda", "device = 'cuda': torch finds no GPU here"),
         ({"indicators": Indicators(weights={"Q": 1.0})}, "cpu", "no indicator 'Q'"),
-        ({"sizes": (3, 900)}, "cpu", "n_robots = 900 .* do not fit"),
+        ({"start": "homing"}, "cpu", "start = 'homing': should be a trained policy"),
+        ({"start": "ppo-delivery"}, "cpu", "start = 'ppo-delivery': its tensors lack .* and have"),
     ],
 )
 def test_nothing_is_begun_that_cannot_be(
@@ -181,25 +186,21 @@ def test_a_checkpoint_that_is_cut_short_is_refused(small: Any, tmp_path: Path) -
         train(small(), tmp_path)
 
 
-def test_imitation_brings_the_network_towards_homing(small: Any) -> None:
-    from swarm_logistics_env.train.imitation import imitate
+def test_a_training_goes_on_from_a_trained_policy(small: Any, tmp_path: Path) -> None:
+    first = train(small(), tmp_path / "first")
+    frozen = small().ppo.replace(value_warmup=100)
+    again = train(small(start=str(first), seed=1, ppo=frozen), tmp_path / "again")
+    layers = [name for name in load_file(first) if name.startswith("layers")]
+    assert all((load_file(first)[name] == load_file(again)[name]).all() for name in layers)
+    assert policies.read_card(again).training["start"] == str(first)
 
-    asked = Imitation(rounds=3, seconds=5.0, sizes=(4, 6), fit=150, last_fit=300, common_share=1.0)
-    training: Training = small()
-    view = trainer._new_view(training)
-    policy = make_learner(training, view, "cpu").policy
-    view.seed(1)
-    inputs = torch.from_numpy(view.reset())
-    commands = homing_commands(view.frame, view.observations, training.scenario.control_period)
-    wanted = torch.from_numpy(view.frame.outputs_for(commands).astype(np.float32))
 
-    def error() -> float:
-        with torch.no_grad():
-            return float(((outputs_of(policy, inputs) - wanted) ** 2).mean())
-
-    before = error()
-    imitate(policy, training, asked)
-    assert error() < 0.3 * before
+def test_deviations_keep_above_their_floor(small: Any, tmp_path: Path) -> None:
+    ppo = small().ppo.replace(deviations=(0.5, 0.3, 0.01), least_deviation=(0.4, 0.1))
+    assert [round(ppo.floor(done), 3) for done in (0.0, 0.5, 1.0)] == [0.4, 0.2, 0.1]
+    ended = load_file(train(small(ppo=ppo.replace(learning_rate=1e-9)), tmp_path))
+    # The last update began three quarters on; the start of the next one would have lowered none.
+    np.testing.assert_allclose(ended["deviations"], [0.5, 0.4, 0.4], rtol=1e-5)
 
 
 def test_the_value_network_may_learn_alone_at_first(small: Any, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions, Imitation
+from swarm_logistics_env.train.settings import Conditions
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -32,10 +32,15 @@ def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone(
     assert same_mix.replace(conditions=(), **names) == deliveries
 
 
-def test_a_file_from_before_beta_had_its_name_is_still_read(tmp_path: Path) -> None:
-    path = tmp_path / "old.toml"
-    path.write_text("[imitation]\nteacher_share = [0.5]\n")
-    assert load_training(str(path)).imitation == Imitation(beta=(0.5,))
+def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        "[[worlds]]\ncount = 2\nn_robots = 3\nscenario = { n_items = 8 }\n"
+        "[[worlds]]\nn_robots = 5\n"
+    )
+    training = load_training(str(path))
+    met = [(world.n_robots, world.n_items) for world in training.world_scenarios]
+    assert (met, training.rows) == ([(3, 8), (3, 8), (5, 60)], 11)
 
 
 @pytest.mark.parametrize(
@@ -47,15 +52,22 @@ def test_a_file_from_before_beta_had_its_name_is_still_read(tmp_path: Path) -> N
         ("[rewards]\ndeliver = 1.0", "no reward term 'deliver'; did you mean 'delivery'"),
         ("[scenario]\nn_itens = 5", "Scenario has no field 'n_itens'"),
         ("[ppo]\nn_minibatches = 7", "should divide the batch of 150 robots x 128 steps"),
-        ("sizes = [1, 2]\nworlds = 1", "worlds = 1: should be at least 2"),
-        ("sizes = [2]\n[[conditions]]\nmodes = ['FM1']", "at most the smallest swarm, 2 robots"),
+        ("worlds = []", "worlds"),
+        (
+            "[[worlds]]\nn_robots = 2\n[[conditions]]\nmodes = ['FM1']",
+            "at most the smallest swarm, 2 robots",
+        ),
         ("name = '../x'", "should be of letters, digits"),
         ("[evaluation.faults]\nFM9 = 1", "FM9"),
         ("[evaluation]\nn_robots = 2\nfaults = { FM1 = 3 }", "FM1 = 3: .* at most n_robots = 2"),
         ("[evaluation]\nn_robots = 9999", "n_robots = 9999 .* do not fit"),
         ("[scores]\nmodes = ['FM9']", "no failure mode 'FM9'; did you mean"),
         ("[scores]\nn_robots = 2\nmodes = ['FM1']", "robots = 3: should be less than n_robots"),
-        ("[imitation]\nseconds = 0.01", "imitation.seconds = 0.01: .* the control period, 0.1 s"),
+        ("[[worlds]]\nn_robots = 900", "n_robots = 900 .* do not fit"),
+        ("[[worlds]]\nscenario = { n_itens = 5 }", "Scenario has no field 'n_itens'"),
+        ("[[worlds]]\nscenario = { n_robots = 5 }", "the swarm size is a field of its own"),
+        ("[[worlds]]\nscenario = { message_size = 2 }", "the network sends no messages"),
+        ("[ppo]\nleast_deviation = [0.0, 0.1]", "should be greater than 0"),
         ("[[conditions]]\nonset = [9, 1]", "should be the earliest time, then the latest"),
         ("seed = -1", "Training.seed = -1: should be greater than or equal to 0"),
         ("[network]\nhidden = [0]", "hidden"),
@@ -77,5 +89,5 @@ def test_unknown_presets_and_files_are_refused(tmp_path: Path) -> None:
 
 
 def test_sizes_are_no_condition() -> None:
-    with pytest.raises(SwarmLogisticsError, match="swarm sizes belong in `sizes`"):
+    with pytest.raises(SwarmLogisticsError, match="swarm sizes belong in `worlds`"):
         Conditions(scenario={"n_robots": [5]})

@@ -4,9 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from swarm_logistics_env import policies
+from swarm_logistics_env import policies, spi
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import PolicyError, TrainingError
 from swarm_logistics_env.policies import SwarmDT
@@ -76,12 +77,19 @@ def test_a_search_that_was_cut_short_goes_on_as_it_would_have(
 
 
 def test_objectives_are_p_and_means_over_the_modes() -> None:
-    measured = Evaluated(
-        40.0, {"FM1": 30.0, "FM4": 10.0, "removed": 36.0}, {"FM1": -0.1, "FM4": -0.5}
-    )
-    asked = small(modes=("FM1", "FM4"), objectives=("FT", "P", "R"))
-    assert values_of(asked, measured) == pytest.approx(((30 + 10 - 72) / 2 / 40, 40.0, -0.3))
-    assert values_of(asked, Evaluated(0.0, {}, {})) == (-1.0, 0.0, -1.0)
+    asked = small(modes=("FM1", "FM4"), robots=2, objectives=("FT", "P", "R"))
+    p_o = np.array([30.0, 50.0])
+    p_f = {
+        "FM1": np.array([20.0, 40.0]),
+        "FM4": np.array([12.0, 8.0]),
+        "removed": np.array([32.0, 40.0]),
+    }
+    measured = Evaluated(10, dict.fromkeys(p_f, 2), p_o, p_f)
+    robustness = [spi.robustness(p_o, p_f[mode], n=10, m=2).value for mode in ("FM1", "FM4")]
+    expected = ((30 + 10 - 72) / 2 / 40, 40.0, np.mean(robustness))
+    assert values_of(asked, measured) == pytest.approx(expected)
+    nothing = measured._replace(p_o=np.zeros(2))
+    assert values_of(asked, nothing) == (-1.0, 0.0, -1.0)
 
 
 @pytest.mark.parametrize(

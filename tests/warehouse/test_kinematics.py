@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.warehouse.kinematics import drive, refused_command
+from swarm_logistics_env.warehouse.packing import blank
 from swarm_logistics_env.warehouse.structs import (
     NOBODY,
-    blank_capabilities,
+    Capabilities,
     blank_robots,
+    lengths_of,
     parameters_of,
 )
 
@@ -23,7 +25,8 @@ from swarm_logistics_env.warehouse.structs import (
 def one_robot(heading: float = 0.0, obeys: bool = True, **fields: Any) -> tuple[Any, ...]:
     """Return robots, capabilities and parameters of one robot of 2 m/s and 6 rad/s."""
     scenario = Scenario(n_robots=1, **fields)
-    robots, able = blank_robots(scenario), blank_capabilities(scenario)
+    lengths = lengths_of(scenario)
+    robots, able = blank_robots(lengths), blank(Capabilities, lengths)
     robots.heading[:], able.obeys[:] = heading, obeys
     able.max_speed[:], able.max_turn_rate[:] = 2.0, 6.0
     return robots, able, parameters_of(scenario)
@@ -104,8 +107,9 @@ def test_a_robot_that_does_not_obey_stands_and_does_not_turn() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_the_first_command_that_is_not_finite_is_named(bad: float) -> None:
-    scenario = Scenario(n_robots=2)
-    robots, able = blank_robots(scenario), blank_capabilities(scenario)
+    lengths = lengths_of(Scenario(n_robots=2))
+    robots, able = blank_robots(lengths), blank(Capabilities, lengths)
+    able.obeys[:] = True
     commands = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 0.0, bad, bad]])
     assert refused_command(commands, robots, able) == 6
     able.obeys[1] = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numba
 import numpy as np
@@ -10,6 +10,8 @@ import pytest
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse import native, physics
+from swarm_logistics_env.warehouse.packing import hints
+from swarm_logistics_env.warehouse.structs import Functions
 
 nb: Any = numba  # typed in parts only
 doubles = nb.types.CPointer(nb.double)
@@ -55,6 +57,7 @@ def test_a_stored_int_leaves_its_neighbours_alone() -> None:
 
 
 def test_a_pymunk_without_the_functions_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(physics._FUNCTIONS, "step", "cpSpaceLeap")
+    renamed = {**hints(Functions), "step": Annotated[int, "cpSpaceLeap"]}
+    monkeypatch.setattr(physics, "hints", lambda _: renamed)
     with pytest.raises(SetupError, match=r"pymunk 7.* lacks a function: .*cpSpaceLeap"):
         physics._function_addresses()

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.warehouse.packing import packed, unpacked_at
+from swarm_logistics_env.warehouse.packing import blank, packed, unpacked_at
 from swarm_logistics_env.warehouse.structs import (
     Flags,
     Keys,
-    NumberRows,
+    Numbers,
     Parameters,
     parameters_of,
 )
@@ -23,7 +23,7 @@ class Inner(NamedTuple):
     """A structure in a structure."""
 
     n_things: int
-    key: Keys
+    key: Annotated[Keys, "things"]
 
 
 class Outer(NamedTuple):
@@ -31,9 +31,9 @@ class Outer(NamedTuple):
 
     share: float
     is_on: bool
-    rows: NumberRows
+    rows: Annotated[Numbers, "rows", 3]
     inner: Inner
-    flags: Flags
+    flags: Annotated[Flags, 3]
 
 
 @kernel
@@ -66,8 +66,23 @@ def test_every_kind_of_field_is_read_and_arrays_are_written() -> None:
 )
 def test_an_array_that_is_not_as_declared_is_refused(rows: Any) -> None:
     outer = Outer(0.0, False, rows, Inner(0, np.zeros(1, np.uint64)), np.zeros(1, np.bool_))
-    with pytest.raises(TypeError, match=r"Outer\.rows: should be a 2-d array of float64"):
+    with pytest.raises(TypeError, match=r"Outer\.rows: should be \(.rows., 3\) numbers of float64"):
         packed(outer)
+
+
+class Shaped(NamedTuple):
+    """Arrays of named and of fixed lengths."""
+
+    places: Annotated[Numbers, "things", 2]
+    flags: Annotated[Flags, 3]
+
+
+def test_blank_arrays_have_the_lengths_that_their_shapes_name() -> None:
+    shaped = blank(Shaped, {"things": 4, "others": 7})
+    assert shaped.places.shape == (4, 2)
+    assert shaped.places.dtype == np.float64
+    assert shaped.flags.tolist() == [False, False, False]
+    assert packed(shaped)[1:3].tolist() == [4, 2]
 
 
 def test_parameters_are_the_scenarios_own() -> None:

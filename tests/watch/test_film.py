@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, policies, run_episode
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering.renderer import load_pygame
-from swarm_logistics_env.watch.play import Play
 
 load_pygame()
 

@@ -13,7 +13,7 @@ from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.web import WatchServer
 
 if TYPE_CHECKING:
-    from tests.watch.conftest import Browser
+    from verification.browser import Browser
 
 STRIP = "document.querySelector('#strip').toDataURL()"
 AT = """(({{left, top}}) => [left + place.left + place.scale * view.robots[{robot}][0],
@@ -47,6 +47,7 @@ def test_robot_is_broken_by_a_click_and_the_strip_shows_it(
     browser.wait_for("view !== null && view.time > 1")
     browser.press(" ")
     browser.wait_for("view.paused && place !== null")
+    assert not browser.value("document.querySelector('#break').offsetParent")  # none is selected
     browser.click(*browser.value(AT.format(robot=4)))
     browser.wait_for("view.selected && view.selected.robot === 4")
     assert session.selected == 4
@@ -70,5 +71,8 @@ def test_robot_is_broken_by_a_click_and_the_strip_shows_it(
     browser.press("h")
     browser.wait_for("document.querySelector('#help').open")
     assert len(browser.screenshot()) > 10_000
+    # Nothing is wider than the column that holds it.
+    assert browser.value("[...document.querySelectorAll('aside *')].every((one) => "
+                         "one.getBoundingClientRect().right <= innerWidth)")  # fmt: skip
     # The browser's own note of the order that was refused, and nothing else.
     assert [entry for entry in browser.console if "400 (Bad Request)" not in entry] == []

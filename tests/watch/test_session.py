@@ -199,17 +199,6 @@ def test_next_seed_and_again() -> None:
     assert session.run.world.state.time == 0.0
 
 
-def test_robot_at_is_the_nearest_within_reach() -> None:
-    session = Session(SMALL, swarm_dt)
-    x, y = session.run.world.state.robot_position[4]
-    assert session.robot_at(x + 0.05, y, 0.2) == 4
-    assert session.robot_at(-3.0, -3.0, 0.2) is None
-    session.choose_mode("removed")
-    session.break_robot(4)
-    assert session.robot_at(x, y, 0.01) is None
-    assert session.robot_at(0.0, 0.0, 0.01) is None  # where absent robots' rows point
-
-
 def test_wrong_arguments() -> None:
     with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
         Session(SMALL, swarm_dt, speed=3.0)

@@ -110,7 +110,7 @@ def test_orders(server: WatchServer) -> None:
         {"do": "choose", "mode": "FM1"},
         {"do": "press", "key": "b"},
         {"do": "toggle", "robot": 3},
-        {"do": "widen", "delivery_width": 2},
+        {"do": "widen", "width": 2},
     ):
         assert ask(server, "order", order)[0] == 200
     assert session.run.world.state.failure_modes == ((), (), ("FM1",), ("FM1",), (), ())
@@ -131,7 +131,7 @@ def test_orders(server: WatchServer) -> None:
         ({"do": "choose", "mode": "FM9"}, "FM9"),
         ({"do": "fly"}, "order"),
         ({"do": "select", "robot": "3"}, "valid integer"),
-        ({"do": "select", "robot": 3, "also": 4}, "Extra inputs"),
+        ({"do": "select", "robot": 3, "also": 4}, "Unexpected keyword"),
         ([], "order"),
     ],
 )
@@ -151,7 +151,7 @@ def test_bytes_that_are_no_order_change_nothing() -> None:
         with pytest.raises(SwarmLogisticsError):
             obey(session, rng.randbytes(length))
     for text in (
-        b'{"do":"widen","delivery_width":NaN}',
+        b'{"do":"widen","width":NaN}',
         b'{"do":"resize","n_robots":1e3}',
         b"null",
     ):

@@ -81,8 +81,8 @@ def conformance(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
         # their own, which we ignore and say so.
         warnings.simplefilter("ignore", DeprecationWarning)
         warnings.filterwarnings("ignore", "reset option 'options' is ignored")
-        # Of a smaller swarm than the largest, not all possible agents end.
+        # In a swarm smaller than the largest, not all possible agents end.
         warnings.filterwarnings("ignore", "No agents present but not all possible_agents")
-        # What a robot that left sees last.
+        # A robot that left observes zeros.
         warnings.filterwarnings("ignore", "Observation numpy array is all zeros")
         yield importlib.import_module("pettingzoo.test")

@@ -65,10 +65,10 @@ MOUSE: tuple[tuple[str, str], ...] = (
 )
 
 
-def press(session: Session, name: str) -> bool:
-    """Do what the key of that name does to a session; False if it does nothing to it."""
-    for key in KEYS:
-        if key.name == name and key.act is not None:
-            key.act(session)
+def press(session: Session, key: str) -> bool:
+    """Do what the key of that name does to a session; return False if it does nothing to it."""
+    for known in KEYS:
+        if known.name == key and known.act is not None:
+            known.act(session)
             return True
     return False

@@ -417,7 +417,7 @@ function listen() {
     button.addEventListener("click", () => order({ do: "press", key: button.dataset.key }));
   }
   element("n_robots").addEventListener("change", (event) => order({ do: "resize", n_robots: Math.round(event.target.valueAsNumber) }));
-  element("delivery_width").addEventListener("change", (event) => order({ do: "widen", delivery_width: event.target.valueAsNumber }));
+  element("delivery_width").addEventListener("change", (event) => order({ do: "widen", width: event.target.valueAsNumber }));
   for (const name of ["trails", "links"]) {
     element(name).addEventListener("change", (event) => { options[name] = event.target.checked; show(); });
   }

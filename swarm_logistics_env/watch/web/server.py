@@ -54,15 +54,15 @@ class WatchServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     """Shows a session to those who know its address, which holds a random token.
 
     Args:
-        session: what is watched.
-        title: names the policy.
-        port: 0: any that is free.
+        session: the session to show.
+        title: the name of the policy.
+        port: the port; 0 takes any that is free.
 
     Attributes:
-        address: what to open in a browser.
+        address: the address to open in a browser.
 
     Raises:
-        SetupError: the port cannot be had.
+        SetupError: the port is in use or not allowed.
     """
 
     allow_reuse_address = True
@@ -110,7 +110,7 @@ class WatchServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
             self._tell()
 
     def view(self, after: int, *, trails: bool = False) -> bytes:
-        """Return the first view later than version `after`, or, if none comes, the same again."""
+        """Return the first view later than version `after`, or the same again if none comes."""
         self._last_look = time.monotonic()
         with self.changed:
             self.changed.wait_for(lambda: self.version != after, _PATIENCE)
@@ -239,11 +239,11 @@ def serve(session: Session, title: str, port: int, announce: Callable[[str], Non
     """Show a session in the browser until Ctrl-C.
 
     Args:
-        announce: called with the sentence that has the address.
+        announce: is called with a sentence that has the address.
 
     Raises:
-        SetupError: the port cannot be had.
-        PolicyError: the policy's commands cannot be.
+        SetupError: the port is in use or not allowed.
+        PolicyError: the policy returned commands of the wrong shape, or not finite.
     """
     with WatchServer(session, title, port) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True)

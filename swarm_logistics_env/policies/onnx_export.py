@@ -1,0 +1,82 @@
+"""Trained policies as ONNX files, for robots and programs without Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.motion.frame import INPUTS, LEAD, OUTPUTS
+from swarm_logistics_env.policies.files import CARD
+from swarm_logistics_env.policies.learned import LearnedPolicy
+from swarm_logistics_env.policies.policy import Policy
+
+# Both are old enough for the runtimes of 2022.
+OPERATORS, FORMAT = 17, 8
+
+
+def write_onnx(policy: Policy, path: Path | str) -> None:
+    """Write the network of a trained policy as an ONNX file.
+
+    Its input "inputs" is float32 (robots, 84), `motion.INPUTS` in this order; its output "outputs"
+    is float32 (robots, 3), `motion.OUTPUTS`. What makes inputs of observations and a memory, and
+    commands of outputs, is `motion.MotionFrame`; docs/onnx.md has it in words. The noise of a
+    policy that explores is not in the file; the card is, in its metadata.
+
+    Args:
+        policy: a trained one, as `policies.load("ppo-delivery")`.
+        path: of the file, which is replaced.
+
+    Raises:
+        PolicyError: the policy is no trained one, the package onnx is missing, or the file cannot
+            be written.
+    """
+    if not isinstance(policy, LearnedPolicy):
+        raise PolicyError(
+            f"policy = {type(policy).__name__}: should be a trained one, as "
+            'policies.load("ppo-delivery") returns, since scripts have no network'
+        )
+    try:
+        from onnx import TensorProto, checker, helper, numpy_helper
+    except ModuleNotFoundError as error:
+        raise PolicyError(
+            f"to write ONNX needs the package onnx ({error}): pip install "
+            "'swarm-logistics-env[onnx]'"
+        ) from error
+    network, tensors = policy.card.network, dict(policy.tensors)
+    if not network.listens:
+        # Such a policy reads zeros there. Without their weights it may be given anything.
+        tensors["layers.0.weight"] = tensors["layers.0.weight"].copy()
+        tensors["layers.0.weight"][:, LEAD] = 0.0
+    nodes, last = [], len(network.hidden)
+    kind = {"tanh": "Tanh", "relu": "Relu"}[network.activation]
+    at = "inputs"
+    for layer in range(last + 1):
+        weight, bias = f"layers.{layer}.weight", f"layers.{layer}.bias"
+        to = "outputs" if layer == last else f"layers.{layer}.sum"
+        nodes.append(helper.make_node("Gemm", [at, weight, bias], [to], transB=1))
+        at = to
+        if layer < last:
+            at = f"layers.{layer}.out"
+            nodes.append(helper.make_node(kind, [to], [at]))
+    kept = {name: np.ascontiguousarray(t) for name, t in tensors.items() if "layers" in name}
+    model = helper.make_model(
+        helper.make_graph(
+            nodes,
+            policy.card.name,
+            [helper.make_tensor_value_info("inputs", TensorProto.FLOAT, ["robots", len(INPUTS)])],
+            [helper.make_tensor_value_info("outputs", TensorProto.FLOAT, ["robots", len(OUTPUTS)])],
+            [numpy_helper.from_array(tensor, name) for name, tensor in kept.items()],
+        ),
+        opset_imports=[helper.make_opsetid("", OPERATORS)],
+        ir_version=FORMAT,
+        producer_name="swarm-logistics-env",
+    )
+    helper.set_model_props(model, {CARD: policy.card.to_json()})
+    checker.check_model(model)
+    path = Path(path)
+    try:
+        path.write_bytes(model.SerializeToString())
+    except OSError as error:
+        raise PolicyError(f"cannot write the ONNX file {path}: {error.strerror}") from error

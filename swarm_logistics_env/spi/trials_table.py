@@ -1,0 +1,250 @@
+"""A CSV file as people type it: its delimiter, decimal sign, and what each column is."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from .inputs import IndicatorError
+
+# What a column is, and the words that name it in files; small letters, "_" for all that is none.
+NAMES: dict[str, tuple[str, ...]] = {
+    "performance": (
+        *("p", "delivered", "deliveries", "items", "score", "throughput"),
+        *("leistung", "geliefert", "lieferungen"),
+    ),
+    "n_robots": ("robots", "n", "swarm_size", "swarmsize", "roboter", "anzahl_roboter"),
+    "fault": ("failure", "mode", "failure_mode", "fault_mode", "fehler", "ausfall"),
+    "faulty": ("m", "failed", "n_faulty", "faulty_robots", "defekt", "ausgefallen"),
+    "onset": ("fault_onset", "fault_time", "fault_at", "fehlerbeginn"),
+    "policy": ("controller", "algorithm", "behaviour", "behavior", "regler", "steuerung"),
+    "seed": ("pair", "block", "paar"),
+    "trial": ("run", "id", "repetition", "versuch", "lauf", "nr"),
+    "time": ("t", "delivery_time", "delivered_at", "zeit", "zeitpunkt"),
+    "duration": ("length", "trial_length", "dauer"),
+    "kind": (),
+    "name": (),
+    "value": (),
+}
+_MEANING = {word: column for column, words in NAMES.items() for word in (column, *words)}
+_LONG = ("kind", "name", "value")
+_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Table:
+    """The cells of a file, found by what their column is.
+
+    Attributes:
+        path: of the file.
+        header: the columns' names as the file has them.
+        places: number of each known column by what it is (a key of `NAMES`).
+        others: numbers of the columns that may be parameters.
+        rows, lines: the cells, and the line that each row ends in.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    places: dict[str, int]
+    others: tuple[int, ...]
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+
+    def need(self, column: str, otherwise: str = "") -> None:
+        """Raise unless there is such a column."""
+        if column not in self.places:
+            raise IndicatorError(
+                f"{self.path} has no column {column!r}{', ' + otherwise if otherwise else ''}: it "
+                f"has {', '.join(map(repr, self.header))}; say which it is by "
+                f"--column {column}=NAME (columns={{{column!r}: NAME}})"
+            )
+
+    def text(self, row: int, column: str) -> str:
+        """Return a cell; empty where there is none."""
+        return self.rows[row][self.places[column]] if column in self.places else ""
+
+    def number(self, row: int, column: str, *, least: float = -math.inf) -> float:
+        """Return a cell as a finite number of at least `least`."""
+        return self._number(row, self.places[column], least)
+
+    def whole(self, row: int, column: str, *, least: int) -> int | None:
+        """Return a cell as a whole number; None where it is empty or there is no such column."""
+        return self.needed_whole(row, column, least=least) if self.text(row, column) else None
+
+    def needed_whole(self, row: int, column: str, *, least: int) -> int:
+        """Return a cell as a whole number of at least `least`."""
+        value = self._parsed(self.rows[row][self.places[column]])
+        if value is None or not (value >= least and value == int(min(value, 1e15))):
+            raise self.error(row, column, f"should be a whole number, {least} or more")
+        return int(value)
+
+    def parameters(self, row: int) -> tuple[tuple[str, float], ...]:
+        """Return name and value of every other column that varies over the file."""
+        return tuple((self.header[place], self._number(row, place)) for place in self._varying)
+
+    def error(self, row: int, column: str, should: str) -> IndicatorError:
+        """Return the error that a cell cannot be."""
+        if column not in self.places:
+            return IndicatorError(
+                f"{self.path}, line {self.lines[row]}: {column} is missing: {should}"
+            )
+        return self._error(row, self.places[column], should)
+
+    def _error(self, row: int, place: int, should: str) -> IndicatorError:
+        cell = self.rows[row][place]
+        return IndicatorError(
+            f"{self.path}, line {self.lines[row]}, column {self.header[place]!r}: "
+            f"{repr(cell) if cell else 'nothing'}: {should}"
+        )
+
+    def _number(self, row: int, place: int, least: float = -math.inf) -> float:
+        value = self._parsed(self.rows[row][place])
+        if value is None or value < least:
+            bound = f", {least:g} or more" if math.isfinite(least) else ""
+            hint = ""
+            if value is None and place in self.others:
+                hint = ", as every column that varies is a parameter; else --ignore " + repr(
+                    self.header[place]
+                )
+            raise self._error(row, place, f"should be a number{bound}{hint}")
+        return value
+
+    def _parsed(self, cell: str) -> float | None:
+        if self._decimal_comma:
+            cell = cell.replace(",", ".")
+        value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
+        return value if math.isfinite(value) else None
+
+    @cached_property
+    def _varying(self) -> tuple[int, ...]:
+        return tuple(place for place in self.others if len({row[place] for row in self.rows}) > 1)
+
+    @cached_property
+    def _decimal_comma(self) -> bool:
+        """Whether decimals have a comma; a file with both signs could mean anything."""
+        first: dict[str, tuple[int, int]] = {}
+        places = [*(p for name, p in self.places.items() if name not in _TEXTS), *self.others]
+        for row, cells in enumerate(self.rows):
+            for place in places:
+                for sign, form in ((",", _COMMA), (".", _POINT)):
+                    if form.fullmatch(cells[place]):
+                        first.setdefault(sign, (row, place))
+        if len(first) == 2:
+            raise self._error(
+                *first["."],
+                f"should have a decimal comma, as line {self.lines[first[','][0]]} has "
+                f"({self.rows[first[','][0]][first[','][1]]!r}), or all a point; no sign between "
+                "thousands",
+            )
+        return "," in first
+
+
+_TEXTS = ("fault", "policy", "trial", "kind", "name")
+
+
+def read_table(path: Path, columns: dict[str, str], ignore: tuple[str, ...]) -> tuple[Table, bytes]:
+    """Return the table in a file, and the file's bytes.
+
+    Args:
+        columns: what a column is (a key of `NAMES`) to its name in the file.
+        ignore: names of columns to leave out.
+
+    Raises:
+        IndicatorError: the file cannot be read or is no such table, or a column is not there.
+    """
+    try:
+        content = path.read_bytes()
+        text = content.decode("utf-8-sig")
+    except OSError as error:
+        raise IndicatorError(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise IndicatorError(
+            f"{path} is not a CSV file in UTF-8 ({error.reason}): save it as CSV UTF-8"
+        ) from error
+    lines = text.splitlines()
+    start = next((n for n, line in enumerate(lines) if line.strip()), None)
+    if start is None:
+        raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
+    delimiter = max(";\t,", key=lines[start].count)
+    reader = csv.reader(lines[start:], delimiter=delimiter, skipinitialspace=True)
+    rows, numbers = [], []
+    try:
+        header = tuple(cell.strip() for cell in next(reader))
+        for cells in reader:
+            stripped = tuple(cell.strip() for cell in cells)
+            number = start + reader.line_num
+            if not any(stripped):
+                continue
+            if any(stripped[len(header) :]):
+                raise IndicatorError(
+                    f"{path}, line {number}: has {len(stripped)} values, more values than the "
+                    f"{len(header)} columns: if decimals have a comma, put ; between the columns"
+                )
+            rows.append((*stripped, *("",) * (len(header) - len(stripped)))[: len(header)])
+            numbers.append(number)
+    except csv.Error as error:
+        raise IndicatorError(f"{path} is not a CSV file: {error}") from error
+    places, others = _columns(path, header, columns, ignore)
+    return Table(path, header, places, others, tuple(rows), tuple(numbers)), content
+
+
+def _columns(
+    path: Path, header: tuple[str, ...], columns: dict[str, str], ignore: tuple[str, ...]
+) -> tuple[dict[str, int], tuple[int, ...]]:
+    """Return where each known column is, and which columns are left as parameters."""
+    for column in columns:
+        if column not in NAMES:
+            raise IndicatorError(f"--column {column}: {_one_of(column, NAMES)}")
+    for name in (*columns.values(), *ignore):
+        if name not in header:
+            raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, header)}")
+    for name in header:
+        if name and header.count(name) > 1:
+            raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
+    places = {column: header.index(name) for column, name in columns.items()}
+    others = []
+    for place, name in enumerate(header):
+        if not name or name in ignore or name in columns.values():
+            continue
+        word = _word(name)
+        known = _MEANING.get(word)
+        if known is None or known in columns:
+            close = difflib.get_close_matches(word, _MEANING, n=1, cutoff=0.75)
+            if close and known is None and len(word) > 3:
+                raise IndicatorError(
+                    f"{path} has a column {name!r}; did you mean {close[0]!r}? Else rename it, or "
+                    f"leave it out by --ignore {name!r}"
+                )
+            others.append(place)
+        elif known in places:
+            raise IndicatorError(
+                f"{path} has columns {header[places[known]]!r} and {name!r}, both {known}: say "
+                f"which it is by --column {known}=NAME, and leave the other out by --ignore NAME"
+            )
+        else:
+            places[known] = place
+    long = [column for column in _LONG if column in places]
+    if long and len(long) < len(_LONG):
+        lacking = next(column for column in _LONG if column not in places)
+        raise IndicatorError(f"{path} has no column {lacking!r}, as it has {long[0]!r}")
+    return places, tuple(others)
+
+
+def _word(name: str) -> str:
+    """Return a column's name in small letters, without unit: "Time [s]" is "time"."""
+    bare = re.sub(r"\s*[\[(].*?[\])]\s*", " ", name)
+    return re.sub(r"\W+", "_", bare.strip().lower()).strip("_")
+
+
+def _one_of(name: str, known: Iterable[str]) -> str:
+    names = [each for each in known if each]
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"should be one of {', '.join(names)}"

@@ -1,0 +1,163 @@
+"""A wrapper that lets robots of any PettingZoo parallel environment fail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from pettingzoo import ParallelEnv
+from pettingzoo.utils.wrappers import BaseParallelWrapper
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+
+from swarm_logistics_env import streams
+from swarm_logistics_env.errors import FaultError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.records import Record
+
+REMOVED = "removed"
+FAILURE_MODES = {
+    "silent": "its actions are replaced by the task's no-op",
+    "frozen": "repeats the last action from before its failure, or its first one",
+    "blind": "observes zeros",
+    "noisy": "observes with Gaussian noise added, of the task's standard deviation",
+    REMOVED: "is not there, from the start",
+}
+
+
+class RobotFault(Record):
+    """Some robots that fail in one way.
+
+    Args:
+        mode: a key of `FAILURE_MODES`.
+        robots: how many; which ones follows from the seed. The sets of one seed are nested.
+        onset: when they fail [s].
+        duration: for how long [s]; None: for good.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = FaultError
+
+    mode: str
+    robots: PositiveInt
+    onset: NonNegativeFloat = 0.0
+    duration: PositiveFloat | None = None
+
+    def active(self, time: float) -> bool:
+        """Return whether the robots fail at a time [s]."""
+        return self.onset <= time < self.onset + (self.duration or np.inf)
+
+
+def failing_rows(seed: int, n_robots: int, n_failing: int) -> tuple[int, ...]:
+    """Return which of `n_robots` robots fail; those of fewer failures are among them."""
+    order = streams.generator(seed, "failing robots").permutation(n_robots)
+    return tuple(sorted(int(row) for row in order[:n_failing]))
+
+
+class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]
+    """Lets robots fail: replaces their actions, or changes what they observe.
+
+    Args:
+        env: any parallel environment.
+        faults: of any mode but "removed": an environment can only start without a robot.
+        failures: for each mode what it needs: the no-op action of "silent", the standard deviation
+            of "noisy" in the observations' own units, None for the others.
+        period: length of a step [s].
+        rows: number of each agent in the whole swarm, by name; None: its place in
+            `possible_agents`.
+
+    Raises:
+        FaultError: a fault's mode is not among `failures`, or more robots fail than there are.
+        SetupError: "noisy" meets observations that are no floats.
+
+    Example:
+        >>> from pettingzoo.test.example_envs import generated_agents_parallel_v0
+        >>> faults = [RobotFault(mode="blind", robots=1)]
+        >>> env = FailingRobots(generated_agents_parallel_v0.env(), faults, {"blind": None})
+        >>> observations, infos = env.reset(seed=0)
+    """
+
+    def __init__(
+        self,
+        env: ParallelEnv[Any, Any, Any],
+        faults: Iterable[RobotFault],
+        failures: Mapping[str, Any],
+        period: float = 1.0,
+        rows: Mapping[str, int] | None = None,
+    ) -> None:
+        super().__init__(env)
+        self._faults = tuple(faults)
+        self._failures, self._period = failures, period
+        self._rows = rows or {agent: row for row, agent in enumerate(env.possible_agents)}
+        self._seed = -1
+        for fault in self._faults:
+            if fault.mode == REMOVED or fault.mode not in failures:
+                known = ", ".join(sorted(set(failures) - {REMOVED}))
+                raise FaultError(f"fault mode {fault.mode!r}: should be one of {known}")
+            if fault.robots > len(self._rows):
+                raise FaultError(f"{fault.robots} robots fail of {len(self._rows)}")
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode; the seed also decides which robots fail. None: the next seed."""
+        self._seed = self._seed + 1 if seed is None else seed
+        self._steps = 0
+        self._last: dict[str, Any] = {}
+        self._noise: dict[str, np.random.Generator] = {}
+        size = max(self._rows.values()) + 1
+        self._failing = [
+            (fault, set(failing_rows(self._seed, size, fault.robots))) for fault in self._faults
+        ]
+        observations, infos = self.env.reset(seed=seed, options=options)
+        return self._observed(observations), infos
+
+    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+        """Step with the actions that failing robots execute; observations as they sense them."""
+        executed = {agent: self._executed(agent, action) for agent, action in actions.items()}
+        observations, *others = self.env.step(executed)
+        self._steps += 1
+        return self._observed(observations), *others
+
+    def _modes(self, agent: str) -> set[str]:
+        time, row = self._steps * self._period, self._rows[agent]
+        return {fault.mode for fault, rows in self._failing if row in rows and fault.active(time)}
+
+    def _executed(self, agent: str, action: Any) -> Any:
+        modes = self._modes(agent)
+        if "silent" in modes:
+            action = self._failures["silent"]
+        elif "frozen" in modes:
+            action = self._last.get(agent, action)
+        self._last[agent] = action
+        return action
+
+    def _observed(self, observations: dict[str, Any]) -> dict[str, Any]:
+        return {agent: self._sensed(agent, value) for agent, value in observations.items()}
+
+    def _sensed(self, agent: str, value: Any) -> Any:
+        modes = self._modes(agent)
+        if "blind" in modes:
+            return _each(value, lambda part: np.zeros_like(part)[()])
+        if "noisy" in modes:
+            if agent not in self._noise:
+                self._noise[agent] = streams.generator(self._seed, "noisy robot", self._rows[agent])
+            return _each(value, lambda part: self._with_noise(agent, part))
+        return value
+
+    def _with_noise(self, agent: str, part: Any) -> Any:
+        clean = np.asarray(part)
+        if not np.issubdtype(clean.dtype, np.floating):
+            raise SetupError(
+                f"noisy: {agent} observes {clean.dtype}: should be floats; leave 'noisy' out of "
+                "the task's failures"
+            )
+        noise = self._noise[agent].normal(0.0, self._failures["noisy"], clean.shape)
+        return (clean + noise).astype(clean.dtype)
+
+
+def _each(value: Any, change: Any) -> Any:
+    """Return an observation with each array or number in it changed."""
+    if isinstance(value, dict):
+        return {name: _each(part, change) for name, part in value.items()}
+    if isinstance(value, tuple):
+        return tuple(_each(part, change) for part in value)
+    return change(value)

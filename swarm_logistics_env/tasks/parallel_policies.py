@@ -1,0 +1,111 @@
+"""What a policy of a parallel environment is given and gives, and the policies for any of them."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from swarm_logistics_env import streams
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.policies.sb3_policy import read_model
+
+Env: TypeAlias = ParallelEnv[Any, Any, Any]
+
+
+class RandomActions:
+    """Draws each robot's action from its action space; robots do not share a stream."""
+
+    def configure(self, env: Env, agents: Sequence[str | None]) -> None:
+        """Learn the action spaces; `agents` has a name for each row, None where none is there."""
+        self._spaces = [
+            None if agent is None else copy.deepcopy(env.action_space(agent)) for agent in agents
+        ]
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode of `n_robots` rows."""
+        for row, space in enumerate(self._spaces):
+            if space is not None:
+                space.seed(streams.key(seed, "random action", row) & 0x7FFFFFFF)
+
+    def act(self, observations: NDArray[np.float32]) -> list[Any]:
+        """Return an action for each row."""
+        return [None if space is None else space.sample() for space in self._spaces]
+
+
+class StableBaselinesModel:
+    """A PPO model that stable-baselines3 saved; it gives its most likely action each time.
+
+    It decides for one robot at a time, from the robot's observation row.
+
+    Args:
+        path: of the .zip file. Reading it executes the code in it.
+
+    Raises:
+        PolicyError: it cannot be read, or stable-baselines3 is missing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+        except OSError as error:
+            raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
+        self._model = read_model(path)
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode; nothing here is random."""
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[Any]:
+        """Return an action for each row of observations (N, D)."""
+        actions, _ = self._model.predict(observations, deterministic=True)
+        return np.asarray(actions)
+
+
+def observation_rows(
+    env: Env, agents: Sequence[str | None], observations: Mapping[str, Any]
+) -> NDArray[np.float32]:
+    """Return observations as rows (N, D), flattened; those of absent robots are zero.
+
+    D is the longest of them, shorter ones end in zeros.
+    """
+    flat = {
+        agent: np.asarray(spaces.flatten(env.observation_space(agent), value), dtype=np.float32)
+        for agent, value in observations.items()
+    }
+    width = max((len(row) for row in flat.values()), default=0)
+    rows = np.zeros((len(agents), width), dtype=np.float32)
+    for row, agent in enumerate(agents):
+        if agent is not None and agent in flat:
+            rows[row, : len(flat[agent])] = flat[agent]
+    return rows
+
+
+def agent_actions(env: Env, agents: Sequence[str | None], actions: Any) -> dict[str, Any]:
+    """Return the rows of actions by agent, each of its action space's type.
+
+    Raises:
+        PolicyError: an action is missing or lies outside its space.
+    """
+    if len(actions) != len(agents):
+        raise PolicyError(f"{len(actions)} actions for {len(agents)} robots")
+    present = set(env.agents)
+    found: dict[str, Any] = {}
+    for row, agent in enumerate(agents):
+        if agent is None or agent not in present:
+            continue
+        space, action = env.action_space(agent), actions[row]
+        if isinstance(space, spaces.Discrete):
+            action = int(action)
+        elif isinstance(space, spaces.Box | spaces.MultiDiscrete | spaces.MultiBinary):
+            action = np.asarray(action, dtype=space.dtype)
+        if not space.contains(action):
+            raise PolicyError(f"action {action!r} of robot {row}: should be in {space}")
+        found[agent] = action
+    return found

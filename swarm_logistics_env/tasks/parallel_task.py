@@ -1,0 +1,361 @@
+"""Any PettingZoo parallel environment as a task."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Container, Iterator, Mapping
+from dataclasses import replace
+from importlib.metadata import packages_distributions, version
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.spaces import flatten
+from pettingzoo.utils.wrappers import BaseParallelWrapper
+from pydantic import ConfigDict, PositiveFloat, PositiveInt
+
+from swarm_logistics_env.errors import FaultError, StudyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.policies.code_identity import function_digest, without_prose
+from swarm_logistics_env.records import Record
+from swarm_logistics_env.tasks.failing_robots import (
+    FAILURE_MODES,
+    REMOVED,
+    FailingRobots,
+    RobotFault,
+    failing_rows,
+)
+from swarm_logistics_env.tasks.parallel_policies import (
+    Env,
+    RandomActions,
+    agent_actions,
+    observation_rows,
+)
+from swarm_logistics_env.tasks.performance import (
+    Gain,
+    SumOfRewards,
+    in_words,
+    name_of,
+    performance_of,
+)
+from swarm_logistics_env.tasks.policy_choice import policy_of
+from swarm_logistics_env.tasks.task import Outcome, Playable
+
+# The files of the package that decide what a run in a parallel environment gives.
+SOURCES = (
+    "streams.py",
+    "tasks/failing_robots.py",
+    "tasks/parallel_policies.py",
+    "tasks/parallel_task.py",
+    "tasks/performance.py",
+)
+NEEDS = {
+    "silent": "the action that counts as none",
+    "noisy": "a standard deviation above 0, in the observations' own units",
+    REMOVED: "the name of the factory's argument that takes the numbers of the robots to leave out",
+}
+
+
+_REWARDS = SumOfRewards()
+
+
+class ParallelScenario(Record):
+    """What is held fixed during a run: swarm size, duration [s] and the task's parameters."""
+
+    model_config = ConfigDict(extra="allow")
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+    n_robots: PositiveInt
+    duration: PositiveFloat
+
+    def conditions(self) -> Iterator[tuple[str, str, str]]:
+        """Yield name, value, and unit or meaning of each."""
+        units = {"n_robots": "robots", "duration": "s"}
+        for name, value in self.model_dump().items():
+            yield name, str(value), units.get(name, "argument of the environment")
+
+
+class ParallelTask:
+    """Episodes of a PettingZoo parallel environment; see `Task` for its further attributes.
+
+    Args:
+        make_env: makes the environment, called as `make_env(**{size: N}, **parameters)`. What is
+            random in an episode has to follow from the seed of its `reset`.
+        name: part of a condition's identity.
+        n_robots: the default swarm size.
+        steps: a run ends after so many steps, or when no agent is left.
+        size: name of the argument for the swarm size.
+        parameters: further arguments with their defaults; studies vary the numbers among them.
+        performance: what a step adds to P: `SumOfRewards`, `SumOfInfos`, or a function of the
+            environment, the rewards and the infos, whose docstring says what P is.
+        references: two scores, that which counts as P = 0 and that which counts as P = 1; None: the
+            score itself is P.
+        failures: the failure modes that studies may ask for, each with what it needs: the no-op
+            action of "silent", the standard deviation of "noisy", for "removed" the name of the
+            argument that takes the rows of the robots to leave out; None for "frozen" and "blind".
+        period: length of a step [s].
+        policies: what makes the task's own policies, by name; "random" is always one.
+
+    A policy has `reset(n_robots, seed)` and `act(observations) -> actions`: observations (N, D) are
+    flattened, actions are rows too. One with `configure(env, agents)` is told before `reset` which
+    agent each row is, None where a robot was removed.
+
+    Raises:
+        StudyError: an argument cannot be.
+
+    Example:
+        >>> from pettingzoo.test.example_envs import generated_agents_parallel_v0
+        >>> task = ParallelTask(
+        ...     lambda n_robots: generated_agents_parallel_v0.env(),
+        ...     name="generated", n_robots=4, steps=20, failures={"frozen": None},
+        ... )
+        >>> task.failure_modes
+        {'frozen': 'repeats the last action from before its failure, or its first one'}
+    """
+
+    def __init__(
+        self,
+        make_env: Callable[..., Env],
+        *,
+        name: str,
+        n_robots: int,
+        steps: int,
+        size: str = "n_robots",
+        parameters: Mapping[str, Any] = MappingProxyType({}),
+        performance: Gain = _REWARDS,
+        references: tuple[float, float] | None = None,
+        failures: Mapping[str, Any] = MappingProxyType({}),
+        period: float = 1.0,
+        policies: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+    ) -> None:
+        self.name, self._make_env, self._size = name, make_env, size
+        self._parameters, self._failures = dict(parameters), dict(failures)
+        self._gain, self._references, self._period = performance, references, period
+        self.policies: dict[str, Callable[..., Any]] = {"random": RandomActions, **policies}
+        self._refuse()
+        self.removed = REMOVED if REMOVED in failures else None
+        self.performance = in_words(performance, references)
+        self.failure_modes = {mode: FAILURE_MODES[mode] for mode in failures}
+        self.fields = {
+            "duration": "time at which a run ends at the latest [s]",
+            **{name: "argument of the environment" for name in parameters if self._numeric(name)},
+        }
+        self.default = ParallelScenario(
+            n_robots=n_robots, duration=steps * period, **self._parameters
+        )
+
+    def code(self) -> str:
+        """Return a digest of what decides a run: settings, code, and the libraries' versions.
+
+        The code is the modules of the factory, of the performance and of their own package as far
+        as they import it; the libraries are those that the environment's classes come from.
+        """
+        return _code(self, repr([name_of(self._make_env), *self._settings]))
+
+    def size(self, scenario: ParallelScenario) -> int:
+        """Return the number N of robots."""
+        return scenario.n_robots
+
+    def duration(self, scenario: ParallelScenario) -> float:
+        """Return the time at which a run ends at the latest [s]."""
+        return scenario.duration
+
+    def vary(self, base: ParallelScenario, fields: Mapping[str, Any]) -> ParallelScenario:
+        """Return a scenario with some fields changed.
+
+        Raises:
+            StudyError: a field is unknown or cannot be.
+        """
+        given = base.model_dump()
+        for name, value in fields.items():
+            if name not in given:
+                raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, given)}")
+            if self._numeric(name) and isinstance(self._parameters[name], int):
+                if value != int(value):
+                    raise StudyError(
+                        f"task {self.name}: {name} = {value}: should be a whole number"
+                    )
+                value = int(value)
+            given[name] = value
+        return ParallelScenario(**given)
+
+    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> RobotFault:
+        """Return the fault of some robots from `onset` on, for `duration` [s] or for good.
+
+        Raises:
+            FaultError: the task has no such failure mode, or robots are to be removed in mid-run.
+        """
+        if mode not in self._failures:
+            raise FaultError(
+                f"task {self.name}: no failure mode {mode!r}{suggest(mode, self._failures)}"
+            )
+        if mode == REMOVED and (onset or duration is not None):
+            raise FaultError(
+                f"task {self.name}: robots are removed from the start, not from {onset:g} s on, so "
+                'FT is not defined here: should be asked for R alone, indicators = ["R"]'
+            )
+        return RobotFault(mode=mode, robots=robots, onset=onset, duration=duration)
+
+    def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
+        """Play one run; see `Task.play`."""
+        scenario, faults = condition.scenario, condition.faults
+        n_robots = scenario.n_robots
+        absent = {
+            row
+            for fault in faults
+            if fault.mode == REMOVED
+            for row in failing_rows(seed, n_robots, fault.robots)
+        }
+        player: Any = policy_of(policy, self.policies)
+        env = self._made(scenario, tuple(sorted(absent)))
+        try:
+            agents = _agents_by_row(env, n_robots, absent)
+            recorded = _Recorded(env)
+            failing = FailingRobots(
+                recorded,
+                [fault for fault in faults if fault.mode != REMOVED],
+                self._failures,
+                self._period,
+                {agent: row for row, agent in enumerate(agents) if agent is not None},
+            )
+            if hasattr(player, "configure"):
+                player.configure(env, agents)
+            player.reset(n_robots, policy_seed)
+            observations, _ = failing.reset(seed=seed)
+            gains: list[float] = []
+            for _ in range(max(1, round(scenario.duration / self._period))):
+                if not env.agents:
+                    break
+                actions = player.act(observation_rows(env, agents, observations))
+                observations, rewards, _, _, infos = failing.step(
+                    agent_actions(env, agents, actions)
+                )
+                gains.append(float(self._gain(env, rewards, infos)))
+        finally:
+            env.close()
+        return self._outcome(gains, recorded.digest(), _failed(seed, n_robots, faults))
+
+    def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
+        total = performance_of(gains, self._references)
+        result = Outcome(
+            "",
+            ended_at=len(gains) * self._period,
+            failed_robots=failed,
+            anchoring_seconds=None,
+            digest=digest,
+        )
+        if self._references is not None or any(not gain.is_integer() for gain in gains):
+            return replace(result, untimed=total)
+        # Whole numbers are events, each at the end of its step.
+        times = np.arange(1, len(gains) + 1) * self._period
+        return replace(result, delivery_times=np.repeat(times, np.array(gains, dtype=np.int64)))
+
+    def _made(self, scenario: ParallelScenario, absent: tuple[int, ...]) -> Env:
+        arguments = scenario.model_dump()
+        del arguments["duration"]
+        arguments[self._size] = arguments.pop("n_robots")
+        if absent:
+            arguments[self._failures[REMOVED]] = absent
+        return self._make_env(**arguments)
+
+    def _numeric(self, name: str) -> bool:
+        value = self._parameters.get(name)
+        return isinstance(value, int | float) and not isinstance(value, bool)
+
+    @property
+    def _settings(self) -> tuple[object, ...]:
+        return (
+            self._size, name_of(self._gain), self._references, self._failures, self._period,
+            self.default,
+        )  # fmt: skip
+
+    def _refuse(self) -> None:
+        needed: dict[str, Callable[[Any], bool]] = {
+            "silent": lambda value: value is not None,
+            "noisy": lambda value: isinstance(value, int | float) and value > 0,
+            REMOVED: lambda value: isinstance(value, str),
+        }
+        for mode, value in self._failures.items():
+            if mode not in FAILURE_MODES:
+                raise StudyError(f"failures: no mode {mode!r}{suggest(mode, FAILURE_MODES)}")
+            if mode in needed and not needed[mode](value):
+                raise StudyError(f"failures[{mode!r}] = {value!r}: should be {NEEDS[mode]}")
+        if self._references is not None and self._references[0] == self._references[1]:
+            raise StudyError(f"references = {self._references}: should be two different scores")
+        if not self._period > 0:
+            raise StudyError(f"period = {self._period}: should be above 0 s")
+
+
+class _Recorded(BaseParallelWrapper):  # type: ignore[misc]
+    """Digests what the environment itself gives, before any failure changes it."""
+
+    def __init__(self, env: Env) -> None:
+        super().__init__(env)
+        self._hash = hashlib.blake2b(digest_size=16)
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        observations, infos = self.env.reset(seed=seed, options=options)
+        self._add(observations, {})
+        return observations, infos
+
+    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+        observations, rewards, *others = self.env.step(actions)
+        self._add(observations, rewards)
+        return observations, rewards, *others
+
+    def digest(self) -> str:
+        """Return 32 hexadecimal digits that equal runs share."""
+        return self._hash.hexdigest()
+
+    def _add(self, observations: dict[str, Any], rewards: dict[str, Any]) -> None:
+        for agent in sorted(observations):
+            space = self.env.observation_space(agent)
+            self._hash.update(np.asarray(flatten(space, observations[agent])).tobytes())
+        self._hash.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
+
+
+def _agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str | None]:
+    present = [row for row in range(n_robots) if row not in absent]
+    names = list(env.possible_agents)
+    if len(names) != len(present):
+        raise StudyError(
+            f"the environment of {len(present)} robots has {len(names)} agents: should have as "
+            "many, see the task's `size`"
+        )
+    agents: list[str | None] = [None] * n_robots
+    for row, name in zip(present, names):
+        agents[row] = name
+    return agents
+
+
+def _failed(seed: int, n_robots: int, faults: tuple[RobotFault, ...]) -> tuple[int, ...]:
+    most = max((fault.robots for fault in faults), default=0)
+    return failing_rows(seed, n_robots, most)
+
+
+_codes: dict[str, str] = {}
+
+
+def _code(task: ParallelTask, settings: str) -> str:
+    """Return the digest of a task, made once in a process: an environment is made for it."""
+    if settings not in _codes:
+        package = Path(__file__).parents[1]
+        digest = hashlib.sha256(settings.encode())
+        for name in SOURCES:
+            digest.update(without_prose((package / name).read_text(encoding="utf-8")).encode())
+        for function in (task._make_env, task._gain):
+            digest.update(function_digest(function).encode())
+        env = task._made(task.default, ())
+        try:
+            tops = {kind.__module__.partition(".")[0] for kind in type(env.unwrapped).__mro__}
+            tops -= {package.name}  # its own code is known by its sources
+        finally:
+            env.close()
+        installed = packages_distributions()
+        names = {name for top in tops for name in installed.get(top, ())}
+        versions = [f"{name} {version(name)}" for name in sorted(names)]
+        digest.update("; ".join(versions).encode())
+        _codes[settings] = f"{digest.hexdigest()[:16]} ({', '.join(versions)})"
+    return _codes[settings]

@@ -1,0 +1,141 @@
+"""Recorded trials as a task: conditions that were met elsewhere, and cannot be played again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal
+
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.records import Record
+from swarm_logistics_env.tasks.task import Outcome, Playable
+
+
+class RecordedScenario(Record):
+    """What a file says of the conditions of a trial.
+
+    Args:
+        n_robots: swarm size N; 0: the file does not say.
+        duration: of a trial [s]; 0: the file does not say.
+        table: which of the file's own tables it stands in, where each has runs of its own.
+        parameters: name and value of whatever else varies.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+    n_robots: int = 0
+    duration: float = 0.0
+    table: str = ""
+    parameters: tuple[tuple[str, float], ...] = ()
+
+    def conditions(self) -> list[tuple[str, str, str]]:
+        """Return name, value and unit of every condition."""
+        return [(name, f"{value:g}", "") for name, value in self.parameters]
+
+
+class RecordedFault(Record):
+    """A failure mode of any name, in so many robots from `onset` [s] on."""
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+    mode: str
+    robots: int
+    onset: float = 0.0
+
+
+class RecordedCell(Record):
+    """One condition of a table.
+
+    Args:
+        kind, name, value, onset: of the study's setting.
+        scenario, fault: what the file says of it; fault None: there is none.
+        repeated: whether these are the trials without fault of a second set.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+    kind: Literal["size", "fault", "parameter"]
+    name: str
+    value: float
+    onset: float = 0.0
+    scenario: RecordedScenario
+    fault: RecordedFault | None = None
+    repeated: bool = False
+
+
+class RecordedTable(Record):
+    """Conditions that are compared with each other, the original one first.
+
+    Args:
+        policy: what controlled the robots; title: heading in the report.
+        cells: the conditions.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+    policy: str
+    title: str
+    cells: tuple[RecordedCell, ...]
+
+
+class Origin(Record):
+    """Where recorded trials came from, and what is compared in them.
+
+    Args:
+        file: its name; digest: of its content; paired: whether its rows name their seeds.
+        seeds: those that they name; empty: none.
+        setup: what the user states about the trials, name and value.
+        tables: what is compared.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+
+    file: str
+    digest: str
+    paired: bool
+    seeds: tuple[int, ...] = ()
+    setup: tuple[tuple[str, str], ...] = ()
+    tables: tuple[RecordedTable, ...] = ()
+
+
+class RecordedTrials:
+    """Trials of real robots, another simulator or a paper; see `Task` for the attributes."""
+
+    name = "recorded trials"
+    removed: str | None = "removed"
+    performance = "what the file holds for each trial"
+    default = RecordedScenario()
+    policies: Mapping[str, Callable[..., Any]] = MappingProxyType({})
+    fields: Mapping[str, str] = MappingProxyType({})
+    failure_modes: Mapping[str, str] = MappingProxyType({})
+
+    def code(self) -> str:
+        """Return a word in place of a code version: none made these runs."""
+        return "imported"
+
+    def size(self, scenario: RecordedScenario) -> int:
+        """Return the number N of robots."""
+        return scenario.n_robots
+
+    def duration(self, scenario: RecordedScenario) -> float:
+        """Return how long a trial lasted [s]."""
+        return scenario.duration
+
+    def vary(self, base: RecordedScenario, fields: Mapping[str, Any]) -> RecordedScenario:
+        """Return `base` with some fields changed."""
+        return base.replace(**fields)
+
+    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> RecordedFault:
+        """Return the fault; how long it lasted is not recorded."""
+        return RecordedFault(mode=mode, robots=robots, onset=onset)
+
+    def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
+        """Raise: what was recorded cannot be played again.
+
+        Raises:
+            StudyError: always.
+        """
+        raise StudyError("recorded trials cannot be played again: give a file with more of them")
+
+
+RECORDED = RecordedTrials()

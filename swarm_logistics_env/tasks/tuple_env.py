@@ -1,0 +1,96 @@
+"""Gymnasium environments of many agents, whose spaces are tuples, as PettingZoo environments."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium
+from pettingzoo import ParallelEnv
+
+from swarm_logistics_env.errors import SetupError
+
+
+class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
+    """The parallel form of a Gymnasium environment with a tuple entry for each agent.
+
+    All agents are there from the first step to the last. A reward that is one number is given to
+    each of them; so is an info that is not told by agent.
+
+    Args:
+        env: e.g. of RWARE, or of VMAS with `terminated_truncated=True`.
+
+    Raises:
+        SetupError: its spaces are no tuples.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"name": "tuple_env", "is_parallelizable": True}
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        parts: list[tuple[Any, ...]] = []
+        for space in (env.observation_space, env.action_space):
+            if not isinstance(space, gymnasium.spaces.Tuple):
+                raise SetupError(f"{env}: space {space} should be a Tuple, one part an agent")
+            parts.append(space.spaces)
+        self.env = env
+        self.render_mode = env.render_mode
+        self.possible_agents = [f"agent_{number}" for number in range(len(parts[0]))]
+        self.observation_spaces, self.action_spaces = (
+            dict(zip(self.possible_agents, part)) for part in parts
+        )
+        self.agents: list[str] = []
+
+    @property
+    def unwrapped(self) -> Any:
+        """The environment below all wrappers."""
+        return self.env.unwrapped
+
+    def observation_space(self, agent: str) -> Any:
+        """Return the space of an agent's observations."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        """Return the space of an agent's actions."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Begin an episode."""
+        observations, info = self.env.reset(seed=seed, options=options)
+        self.agents = self.possible_agents[:]
+        return dict(zip(self.agents, observations)), self._infos(info)
+
+    def step(
+        self, actions: dict[str, Any]
+    ) -> tuple[
+        dict[str, Any],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """Step all agents."""
+        agents = self.agents
+        rewards: Any
+        observations, rewards, terminated, truncated, info = self.env.step(
+            tuple(actions[agent] for agent in agents)
+        )
+        each = [rewards] * len(agents) if isinstance(rewards, int | float) else rewards
+        infos = self._infos(info)
+        if terminated or truncated:
+            self.agents = []
+        return (
+            dict(zip(agents, observations)),
+            {agent: float(reward) for agent, reward in zip(agents, each)},
+            {agent: bool(terminated) for agent in agents},
+            {agent: bool(truncated) for agent in agents},
+            infos,
+        )
+
+    def _infos(self, info: dict[str, Any]) -> dict[str, Any]:
+        by_agent = set(info) == set(self.agents)
+        return {agent: info[agent] if by_agent else info for agent in self.agents}
+
+    def close(self) -> None:
+        """Close it."""
+        self.env.close()

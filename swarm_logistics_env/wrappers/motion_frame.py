@@ -1,0 +1,96 @@
+"""Observations and commands in the frame of each robot's motion, for learners of any library."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env import motion
+from swarm_logistics_env.environment.commands import as_array
+from swarm_logistics_env.environment.dict_view import ArrayStep
+from swarm_logistics_env.errors import CommandError
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
+from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+
+
+class MotionFrame(Wrapper):
+    """Gives each robot a memory of its own, and turns what it reads and commands into its motion.
+
+    Observations become rows of `motion.INPUTS` (84 numbers, most within -1 and 1): walls,
+    neighbours, items and the lowest timer, relative to the direction in which the robot drives,
+    and what it remembers, such as the way to the delivery area. Actions become rows of
+    `motion.OUTPUTS`: along and aside, fractions of the top speed, and the gripper, all within -1
+    and 1. The frame never turns the body, so this is for the holonomic drive. It is what
+    `swarm-logistics train` learns on; rows of absent robots are zeros.
+
+    Args:
+        env: the environment, or a wrapper of one.
+        listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
+
+    Raises:
+        SetupError: it is something else.
+
+    Example:
+        >>> from swarm_logistics_env import swarm_logistics_v0
+        >>> env = MotionFrame(swarm_logistics_v0.parallel_env(n_robots=3))
+        >>> observations, infos = env.reset(seed=0)
+        >>> observations["robot_0"].shape, env.action_space("robot_0").shape
+        ((84,), (3,))
+    """
+
+    def __init__(self, env: SwarmLogisticsEnv | Wrapper, listens: bool = True) -> None:
+        super().__init__(env)
+        self._listens = listens
+        self._read_space = Box(-np.inf, np.inf, (len(INPUTS),), np.float32)
+        self._output_space = Box(-1.0, 1.0, (len(OUTPUTS),), np.float32)
+
+    def observation_space(self, agent: str) -> Box:
+        """Return the space of a row of inputs (84,), the same for every agent."""
+        return self._read_space
+
+    def action_space(self, agent: str) -> Box:
+        """Return the space of along, aside and gripper (3,), the same for every agent."""
+        return self._output_space
+
+    def reset_arrays(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> NDArray[np.float32]:
+        """Begin an episode and return the first inputs (N, 84)."""
+        observations = super().reset_arrays(seed, options)
+        return self._read(observations)
+
+    def begun(self, seed: int) -> None:
+        """Begin an episode of empty memories and random headings."""
+        self._frame = motion.MotionFrame(self.warehouse.scenario, self._listens)
+        self._frame.begin(row_keys(seed, "motion frame", self.warehouse.state.n_robots))
+
+    def step_arrays(self, outputs: ArrayLike) -> ArrayStep:
+        """Take one control period with outputs (N, 3); see `SwarmLogisticsEnv.step_arrays`.
+
+        Raises:
+            CommandError: wrong shape, not readable or not finite; nothing has happened then.
+        """
+        given = as_array(outputs, "outputs")
+        wanted = (self.warehouse.state.n_robots, len(OUTPUTS))
+        if given.shape != wanted or not np.isfinite(given).all():
+            raise CommandError(
+                f"outputs of shape {given.shape}: should be {wanted} finite numbers, "
+                f"{', '.join(OUTPUTS)}"
+            )
+        observations, *rest = self.env.step_arrays(self._frame.command(given))
+        return (self._read(observations), *rest)
+
+    def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        inputs = self._frame.read(observations)
+        inputs[~self.warehouse.state.robot_present] = 0.0
+        return inputs

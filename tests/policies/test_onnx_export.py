@@ -1,0 +1,122 @@
+"""Trained policies as ONNX files."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame, memory
+from swarm_logistics_env.policies import PolicyCard
+from swarm_logistics_env.policies.files import CARD
+from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
+from swarm_logistics_env.policies.onnx_export import write_onnx
+from swarm_logistics_env.streams import row_keys
+
+PAGE = Path(__file__).parents[2] / "docs" / "onnx.md"
+TRAINED = [name for name in policies.NAMES if name.startswith("ppo-")]
+
+
+def session_of(policy: Any, path: Path) -> Any:
+    onnxruntime = pytest.importorskip("onnxruntime")
+    write_onnx(policy, path)
+    return onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+
+
+def test_without_the_package_it_says_what_to_install(tmp_path: Path) -> None:
+    script = (
+        "import sys; sys.modules['onnx'] = None\n"
+        "from swarm_logistics_env import policies\n"
+        "from swarm_logistics_env.errors import PolicyError\n"
+        "try: policies.write_onnx(policies.load('ppo-delivery'), 'p.onnx')\n"
+        "except PolicyError as error: print(error)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert "pip install 'swarm-logistics-env[onnx]'" in done.stdout
+
+
+def test_scripts_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(PolicyError, match="policy = SwarmDT: should be a trained one"):
+        write_onnx(policies.load("swarm-dt"), tmp_path / "p.onnx")
+
+
+@pytest.mark.parametrize("name", TRAINED)
+def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path: Path) -> None:
+    policy: Any = policies.load(name)
+    session = session_of(policy, tmp_path / "p.onnx")
+    scenario = Scenario(n_robots=25, duration=100.0)
+    world = Warehouse(scenario)
+    rows = world.reset(3, [Fault("FM1", 2), Fault("motor_dead", 2, onset=50.0)])
+    policy.configure(scenario)
+    policy.reset(25, 3)
+    # Beside the policy, a frame of its own: with the same rows it has the same memories.
+    frame = MotionFrame(scenario, policy.card.network.listens)
+    frame.begin(row_keys(3, STREAM, 25))
+    furthest, n_rows = 0.0, 0
+    while not (world.is_over_time or world.all_delivered):
+        inputs = frame.read(rows)
+        ours = policy._network(inputs)
+        [theirs] = session.run(None, {"inputs": inputs})
+        assert theirs.shape == (25, len(OUTPUTS))
+        furthest = max(furthest, float(np.abs(theirs - ours).max()))
+        n_rows += len(rows)
+        commands = policy.act(rows)
+        np.testing.assert_array_equal(frame.command(ours), commands)
+        rows = world.step(commands)
+    assert n_rows == 25_000
+    assert furthest < 1e-5
+    assert world.state.delivered > 5
+
+
+def test_other_networks_agree_too(
+    card: PolicyCard, tensors: dict[str, NDArray[np.float32]], tmp_path: Path
+) -> None:
+    inputs = np.random.default_rng(0).normal(size=(50, len(INPUTS))).astype(np.float32)
+    for activation in ("tanh", "relu"):
+        network = card.network.replace(activation=activation)
+        policy = LearnedPolicy(card.replace(network=network), tensors)
+        session = session_of(policy, tmp_path / "p.onnx")
+        [theirs] = session.run(None, {"inputs": inputs})
+        np.testing.assert_allclose(theirs, policy._network(inputs), atol=1e-5)
+
+
+def test_one_that_does_not_listen_ignores_timers(tmp_path: Path) -> None:
+    session = session_of(policies.load("ppo-robust"), tmp_path / "p.onnx")
+    rng = np.random.default_rng(0)
+    inputs = rng.normal(size=(5, len(INPUTS))).astype(np.float32)
+    told = inputs.copy()
+    lead = [place for place, name in enumerate(INPUTS) if name.startswith("lead_")]
+    told[:, lead] = rng.normal(size=(5, len(lead)))
+    np.testing.assert_array_equal(*(session.run(None, {"inputs": x})[0] for x in (inputs, told)))
+
+
+def test_the_card_travels_along(tmp_path: Path) -> None:
+    policy: Any = policies.load("ppo-delivery")
+    said = session_of(policy, tmp_path / "p.onnx").get_modelmeta().custom_metadata_map
+    assert PolicyCard.from_json(said[CARD]) == policy.card
+
+
+def test_the_page_tells_the_numbers_of_the_code() -> None:
+    text = " ".join(PAGE.read_text(encoding="utf-8").split())
+    for number in (
+        f"{memory.FAILURE_TIME:g} s",
+        f"exp(-period / {memory.HOME_TIME:g} s)",
+        f"{memory.STUCK_TIME:g} s",
+        f"{memory.CAGED_TIME:g} s",
+        f"{memory.CLEARING_TIME:g} s",
+        f"{memory.SURELY_IN_REACH:g} m",
+        f"{memory.STANDS:g} m/s",
+        f"{memory.MOVES:g} m/s",
+        f"{len(INPUTS)} inputs",
+        f"{memory.N_COLUMNS} numbers",
+    ):
+        assert number in text, number

@@ -1,0 +1,161 @@
+"""Reading trials as people type them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from swarm_logistics_env import spi
+
+# As typed in a German lab: semicolons, decimal commas, a unit, a fault of its own, no seeds.
+GERMAN = """Versuch;Roboter;Fehler;Defekt;Geliefert;Breite [m];Notiz
+1;8;keine;;12,5;2;
+2;8;keine;;11,25;2;
+3;8;keine;;13;2;Akku schwach
+4;8;Radbruch;1;10,5;2;
+5;8;Radbruch;1;9,75;2;
+6;8;Radbruch;1;11,5;2;
+7;8;entfernt;1;10,0;2;
+8;8;entfernt;1;11,0;2;
+9;8;entfernt;1;10,25;2;
+10;8;keine;;9,5;1,5;
+11;8;keine;;10,5;1,5;
+12;8;keine;;10,75;1,5;
+13;4;keine;;6,5;2;
+14;4;keine;;7,5;2;
+15;4;keine;;6,25;2;
+"""
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "trials.csv"
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    return path
+
+
+def test_a_file_typed_in_a_german_lab_is_read(tmp_path: Path) -> None:
+    trials = spi.read_trials(written(tmp_path, GERMAN), ignore=["Notiz"])
+    assert not trials.paired
+    assert len(trials.rows) == 15
+    whole = {"n_robots": 8, "Breite [m]": 2.0}
+    assert trials.performance(fault="none", **whole).tolist() == [12.5, 11.25, 13.0]
+    assert trials.performance(fault="Radbruch", faulty=1).tolist() == [10.5, 9.75, 11.5]
+    assert trials.performance(fault="removed").tolist() == [10.0, 11.0, 10.25]
+    assert trials.performance(**{"Breite [m]": 1.5}).tolist() == [9.5, 10.5, 10.75]
+    with pytest.raises(spi.IndicatorError, match="no trial with fault = 'Radbruck'"):
+        trials.performance(fault="Radbruck")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "trial,robots,fault,faulty,delivered\n1,8,,,10.5\n2,8,stuck wheel,2,7\n",
+        "n_robots\tfailure mode\tfaulty robots\tP\n8\tnone\t0\t10.5\n8\tstuck wheel\t2\t7\n",
+        "\ufeffRobots;Fault;Faulty;Items [box]\r\n8;ok;0;10,5\r\n8;stuck wheel;2;7\r\n",
+        'N,mode,m,p\n8,ok,0,"10,5"\n\n8,stuck wheel,2,7\n,,,\n',
+    ],
+)
+def test_spellings_of_one_file_read_alike(tmp_path: Path, text: str) -> None:
+    trials = spi.read_trials(written(tmp_path, text))
+    found = [(row.n_robots, row.fault, row.faulty, row.performance) for row in trials.rows]
+    assert found == [(8, "none", 0, 10.5), (8, "stuck wheel", 2, 7.0)]
+
+
+def test_columns_of_other_names_are_mapped(tmp_path: Path) -> None:
+    text = "swarm,boxes,weather\n4,5,sun\n8,9,rain\n"
+    path = written(tmp_path, text)
+    columns = {"performance": "boxes", "n_robots": "swarm"}
+    trials = spi.read_trials(path, columns=columns, ignore=["weather"])
+    assert [(row.n_robots, row.performance) for row in trials.rows] == [(4, 5.0), (8, 9.0)]
+
+
+def test_seeds_pair_whatever_the_order(tmp_path: Path) -> None:
+    trials = spi.read_trials(written(tmp_path, "robots,seed,p\n4,7,1\n4,3,2\n8,3,30\n8,7,10\n"))
+    assert trials.paired
+    assert trials.performance(n_robots=4).tolist() == [2, 1]
+    assert trials.performance(n_robots=8).tolist() == [30, 10]
+
+
+def test_an_event_log_counts_deliveries_and_keeps_their_times(tmp_path: Path) -> None:
+    text = (
+        "trial,robots,fault,faulty,onset,time [s]\n"
+        "1,4,none,0,,30.5\n1,4,none,0,,12.25\n2,4,none,0,,\n3,4,jam,1,20,50\n"
+    )
+    trials = spi.read_trials(written(tmp_path, text), duration=60.0)
+    assert [row.times for row in trials.rows] == [(12.25, 30.5), (), (50.0,)]
+    assert [row.performance for row in trials.rows] == [2.0, 0.0, 1.0]
+    assert trials.rows[2].onset == 20.0
+
+
+HEAD = "trial,robots,fault,faulty,delivered\n"
+GOOD = "1,8,none,,10\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty: should have a row of column names"),
+        (HEAD, "holds no trial"),
+        ("\udcff", "is not a CSV file in UTF-8"),
+        ("trial,robots\n1,8\n", "has no column 'performance', or time"),
+        (HEAD + GOOD + "2,8,none,,ten\n", "line 3, column 'delivered': 'ten': should be a number"),
+        (HEAD + GOOD + "2,8,none,,\n", "line 3, column 'delivered': nothing: should be a number"),
+        (
+            HEAD + "1,8,none,,-2\n",
+            "line 2, column 'delivered': '-2': should be a number, 0 or more",
+        ),
+        (HEAD + "1,8,none,,inf\n", "line 2, column 'delivered': 'inf': should be a number"),
+        (HEAD + "1,8,none,,12,5\n", "line 2: has 6 values, more values than the 5 columns"),
+        (HEAD + GOOD + "2,8,jam,,7\n", "line 3, column 'faulty': nothing: should be how many"),
+        (HEAD + GOOD + "2,8,none,2,7\n", "line 3, column 'faulty': '2': should be 0 without"),
+        (HEAD + GOOD + "2,8,jam,1.5,7\n", "column 'faulty': '1.5': should be a whole number"),
+        (HEAD + GOOD + "2,8,jam,8,7\n", "column 'faulty': '8': should be less than the 8 robots"),
+        (HEAD + GOOD + "2,,jam,1,7\n", "line 3, column 'robots': nothing: should be the swarm's"),
+        (HEAD + GOOD + "1,8,none,,7\n", "line 3, column 'trial': '1': is in line 2 too"),
+        ("robots;p\n4;1,5\n8;2.5\n", "line 3, column 'p': '2.5': should have a decimal comma, as"),
+        ("robots,fualt,p\n4,none,1\n", "has a column 'fualt'; did you mean 'fault'?"),
+        ("robots,p,note\n4,1,a\n8,2,b\n", "line 2, column 'note': 'a': should be a number, as"),
+        ("robots,p,items\n4,1,1\n", "has columns 'p' and 'items', both performance"),
+        ("robots,p,p\n4,1,1\n", "has two columns 'p'"),
+        ("robots,seed,p\n4,0,1\n8,,2\n", "line 3: has no seed"),
+        ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
+        ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n", "line 4: its condition has no run of seed 1"),
+        ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: has duration 90, line 2 60"),
+        ("kind,name,p\nsize,n,1\n", "has no column 'value', as it has 'kind'"),
+        ("kind,name,value,p\nsise,n,4,1\n", "line 2, column 'kind': 'sise': should be one of size"),
+        ("robots,time\n4,1\n", "has no column trial or seed"),
+        ("trial,robots,time,p\n1,4,1,1\n", "has a column of times and one of performance"),
+        (
+            "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n",
+            "line 2: duration is missing: should say when a trial ends",
+        ),
+        (
+            "trial,robots,duration,time\n1,4,60,70\n",
+            "line 2, column 'time': '70': should not be after its duration 60",
+        ),
+    ],
+)
+def test_a_broken_file_is_refused_by_line_column_and_remedy(
+    tmp_path: Path, text: str, words: str
+) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(spi.IndicatorError) as caught:
+        spi.read_trials(path)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, HEAD + GOOD)
+    for columns, ignore, words in (
+        ({"performanse": "delivered"}, (), "did you mean 'performance'?"),
+        ({"performance": "deliverd"}, (), "no column 'deliverd': did you mean 'delivered'?"),
+        ({}, ("faultz",), "no column 'faultz': did you mean 'fault'?"),
+    ):
+        with pytest.raises(spi.IndicatorError) as caught:
+            spi.read_trials(path, columns=columns, ignore=ignore)
+        assert words in str(caught.value)
+    with pytest.raises(spi.IndicatorError, match="cannot read"):
+        spi.read_trials(tmp_path / "nowhere.csv")

@@ -1,0 +1,320 @@
+"""A PettingZoo environment in a study: its runs, indicators, failure modes, and what is refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.cli.study_commands import study_of
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.engines import execute
+from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.tasks import ParallelTask, SumOfInfos
+from tests.tasks.lane import ACTIONS, FAILURES, LANE, OBSERVATIONS, STAY, Lane, Walker
+
+STUDY = """
+task = "tests.tasks.lane:LANE"
+policies = ["walker", "random"]
+seeds = 4
+
+[[sizes]]
+values = [2, 4]
+
+[[faults]]
+modes = ["silent", "blind"]
+robots = [1]
+
+[[parameters]]
+name = "length"
+values = [6, 12]
+"""
+FAULT = {"modes": ["silent"], "robots": [1]}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "lane.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def only_run(task: object, **fields: Any) -> Run:
+    study = Study(**{"task": task, "seeds": 1, "policies": ["walker"], "faults": [FAULT], **fields})
+    return next(study.plan().runs())
+
+
+def test_a_study_plays_sizes_parameters_and_failure_modes(file: Path, tmp_path: Path) -> None:
+    study = Study.from_file(file, out=tmp_path / "out", trust_code=True)
+    tally = study.run()
+    # N = 2, 4 (which is no fault and length 6), silent, blind, removed, length 12; two policies.
+    assert (tally.played, tally.failed) == (6 * 2 * 4, 0)
+    results = study.findings()
+    p = {(c.policy, str(c.arm.setting)): c.performance for c in results.cells}
+    assert p["walker", "N = 2"].mean() > 5
+    assert p["walker", "length = 12"].mean() < p["walker", "length = 6"].mean()
+    assert p["random", "N = 4"].mean() < p["walker", "N = 4"].mean()
+    # A silent robot stands in the way of the others; one that is blind stands still, too.
+    assert p["walker", "silent, m = 1"].mean() < p["walker", "removed, m = 1"].mean()
+    assert p["walker", "silent, m = 1"].tolist() == p["walker", "blind, m = 1"].tolist()
+    by_hand = spi.fault_tolerance(
+        p["walker", "no fault"], p["walker", "silent, m = 1"], p["walker", "removed, m = 1"]
+    )
+    (test,) = (
+        t
+        for t in results.tests
+        if (t.policy, t.indicator, t.comparison.label) == ("walker", "FT", "silent, m = 1")
+    )
+    assert test.estimate is not None
+    assert test.estimate.value == by_hand.value
+    study.report()
+    text = (tmp_path / "out" / "report.md").read_text()
+    assert "Performance P is the sum of the rewards." in text
+    assert "its actions are replaced by the task's no-op" in text
+
+
+def test_whole_rewards_are_events_with_times(file: Path) -> None:
+    study = Study.from_file(file, trust_code=True, seeds=1, policies=["walker"])
+    study.run()
+    outcomes = study.findings().outcomes.values()
+    assert all(len(o.delivery_times) == o.delivered for o in outcomes)
+    assert all(o.ended_at == 40 and o.untimed is None for o in outcomes)
+
+
+def test_equal_seeds_give_equal_bits_in_another_process(file: Path) -> None:
+    script = (
+        "import sys; from pathlib import Path; from swarm_logistics_env.studies import Study\n"
+        "from swarm_logistics_env.studies.engines import execute\n"
+        "study = Study.from_file(Path(sys.argv[1]), trust_code=True)\n"
+        "for run in study.plan().runs():\n"
+        "    outcome = execute(run); print(run.key, outcome.delivered, outcome.digest)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(file)], capture_output=True, text=True, check=True
+    )
+    study = Study.from_file(file, trust_code=True)
+    runs = list(study.plan().runs())
+    here = [execute(run) for run in reversed(runs)][::-1]
+    assert done.stdout.splitlines() == [f"{o.run} {o.delivered} {o.digest}" for o in here]
+    assert len({o.digest for o in here}) > len(here) / 2
+
+
+def test_worker_processes_give_the_same_rows(file: Path) -> None:
+    alone, shared = (Study.from_file(file, trust_code=True, seeds=2) for _ in range(2))
+    alone.run()
+    assert shared.run(processes=2).failed == 0
+    kept = [
+        {key: (o.delivered, o.digest) for key, o in study.findings().outcomes.items()}
+        for study in (alone, shared)
+    ]
+    assert kept[0] == kept[1]
+
+
+def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Path) -> None:
+    task = ParallelTask(
+        Lane,
+        name="distance",
+        n_robots=3,
+        steps=10,
+        performance=SumOfInfos("distance"),
+        failures={"frozen": None, "blind": None},
+        policies={"walker": Walker},
+    )
+    study = Study(
+        task=task, out=tmp_path, seeds=3, policies=["random"], faults=[{"modes": ["blind"]}]
+    )
+    # Removing is not among its failures, so FT is not asked.
+    with pytest.raises(StudyError, match="less than n_robots"):
+        study.plan()
+    study = Study(
+        task=task,
+        out=tmp_path,
+        seeds=3,
+        policies=["random"],
+        faults=[{"modes": ["blind", "frozen"], "robots": [1]}],
+    )
+    assert {c.indicator for c in study.plan().comparisons} == {"R"}
+    study.run()
+    results = Study.stored(tmp_path, task=task).findings()
+    assert all(o.untimed is not None and o.digest for o in results.outcomes.values())
+    blind, frozen = (t for t in results.tests)
+    # Random actions do not look: a blind robot changes nothing, and the report says so.
+    assert blind.unaffected
+    assert not frozen.unaffected
+    assert any(p % 1 for cell in results.cells for p in cell.performance)
+
+
+def test_a_killed_study_goes_on_where_it_was(file: Path, tmp_path: Path) -> None:
+    def command(out: Path) -> list[str]:
+        run = ["study", "run", str(file), "--seeds", "40", "--processes", "1", "--trust-code"]
+        start = "from swarm_logistics_env.cli import app; app()"
+        return [sys.executable, "-c", start, *run, "--out", str(out)]
+
+    killed, whole = tmp_path / "killed", tmp_path / "whole"
+    process = subprocess.Popen(command(killed), stdout=subprocess.DEVNULL)
+    while not (killed / FILE_NAME).is_file() or n_runs(killed) < 30:
+        assert process.poll() is None
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    kept = n_runs(killed)
+    assert 30 <= kept < 6 * 2 * 40
+    done = subprocess.run(command(killed), capture_output=True, text=True, check=True)
+    assert f"{6 * 2 * 40 - kept} runs played" in done.stdout
+    subprocess.run(command(whole), check=True, stdout=subprocess.DEVNULL)
+    assert rows(killed) == rows(whole)
+
+
+def n_runs(directory: Path) -> int:
+    try:
+        with Store.existing(directory) as store:
+            return len(store.succeeded())
+    except StudyError:  # the tables are being made
+        return 0
+
+
+def rows(directory: Path) -> list[dict[str, Any]]:
+    with Store.existing(directory) as store:
+        return list(store.rows())
+
+
+def test_a_model_of_stable_baselines3_plays(tmp_path: Path) -> None:
+    sb3 = pytest.importorskip("stable_baselines3")
+
+    class Single(gymnasium.Env[Any, Any]):
+        observation_space, action_space = OBSERVATIONS, ACTIONS
+
+    path = tmp_path / "model.zip"
+    sb3.PPO("MlpPolicy", Single(), seed=0, device="cpu").save(path)
+    run = only_run(LANE, policies=[str(path)])
+    one, two = execute(run), execute(run)
+    assert one.error is None
+    assert one.digest == two.digest
+    study = tmp_path / "lane.toml"
+    study.write_text(STUDY.replace('"walker", "random"', f'"{path}"'))
+    with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
+        Study.from_file(study)
+    with pytest.raises(StudyError, match="should be allowed by --trust-code"):
+        study_of("quick", None, None, [str(path)])
+
+
+class Crash(Walker):
+    def act(self, observations: Any) -> Any:
+        raise ZeroDivisionError("on purpose")
+
+
+class Wrong(Walker):
+    def act(self, observations: Any) -> Any:
+        return np.full(self.n_robots, 7)
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        (Crash(), "ZeroDivisionError: on purpose"),
+        (Wrong(), "PolicyError: action 7 of robot 0: should be in Discrete(3)"),
+    ],
+)
+def test_failing_runs_are_rows_with_their_reason(policy: object, words: str) -> None:
+    outcome = execute(only_run(LANE, policies=[policy]))
+    assert outcome.error is not None
+    assert words in outcome.error
+
+
+def costs(env: object, rewards: object, infos: object) -> float:
+    return -2.0
+
+
+def endless(env: object, rewards: object, infos: object) -> float:
+    return float("nan")
+
+
+def task_of(**fields: Any) -> ParallelTask:
+    return ParallelTask(
+        Lane,
+        **{
+            "name": "lane",
+            "n_robots": 3,
+            "steps": 5,
+            "failures": FAILURES,
+            "policies": {"walker": Walker},
+            **fields,
+        },
+    )
+
+
+def test_a_measure_without_a_true_zero_is_refused_with_a_remedy() -> None:
+    outcome = execute(only_run(task_of(performance=costs)))
+    assert outcome.error is not None
+    assert "step 1 adds -2: should be 0 or more; the indicators are ratios" in outcome.error
+    assert "references=(score that counts as 0" in outcome.error
+    outcome = execute(only_run(task_of(performance=endless)))
+    assert "adds nan: should be a finite number" in (outcome.error or "")
+    scored = execute(only_run(task_of(performance=costs, references=(-20.0, 0.0))))
+    assert scored.delivered == 0.5
+    below = execute(only_run(task_of(performance=costs, references=(-5.0, 0.0))))
+    assert "the score -10 is below the reference -5" in (below.error or "")
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: task_of(failures={"silnt": 0}), "no mode 'silnt'; did you mean 'silent'?"),
+        (lambda: task_of(failures={"silent": None}), "should be the action that counts as none"),
+        (lambda: task_of(failures={"noisy": 0.0}), "should be a standard deviation above 0"),
+        (lambda: task_of(failures={"removed": True}), "should be the name of the factory's"),
+        (lambda: task_of(references=(1.0, 1.0)), "should be two different scores"),
+        (lambda: task_of(period=0.0), "should be above 0 s"),
+        (lambda: Study(task=LANE, scenario={"lenght": 3}), "did you mean 'length'?"),
+        (lambda: Study(task=LANE, scenario={"length": 6.5}), "6.5: should be a whole number"),
+        (lambda: only_run(LANE, policies=["walkr"]), "no policy 'walkr'"),
+        (lambda: only_run(LANE, policies=["swarm-dt"]), "the task has no policy 'swarm-dt'"),
+        (
+            lambda: only_run(LANE, faults=[{**FAULT, "onsets": [5]}]),
+            "removed from the start, not from 5 s on, so FT is not defined here: should be asked",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_before_any_run(make: Any, words: str) -> None:
+    with pytest.raises(SwarmLogisticsError) as caught:
+        make()
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_factory_that_ignores_the_size_is_refused() -> None:
+    task = ParallelTask(
+        lambda n_robots: Lane(2), name="two", n_robots=3, steps=5, failures={"silent": STAY}
+    )
+    outcome = execute(only_run(task, policies=["random"]))
+    assert "the environment of 3 robots has 2 agents" in (outcome.error or "")
+
+
+def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
+    assert task_of().code() == task_of().code()
+    others = [
+        task_of(performance=costs),
+        task_of(references=(0.0, 2.0)),
+        task_of(failures={**FAILURES, "noisy": 0.1}),
+        task_of(period=0.5),
+        ParallelTask(lambda n_robots: Lane(n_robots), name="lane", n_robots=3, steps=5),
+    ]
+    assert len({task.code() for task in [task_of(), *others]}) == 6
+    assert "pettingzoo" in task_of().code()
+
+
+def test_robots_that_fail_in_mid_run_and_recover() -> None:
+    late = {**FAULT, "onsets": [20], "duration": 10}
+    study = Study(task=LANE, seeds=3, policies=["walker"], indicators=["R"], faults=[FAULT, late])
+    assert study.run().failed == 0
+    p = {str(c.arm.setting): c.performance.mean() for c in study.findings().cells}
+    assert p["silent, m = 1"] < p["silent, m = 1 from 20 s"] < p["no fault"]

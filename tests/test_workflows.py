@@ -1,0 +1,139 @@
+"""The workflows on the repository's host call targets that exist, and cover what is promised."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+yaml = pytest.importorskip("yaml")
+
+ROOT = Path(__file__).parents[1]
+HOST = ROOT / ".github"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+TARGETS = {
+    target
+    for head in re.findall(r"^([\w -]+):(?!=)", MAKEFILE, flags=re.MULTILINE)
+    for target in head.split()
+}
+
+WORKFLOWS: dict[str, Any] = {
+    path.name: yaml.safe_load(path.read_text(encoding="utf-8"))
+    for path in sorted(HOST.glob("workflows/*.yml"))
+}
+JOBS = [
+    pytest.param(job, id=f"{name}:{title}")
+    for name, workflow in WORKFLOWS.items()
+    for title, job in workflow["jobs"].items()
+]
+
+
+def versions_in(job: dict[str, Any]) -> list[dict[str, str]]:
+    """Return what a job's matrix sets in each of its runs."""
+    matrix = job.get("strategy", {}).get("matrix", {})
+    lists = {name: values for name, values in matrix.items() if name != "include"}
+    crossed = [{name: value} for name, values in lists.items() for value in values]
+    return [*crossed, *matrix.get("include", [])] or [{}]
+
+
+def lines_of(job: dict[str, Any]) -> list[str]:
+    """Return every command of a job, with the values of its matrix filled in."""
+    return [
+        re.sub(r"\$\{\{ matrix\.(\w+) \}\}", lambda m: str(values.get(m[1], m[0])), line)  # noqa: B023  # used at once
+        for values in versions_in(job)
+        for step in job["steps"]
+        for line in step.get("run", "").splitlines()
+    ]
+
+
+def called() -> set[str]:
+    return {
+        target
+        for workflow in WORKFLOWS.values()
+        for job in workflow["jobs"].values()
+        for line in lines_of(job)
+        for target in re.findall(r"\bmake ([\w-]+)", line)
+    }
+
+
+def test_every_target_that_a_workflow_calls_exists() -> None:
+    assert called() - TARGETS == set()
+    wanted = {"test", "paper", "docs", "soak", "mutants", "interop", "dist"}
+    assert wanted | {"test-lowest", "test-newest"} <= called()
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_a_job_does_its_work_by_make_within_a_time(job: dict[str, Any]) -> None:
+    assert job["timeout-minutes"] <= 330
+    for step in job["steps"]:
+        assert ("uses" in step) != ("run" in step), step
+        if "uses" in step:
+            assert re.fullmatch(r"[\w-]+/[\w-]+@[\w./]+", step["uses"]), step
+    made = [line for line in lines_of(job) if line.startswith("make ")]
+    publishes = any("pypi-publish" in step.get("uses", "") for step in job["steps"])
+    assert made or publishes
+
+
+def test_the_gate_runs_on_every_python_that_the_package_names() -> None:
+    named = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
+    assert WORKFLOWS["test.yml"]["jobs"]["gate"]["strategy"]["matrix"]["python"] == named
+    assert PROJECT["requires-python"] == f">={named[0]}"
+
+
+def test_nothing_may_write_but_the_release() -> None:
+    for name, workflow in WORKFLOWS.items():
+        assert workflow["permissions"] == {"contents": "read"}, name
+        for job in workflow["jobs"].values():
+            assert name == "release.yml" or "permissions" not in job
+
+
+def test_a_release_is_published_without_a_password_and_with_attestations() -> None:
+    jobs = WORKFLOWS["release.yml"]["jobs"]
+    assert jobs["publish"]["permissions"] == {"id-token": "write"}
+    assert jobs["publish"]["needs"] == "build"
+    [step] = [step for step in jobs["publish"]["steps"] if "pypi-publish" in step["uses"]]
+    assert step["with"] == {"attestations": True}
+    assert any("attest-build-provenance" in step.get("uses", "") for step in jobs["build"]["steps"])
+    everything = (HOST / "workflows" / "release.yml").read_text(encoding="utf-8")
+    assert "secrets." not in everything
+
+
+def test_issue_forms_ask_for_something() -> None:
+    forms = [path for path in HOST.glob("ISSUE_TEMPLATE/*.yml") if path.name != "config.yml"]
+    assert len(forms) == 3
+    for path in forms:
+        form = yaml.safe_load(path.read_text(encoding="utf-8"))
+        assert {"name", "description", "body"} <= form.keys()
+        names = [part["id"] for part in form["body"]]
+        assert len(set(names)) == len(names)
+        assert any(part.get("validations", {}).get("required") for part in form["body"])
+        assert all(part["attributes"]["label"] for part in form["body"])
+
+
+def test_links_of_the_readme_begin_with_the_repositorys_address_and_exist() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    source = PROJECT["urls"]["Source"]
+    links = re.findall(r"\]\(([^)]+)\)|^\[[^\]]+\]: (\S+)$", readme, flags=re.MULTILINE)
+    targets = [inline or defined for inline, defined in links]
+    assert targets
+    for target in targets:
+        assert target.startswith(("https://", "#")), f"{target} breaks on the package index"
+        found = re.fullmatch(rf"{re.escape(source)}/(?:blob|raw)/main/(.+)", target)
+        assert not target.startswith(source) or (found and (ROOT / found[1]).exists()), target
+    defined = {name.lower() for name in re.findall(r"^\[([^\]]+)\]: ", readme, re.MULTILINE)}
+    used = {name.lower() for name in re.findall(r"\[([^\]]+)\](?!:)", readme)}
+    assert defined - used == set()
+
+
+def test_the_project_and_the_citation_name_the_same_address() -> None:
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    source = PROJECT["urls"]["Source"]
+    assert cited["repository-code"] == source
+    [paper] = cited["references"]
+    assert paper["url"] == PROJECT["urls"]["Paper"]
+    for name, address in PROJECT["urls"].items():
+        assert name == "Paper" or address.startswith(source)

@@ -1,0 +1,235 @@
+"""Invariants of every world, on random scenarios; `make soak` does the same at length."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import verification
+from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.scenario import LONGEST_STRIDE
+from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED
+from verification.invariants import BrokenPromiseError, Watch
+from verification.soak import Tally, play
+
+ROOT = Path(verification.__file__).parents[1]
+
+
+# `python -m verification.soak --first NUMBER --worlds 1 --steps 80` plays a world again.
+@given(number=st.integers(0, 2**32))
+@settings(max_examples=max(40, settings().max_examples // 4))
+def test_no_random_world_breaks_a_promise(number: int) -> None:
+    play(random.Random(number), 80, Tally())
+
+
+def test_the_soak_says_how_far_it_went() -> None:
+    command = [sys.executable, "-m", "verification.soak", "--worlds", "12", "--steps", "50"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    last = done.stdout.splitlines()[-1]  # a slow machine tells of every minute before
+    assert last.startswith("no promise broken: ")
+    assert "of 12 worlds" in last
+
+
+def test_the_watch_accuses_nobody_who_was_repaired_for_a_moment() -> None:
+    world = Warehouse(Scenario(n_robots=1))
+    world.reset(0, [Fault("dead", (0,))])
+    watch, heading = Watch(world), float(world.state.robot_heading[0])
+    watch.look()
+    world.set_faults([Fault("dead", (0,), onset=0.5 * world.scenario.control_period)])
+    watch.faults_changed()
+    world.step([[0.0, 0.0, 1.0, 0.0]])
+    assert world.state.robot_heading[0] != heading
+    watch.look()
+    # Without a change in between it may not turn.
+    world.state.robot_heading[0] += 0.1
+    with pytest.raises(BrokenPromiseError, match="turns"):
+        watch.look()
+
+
+@pytest.mark.parametrize("heavy", [False, True])
+def test_a_crowd_presses_nobody_out_at_the_longest_stride(heavy: bool) -> None:
+    scenario = Scenario(
+        n_robots=34, n_items=2, warehouse_width=2.4, warehouse_height=3.6, delivery_width=0.25,
+        restock=True, robot_radius=0.1, robot_mass=22.0 if heavy else 1.0, max_speed=4.0,
+        physics_period=0.02, control_period=0.1, item_radius=0.04,
+    )  # fmt: skip
+    stride = scenario.max_speed * scenario.physics_period
+    assert stride == pytest.approx(LONGEST_STRIDE * scenario.robot_radius)
+    world = Warehouse(scenario)
+    world.reset(0)
+    watch, rng = Watch(world), np.random.default_rng(0)
+    for step in range(150):
+        if step % 10 == 0:
+            commands = rng.uniform(-1.5, 1.5, (34, 4)) if step % 20 else np.full((34, 4), 1.0)
+        world.step(commands)
+        watch.look()
+
+
+Spoil = Callable[[Warehouse], None]
+
+
+def crowd() -> Warehouse:
+    """A world in which everybody carries something and half have failed."""
+    scenario = Scenario(
+        n_robots=8, n_items=20, warehouse_width=4.0, warehouse_height=3.0, pickup_range=1.0,
+        delivery_width=1.0,
+    )  # fmt: skip
+    world = Warehouse(scenario)
+    faults = [Fault("FM1", (0,)), Fault("FM2", (1,)), Fault("FM4", (2,)), Fault("FM3", (3,))]
+    world.reset(0, [*faults, Fault("dead", (4,)), Fault("removed", (5,))])
+    return world
+
+
+def item_in_two_hands(world: Warehouse) -> None:
+    first, second = np.flatnonzero(world.state.robot_item != NOBODY)[:2]
+    world.state.robot_item[second] = world.state.robot_item[first]
+
+
+def item_lost(world: Warehouse) -> None:
+    world.state.item_status[world.state.item_status == STORED] = DELIVERED
+
+
+def request_of_nothing(world: Warehouse) -> None:
+    world.state.requested = NOBODY
+
+
+def request_of_what_is_gone(world: Warehouse) -> None:
+    world.state.requested = world.scenario.n_items
+
+
+def robots_in_one_place(world: Warehouse) -> None:
+    world.state.robot_position[0] = world.state.robot_position[1]
+
+
+def robot_in_the_wall(world: Warehouse) -> None:
+    world.state.robot_position[0, 0] = 0.01
+
+
+def robot_outside(world: Warehouse) -> None:
+    world.state.robot_position[0] = (-1.0, 1.0)
+
+
+def place_that_is_no_number(world: Warehouse) -> None:
+    world.state.robot_position[0] = np.nan
+
+
+def timer_beyond_its_limit(world: Warehouse) -> None:
+    world.state.robot_timer[0] = world.scenario.timer_limit
+
+
+def timer_from_nowhere(world: Warehouse) -> None:
+    world.state.robot_heard[7] = -1.0
+
+
+def deaf_robot_hears(world: Warehouse) -> None:
+    world.state.robot_heard[3] = 5.0
+
+
+def lifted_in_fm2(world: Warehouse) -> None:
+    free = int(np.flatnonzero(world.state.item_status == STORED)[0])
+    world.state.robot_item[1] = free
+    world.state.item_status[free], world.state.item_carrier[free] = 1, 1
+
+
+def honest_in_fm1(world: Warehouse) -> None:
+    world.state.robot_told[0] = 3.0
+
+
+def delivered_in_fm4(world: Warehouse) -> None:
+    state = world.state
+    gone = state.requested
+    carrier = state.item_carrier[gone]
+    if carrier != NOBODY:
+        state.robot_item[carrier] = NOBODY
+    state.item_status[gone], state.item_carrier[gone] = DELIVERED, NOBODY
+    state.requested = int(np.flatnonzero(state.item_status == STORED)[0])
+    state.delivery_times.append(state.time)
+    state.delivered_by.append(2)
+
+
+def dead_robot_turns(world: Warehouse) -> None:
+    world.state.robot_heading[4] += 0.1
+
+
+def removed_robot_is_back(world: Warehouse) -> None:
+    world.state.robot_present[5] = True
+    world.state.robot_position[5] = (2.0, 1.5)
+
+
+def deliveries_taken_back(world: Warehouse) -> None:
+    delivered_in_fm4(world)
+    world.state.delivery_times.clear()
+
+
+def row_that_is_no_number(world: Warehouse) -> None:
+    world.observe()[0, 3] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (item_in_two_hands, "in the hands of"),
+        (item_lost, "have left for 0 deliveries"),
+        (request_of_nothing, "nothing is asked for"),
+        (request_of_what_is_gone, "is asked"),
+        (robots_in_one_place, "overlap by"),
+        (robot_in_the_wall, "overlap by"),
+        (robot_outside, "overlap by"),
+        (place_that_is_no_number, "overlap by nan"),
+        (timer_beyond_its_limit, r"robot_timer leaves \[0, 10\)"),
+        (timer_from_nowhere, "robot_heard leaves"),
+        (deaf_robot_hears, "does not hear has heard"),
+        (lifted_in_fm2, "robot 1 lifts item"),
+        (honest_in_fm1, "tells no 0"),
+        (delivered_in_fm4, "robot 2 delivers"),
+        (dead_robot_turns, "robot 4 turns"),
+        (removed_robot_is_back, "robot 5, removed, is there"),
+        (deliveries_taken_back, "have left for 0 deliveries|noted for 0 deliveries"),
+        (row_that_is_no_number, "range_robots"),
+    ],
+)
+def test_the_watch_sees(spoil: Spoil, words: str) -> None:
+    world = crowd()
+    watch = Watch(world)
+    for _ in range(3):
+        world.step(np.tile([0.1, 0.0, 0.0, 1.0], (8, 1)))
+        watch.look()
+    spoil(world)
+    with pytest.raises(BrokenPromiseError, match=words):
+        watch.look()
+
+
+MEMORY = """
+import numpy as np
+from swarm_logistics_env import Fault, Scenario, Warehouse
+from verification.soak import peak_memory
+
+world = Warehouse(Scenario(n_robots=6, n_items=8, warehouse_width=4, warehouse_height=3,
+                           delivery_width=1, restock=True, message_size=2))
+rng, peaks = np.random.default_rng(0), []
+for half in range(2):
+    for episode in range(20):
+        world.reset(episode, [Fault("motor_slow", 2, 5.0, 5.0)])
+        for step in range(500):
+            world.step(rng.uniform(-1, 1, (6, 6)))
+    peaks.append(peak_memory())
+print(*peaks)
+"""
+
+
+def test_the_peak_memory_of_a_world_is_flat_over_its_second_half() -> None:
+    pytest.importorskip("resource")  # not on Windows
+    done = subprocess.run(
+        [sys.executable, "-c", MEMORY], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    half, whole = map(int, done.stdout.split())
+    assert whole <= 1.01 * half

@@ -1,1 +1,0 @@
-"""What holds the promises of docs/promises.md: recorded trajectories, invariants, mutants."""

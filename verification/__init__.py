@@ -1,0 +1,1 @@
+"""Checks of the promises in docs/promises.md: golden trajectories, invariants, mutants."""

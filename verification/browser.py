@@ -1,0 +1,145 @@
+"""A headless Chromium that is driven by real mouse and key events."""
+
+from __future__ import annotations
+
+import base64
+import fcntl
+import itertools
+import json
+import os
+import select
+import shutil
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome")
+
+
+class Browser:
+    """A browser, spoken to in the DevTools protocol over two pipes: no port, no websocket.
+
+    Args:
+        profile: an empty folder for the browser's own files.
+        size: width and height of the window [px].
+
+    Attributes:
+        console: the errors that the page has logged.
+
+    Raises:
+        FileNotFoundError: there is no Chromium on this machine.
+    """
+
+    def __init__(self, profile: Path, size: tuple[int, int]) -> None:
+        program = next(filter(None, map(shutil.which, _NAMES)), None)
+        if program is None:
+            raise FileNotFoundError(f"no Chromium on this machine: none of {', '.join(_NAMES)}")
+        to_browser, self._out = os.pipe()
+        self._in, from_browser = os.pipe()
+        # Above 4, so that none is in the way of 3 and 4, where the browser looks for them.
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (to_browser, from_browser)]
+
+        def place_pipes() -> None:
+            os.dup2(ends[0], 3)
+            os.dup2(ends[1], 4)
+
+        self._process = subprocess.Popen(
+            [
+                program, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run",
+                "--disable-dev-shm-usage", "--disable-background-networking", "--mute-audio",
+                "--remote-debugging-pipe", f"--user-data-dir={profile}",
+                f"--window-size={size[0]},{size[1]}", "about:blank",
+            ],
+            close_fds=False,
+            preexec_fn=place_pipes,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        for end in (to_browser, from_browser, *ends):
+            os.close(end)
+        self._numbers, self._buffer, self._session = itertools.count(1), b"", None
+        self.console: list[str] = []
+        targets = self.call("Target.getTargets")["targetInfos"]
+        page = next(target for target in targets if target["type"] == "page")
+        attached = self.call("Target.attachToTarget", targetId=page["targetId"], flatten=True)
+        self._session = attached["sessionId"]
+        self.call("Page.enable")
+        self.call("Runtime.enable")
+        self.call("Log.enable")
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=size[0], height=size[1], deviceScaleFactor=1, mobile=False,
+        )  # fmt: skip
+
+    def call(self, method: str, **parameters: Any) -> Any:
+        """Send a command of the protocol and return its result."""
+        number = next(self._numbers)
+        message: dict[str, Any] = {"id": number, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._out, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._read()
+            if answer.get("id") == number:
+                assert "error" not in answer, answer
+                return answer["result"]
+            if answer.get("method") in {"Runtime.exceptionThrown", "Log.entryAdded"}:
+                self.console.append(json.dumps(answer["params"]))
+
+    def _read(self) -> Any:
+        while b"\0" not in self._buffer:
+            ready, _, _ = select.select([self._in], [], [], 60.0)
+            assert ready, "the browser does not answer"
+            got = os.read(self._in, 1 << 16)
+            assert got, "the browser has ended"
+            self._buffer += got
+        message, _, self._buffer = self._buffer.partition(b"\0")
+        return json.loads(message)
+
+    def open(self, address: str) -> None:
+        """Go to an address."""
+        self.call("Page.navigate", url=address)
+
+    def value(self, expression: str) -> Any:
+        """Return what a JavaScript expression is on the page."""
+        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
+        return result["result"].get("value")
+
+    def wait_for(self, expression: str) -> Any:
+        """Return the value of a JavaScript expression once it is true."""
+        for _ in range(600):
+            value = self.value(expression)
+            if value:
+                return value
+            time.sleep(0.05)
+        raise AssertionError(f"never true: {expression}; {self.console}")
+
+    def click(self, x: float, y: float, button: str = "left") -> None:
+        """Click at a place of the window [px]."""
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
+
+    def click_on(self, selector: str) -> None:
+        """Click the middle of the element that a CSS selector finds."""
+        box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
+        x, y = self.value(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])({box})")
+        self.click(x, y)
+
+    def press(self, key: str) -> None:
+        """Press and release a key, by the name that browsers have for it."""
+        text = {"text": key} if len(key) == 1 else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+
+    def screenshot(self) -> bytes:
+        """Return a picture of the window as PNG."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    def close(self) -> None:
+        """End the browser."""
+        self._process.kill()
+        self._process.wait()
+        os.close(self._in)
+        os.close(self._out)

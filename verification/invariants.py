@@ -1,0 +1,262 @@
+"""Invariants of every step of every world, checked without the kernels that keep them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Warehouse
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.testing.world_checks import Count, counted, wrong_count, wrong_item
+from swarm_logistics_env.warehouse import FAILURE_MODES, FailureMode
+from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+
+SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
+JAM = 1.0  # [s] of overlap without a break make a jam
+
+
+class BrokenPromiseError(AssertionError):
+    """An invariant that does not hold, with the step and what was seen."""
+
+
+class Watch:
+    """Looks at one world after its reset and after every step.
+
+    Attributes:
+        deepest: the greatest overlap seen between bodies [m].
+
+    Raises:
+        BrokenPromiseError: from `look`, with one sentence.
+    """
+
+    def __init__(self, world: Warehouse) -> None:
+        self.world = world
+        self.deepest = 0.0
+        self._count: Count | None = None
+        self._speed = 0.0
+        self._modes: tuple[tuple[str, ...], ...] = ()
+        self._before: dict[str, NDArray[Any]] = {}
+        self._jammed = np.zeros((0, 0))
+        self._covered = np.zeros(len(world.state.item_position), np.bool_)
+
+    def look(self) -> None:
+        """Check everything."""
+        self._items()
+        self._cover()
+        self._bodies()
+        self._timers()
+        self._capabilities()
+        self._rows()
+        state = self.world.state
+        self._count, self._modes = counted(self.world), state.failure_modes
+        self._speed = float(self.world.scenario.max_speed)
+        self._before = {
+            name: getattr(state, name).copy()
+            for name in ("robot_item", "robot_present", "robot_position", "robot_heading",
+                         "item_position", "item_status")
+        }  # fmt: skip
+
+    def faults_changed(self) -> None:
+        """Note that faults were set: what was repaired may come back within the next step.
+
+        A robot that was removed stands above nothing when that step begins.
+        """
+        now = self.world.state.failure_modes
+        self._modes = tuple(
+            tuple(name for name in before if name in after)
+            for before, after in zip(self._modes, now)
+        )
+        self._before["robot_item"][~self.world.state.robot_present] = NOBODY
+
+    def _demand(self, holds: bool, words: str) -> None:
+        # Every comparison is written so that NaN fails it.
+        if not holds:
+            raise BrokenPromiseError(f"at step {self.world.state.step} {words}")
+
+    def _items(self) -> None:
+        world, state, scenario = self.world, self.world.state, self.world.scenario
+        problem = wrong_item(world) or wrong_count(world, self._count)
+        self._demand(problem is None, str(problem))
+        counts = [int(np.count_nonzero(state.item_status == s)) for s in (0, 1, 2)]
+        self._demand(sum(counts) == scenario.n_items, f"{counts} items are there in all")
+        carried = state.robot_item[state.robot_item != NOBODY]
+        self._demand(len(set(carried.tolist())) == len(carried), "two robots carry one item")
+        if state.requested == NOBODY:
+            self._demand(bool((state.item_status == DELIVERED).all()), "nothing is asked for")
+        else:
+            self._demand(0 <= state.requested < scenario.n_items, f"{state.requested} is asked")
+            asked = state.item_status[state.requested]
+            self._demand(asked in (STORED, CARRIED), "the requested item is delivered")
+        times = np.array(state.delivery_times)
+        self._demand(bool((np.diff(times) >= 0.0).all()), "delivery times fall")
+        far = np.array([scenario.warehouse_width, scenario.warehouse_height])
+        here = state.item_position[state.item_status == STORED]
+        self._demand(bool(((here > 0.0) & (here < far)).all()), "an item lies outside")
+
+    def _bodies(self) -> None:
+        scenario, state = self.world.scenario, self.world.state
+        here = state.robot_present
+        at, radius = state.robot_position, scenario.robot_radius
+        gaps = np.linalg.norm(at[:, None] - at[None], axis=2) - 2.0 * radius
+        off = ~(here[:, None] & here[None]) | np.eye(len(at), dtype=bool)
+        solids = state.obstacle_position
+        to_solids = np.linalg.norm(at[:, None] - solids[None], axis=2)
+        to_solids -= radius + scenario.obstacle_radius
+        far = np.array([scenario.warehouse_width, scenario.warehouse_height])
+        to_walls = np.hstack([at, far - at]) - radius
+        to_items = np.linalg.norm(at[:, None] - state.item_position[None], axis=2)
+        to_items -= radius + scenario.item_radius
+        solid = (state.item_status == STORED) & ~self._covered
+        met = (state.robot_item != NOBODY)[:, None] & solid
+        depth = np.hstack(
+            [
+                np.where(off, -np.inf, -gaps),
+                -to_solids,
+                -to_walls,
+                np.where(met, -to_items, -np.inf),
+            ]
+        )
+        depth[~here] = -np.inf
+        # The speed of the last step is that before or after a change.
+        closing = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period
+        deepest = float(depth.max(initial=-np.inf))
+        self._demand(
+            deepest <= closing + SUSTAINED,
+            f"bodies overlap by {deepest:.4f} m: should be at most {closing:.4f} m, what they "
+            "close in one substep, beyond the depth of a jam",
+        )
+        inside = np.minimum(at, far - at).min(axis=1)[here]
+        self._demand(bool((inside > 0.0).all()), "a robot is outside the walls")
+        self.deepest = max(self.deepest, deepest)
+        # For how long each pair is deeper than it may be in a jam.
+        if self._jammed.shape != depth.shape:
+            self._jammed = np.zeros(depth.shape)
+        self._jammed = np.where(depth > SUSTAINED, self._jammed + scenario.control_period, 0.0)
+        lasting = float(depth[self._jammed > JAM].max(initial=0.0))
+        self._demand(
+            lasting == 0.0,
+            f"bodies overlap by more than {SUSTAINED} m for {JAM} s, now by {lasting:.4f} m",
+        )
+
+    def _cover(self) -> None:
+        """Note which items are no obstacles: (I,), by the rule and not by what the world says.
+
+        Those that were put where they are, and those that a robot stood above when it took
+        another; until a step begins with no laden robot above.
+        """
+        state, before = self.world.state, self._before
+        stored = state.item_status == STORED
+        if before:
+            self._covered &= self._above(before, before["robot_item"] != NOBODY).any(axis=0)
+            took = (state.robot_item != before["robot_item"]) & (state.robot_item != NOBODY)
+            # Those too that delivered at once what they took.
+            for robot in state.delivered_by[self._count.delivered if self._count else 0 :]:
+                took[robot] |= before["robot_item"][robot] == NOBODY
+            put = (before["item_status"] != STORED) | (
+                state.item_position != before["item_position"]
+            ).any(axis=1)
+            self._covered |= put | self._above(
+                {"robot_position": state.robot_position, "item_position": state.item_position}, took
+            ).any(axis=0)
+            if (before["robot_present"] & ~state.robot_present).any():
+                # It is no longer known where they were when they took something.
+                self._covered |= state.item_covered == 1
+        self._covered &= stored
+        self._demand(
+            bool((self._covered == state.item_covered).all()), "an item is covered, or is not"
+        )
+
+    def _above(self, at: dict[str, NDArray[Any]], laden: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which of the robots that are `laden` stand above which items, (N, I)."""
+        away = np.linalg.norm(at["robot_position"][:, None] - at["item_position"][None], axis=2)
+        reach = self.world.scenario.robot_radius + self.world.scenario.item_radius
+        above: NDArray[np.bool_] = laden[:, None] & (away < reach)
+        return above
+
+    def _timers(self) -> None:
+        state, limit = self.world.state, self.world.scenario.timer_limit
+        for name in ("robot_timer", "robot_told", "robot_heard"):
+            timer = getattr(state, name)
+            self._demand(
+                bool((np.isnan(timer) | ((timer >= 0.0) & (timer < limit))).all()),
+                f"{name} leaves [0, {limit:g})",
+            )
+
+    def _capabilities(self) -> None:
+        state, scenario = self.world.state, self.world.scenario
+        for robot, names in enumerate(state.failure_modes):
+            modes = [FAILURE_MODES[name] for name in names]
+            self._exercised(robot, modes)
+            # What held before and after a step held throughout it.
+            if self._modes:
+                lasting = [FAILURE_MODES[name] for name in names if name in self._modes[robot]]
+                self._did(robot, lasting)
+        tells = state.robot_present & state.sends & ~np.isnan(state.robot_told)
+        gaps = state.robot_position[:, None] - state.robot_position[None]
+        squares = (gaps**2).sum(axis=2)
+        reached = (squares <= scenario.radio_range**2 * (1 + 1e-12)) & tells[None]
+        np.fill_diagonal(reached, False)
+        lowest = np.where(reached, state.robot_told[None], np.inf).min(axis=1, initial=np.inf)
+        heard = np.where(np.isnan(state.robot_heard), np.inf, state.robot_heard)
+        deaf = ~(state.hears & state.robot_present)
+        self._demand(
+            bool(np.isinf(heard[deaf]).all()), "a robot that does not hear has heard a timer"
+        )
+        self._demand(
+            bool((heard >= lowest).all()), "a timer was heard that no robot in range broadcasts"
+        )
+
+    def _exercised(self, robot: int, modes: list[FailureMode]) -> None:
+        state, scenario = self.world.state, self.world.scenario
+        rows = self.world.observe()[robot]
+        if not all(mode.present for mode in modes):
+            self._demand(not state.robot_present[robot], f"robot {robot}, removed, is there")
+        if not state.robot_present[robot]:
+            self._demand(not rows.any(), f"robot {robot} is gone and senses")
+            self._demand(state.robot_item[robot] == NOBODY, f"robot {robot} is gone and carries")
+            self._demand(bool(np.isnan(state.robot_told[robot])), f"robot {robot} tells, gone")
+            return
+        if not all(mode.honest for mode in modes):
+            self._demand(state.robot_told[robot] == 0.0, f"robot {robot} is in FM1, tells no 0")
+        is_live = all(mode.rangers_refresh for mode in modes) and scenario.ranger_noise == 0.0
+        if not all(mode.rangers for mode in modes) and is_live:
+            scans = rows[: 3 * row.N_BEAMS]
+            blind = bool((scans == np.float32(scenario.ranger_range)).all())
+            self._demand(blind, f"robot {robot}'s blind rangers see")
+        if any(mode.view == 0.0 for mode in modes):
+            items = rows[row.ITEMS : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
+            self._demand(not items.any(), f"robot {robot} sees items without cameras")
+
+    def _did(self, robot: int, modes: list[FailureMode]) -> None:
+        state, before = self.world.state, self._before
+        took = state.robot_item[robot] not in (before["robot_item"][robot], NOBODY)
+        if not all(mode.lifts for mode in modes):
+            self._demand(not took, f"robot {robot} lifts item {state.robot_item[robot]}")
+        if not all(mode.delivers for mode in modes):
+            news = state.delivered_by[self._count.delivered if self._count else 0 :]
+            self._demand(robot not in news, f"robot {robot} delivers in a mode that does not")
+        if any(mode.speed == 0.0 for mode in modes):
+            turned = state.robot_heading[robot] != before["robot_heading"][robot]
+            self._demand(not turned or not state.robot_present[robot], f"robot {robot} turns")
+        jammed = not all(mode.releases_inside for mode in modes)
+        if jammed and state.robot_in_delivery[robot] and state.robot_present[robot]:
+            held = before["robot_item"][robot]
+            kept = held in (NOBODY, state.robot_item[robot])
+            self._demand(kept, f"robot {robot}, jammed inside, lets item {held} go")
+        if not all(mode.obeys for mode in modes) and state.robot_present[robot]:
+            held = before["robot_item"][robot]
+            lost = held != NOBODY and state.robot_item[robot] != held
+            self._demand(not lost, f"robot {robot} is dead and lets item {held} go")
+
+    def _rows(self) -> None:
+        rows = self.world.observe()
+        low, high = row.bounds(self.world.scenario)
+        here = self.world.state.robot_present
+        fits = (rows[here] >= low) & (rows[here] <= high)
+        names = [c.name for c in row.columns(self.world.scenario) if not fits[:, c.columns].all()]
+        self._demand(not names, f"observations leave their ranges: {', '.join(names)}")
+        asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
+        flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
+        self._demand(bool((flags.sum(axis=1) <= 1).all()), "a robot sees two requested items")

@@ -1,0 +1,291 @@
+"""Golden trajectories: recorded digests of every bit that a seed decides, one world per rule.
+
+    python -m verification.trajectories            # compare with the record
+    python -m verification.trajectories --record   # write the record anew: a change of behaviour
+
+The record holds the digests of the machine that first wrote it and, for each other platform, the
+trajectories that differ there. Its key "stories" is the former name of golden trajectories.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import hashlib
+import json
+import platform
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env.policies.policy import decide, start
+from swarm_logistics_env.streams import key
+from swarm_logistics_env.warehouse import FAILURE_MODES
+
+RECORD = Path(__file__).with_name("trajectories.json")
+DECIDING = ("numpy", "numba", "pymunk")  # whose versions may change a bit
+
+# Steps after which the digests are noted: where two trajectories part, the last equal one says.
+NOTED = (0, 1, 2, 5, 10, 25, 50, 100, 200, 300, 650)
+GROUPS: dict[str, tuple[str, ...]] = {
+    "robots": (
+        "robot_position", "robot_velocity", "robot_heading", "robot_heading_drift",
+        "robot_contact", "robot_present", "robot_in_delivery", "max_speed", "max_turn_rate",
+    ),
+    "items": (
+        "item_position", "item_status", "item_carrier", "item_covered", "robot_item",
+        "robot_memory", "obstacle_position",
+    ),
+    "signals": ("robot_timer", "robot_told", "robot_heard", "robot_message", "last_in_delivery"),
+    "counts": ("step", "time", "requested", "delivery_times", "delivered_by", "anchoring_seconds"),
+}  # fmt: skip
+
+Act = Callable[[Warehouse], None]
+Digests = dict[str, str]  # step -> digests, one per group
+
+
+@dataclass(frozen=True)
+class GoldenTrajectory:
+    """The inputs that decide a trajectory whose digests are recorded.
+
+    Attributes:
+        scenario: the world is reset to it.
+        faults: they are scheduled at the reset.
+        steps: the number of steps to play.
+        policy: the name of the policy; every fifth of its commands is replaced by a random one.
+        events: step -> what is done to the world before that step.
+        seed: it decides layout, requests, the robots that fail, and the random commands.
+    """
+
+    scenario: Scenario
+    faults: tuple[Fault, ...] = ()
+    steps: int = 200
+    policy: str = "swarm-dt"
+    events: dict[int, Act] = field(default_factory=dict)
+    seed: int = 0
+
+
+def small(**fields: Any) -> Scenario:
+    """Return a warehouse in which six robots deliver within seconds."""
+    size = {"n_robots": 6, "n_items": 10, "warehouse_width": 4.0, "warehouse_height": 3.0}
+    return Scenario(**{**size, "delivery_width": 1.0, **fields})
+
+
+def _golden() -> dict[str, GoldenTrajectory]:
+    golden = {
+        "preset paper": GoldenTrajectory(Scenario.preset("paper"), steps=100),
+        "preset paper_scalability": GoldenTrajectory(
+            Scenario.preset("paper_scalability"), steps=50
+        ),
+        "preset dots": GoldenTrajectory(Scenario.preset("dots"), steps=100),
+        "preset realistic": GoldenTrajectory(Scenario.preset("realistic"), steps=100),
+        "seed 1": GoldenTrajectory(small(), seed=1),
+        "long, past the rebuilding of bodies": GoldenTrajectory(small(restock=True), steps=650),
+        "until all is delivered": GoldenTrajectory(small(n_items=2, n_robots=8), steps=300),
+        "obstacles": GoldenTrajectory(small(n_obstacles=4, obstacle_radius=0.2)),
+        "restock": GoldenTrajectory(small(restock=True, n_items=3), steps=300),
+        "gossip": GoldenTrajectory(small(relay="gossip", radio_range=1.0)),
+        "ranger noise": GoldenTrajectory(small(ranger_noise=0.05)),
+        "position noise": GoldenTrajectory(small(position_noise=0.05)),
+        "sensor dropout": GoldenTrajectory(small(sensor_dropout=0.3)),
+        "radio loss": GoldenTrajectory(small(radio_loss=0.5)),
+        "all noise": GoldenTrajectory(
+            small(ranger_noise=0.1, position_noise=0.1, sensor_dropout=0.1, radio_loss=0.1)
+        ),
+        "messages": GoldenTrajectory(small(message_size=3)),
+        "differential drive": GoldenTrajectory(small(drive="differential")),
+        "mixed swarm": GoldenTrajectory(small(speed_mix=(1.0, 0.5), sensing_mix=(1.0, 0.6, 0.3))),
+        "no memory": GoldenTrajectory(small(memory_size=0)),
+        "long memory": GoldenTrajectory(small(memory_size=5)),
+        "other periods": GoldenTrajectory(
+            small(control_period=0.2, physics_period=0.01, max_speed=1.0)
+        ),
+        "jam": GoldenTrajectory(small(n_robots=30, n_items=1), steps=100),
+        "swarm-dt-follow": GoldenTrajectory(small(), policy="swarm-dt-follow"),
+        "random-walk": GoldenTrajectory(small(), policy="random-walk"),
+        "central": GoldenTrajectory(small(), policy="central"),
+    }
+    for mode in FAILURE_MODES:
+        golden[f"{mode} from the start"] = GoldenTrajectory(small(), (Fault(mode, 2),))
+        passing = None if mode == "removed" else 6.0
+        golden[f"{mode} for a while"] = GoldenTrajectory(small(), (Fault(mode, 3, 5.0, passing),))
+    golden["several faults at once"] = GoldenTrajectory(
+        small(),
+        (Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)),
+    )
+    golden["faults that come and go"] = GoldenTrajectory(
+        small(),
+        (
+            Fault("motor_wear", 2, intermittent=(2.0, 1.0)),
+            Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
+        ),
+    )
+    golden["without drift"] = GoldenTrajectory(small(heading_drift=0.0))
+    golden["changes during the run"] = GoldenTrajectory(
+        small(delivery_width=0.5),
+        events={
+            50: lambda world: world.change(delivery_width=1.5, max_speed=1.0),
+            100: lambda world: world.change(relay="gossip", radio_loss=0.2, ranger_noise=0.02),
+            150: lambda world: world.change(drive="differential", view_range=0.4, restock=True),
+        },
+    )
+    golden["faults set during the run"] = GoldenTrajectory(
+        small(),
+        events={
+            40: lambda world: world.set_faults([Fault("dead", 2)]),
+            80: lambda world: world.set_faults([Fault("FM3", 3), Fault("removed", (5,))]),
+            120: lambda world: world.set_faults([]),
+        },
+    )
+    return golden
+
+
+GOLDEN = _golden()
+
+
+def moments(golden: GoldenTrajectory, *, copied_at: int | None = None) -> Iterator[Warehouse]:
+    """Yield the world after the reset and after every step.
+
+    Args:
+        copied_at: before this step world and policy are replaced by copies.
+    """
+    world, policy = Warehouse(golden.scenario), policies.load(golden.policy)
+    observations = world.reset(golden.seed, golden.faults)
+    start(policy, golden.scenario, golden.seed)
+    # The former name of golden trajectories decides what is drawn.
+    numbers = np.random.Philox(key=key(golden.seed, "commands of a story"))
+    yield world
+    for step in range(golden.steps):
+        if step in golden.events:
+            golden.events[step](world)
+        if step == copied_at:
+            world, policy = copy.deepcopy((world, policy))
+        commands = np.array(decide(policy, observations, world.state))
+        # Raw numbers: their meaning never changes with a version of numpy.
+        width = 4 + world.scenario.message_size
+        drawn = numbers.random_raw((len(commands), width + 1)) * 2.0**-63 - 1.0
+        commands = np.pad(commands, ((0, 0), (0, width - commands.shape[1])))
+        commands = np.where(drawn[:, :1] < -0.6, 1.2 * drawn[:, 1:], commands)
+        observations = world.step(commands)
+        yield world
+
+
+def digests(golden: GoldenTrajectory, *, copied_at: int | None = None) -> Digests:
+    """Return the digests of all that was up to each noted step: observations, then `GROUPS`."""
+    running = {name: hashlib.blake2b(digest_size=5) for name in ("observations", *GROUPS)}
+    noted: Digests = {}
+    for step, world in enumerate(moments(golden, copied_at=copied_at)):
+        running["observations"].update(_bytes(world.observe()))
+        for group, names in GROUPS.items():
+            for name in names:
+                running[group].update(_bytes(getattr(world.state, name)))
+        if step in NOTED or step == golden.steps:
+            noted[str(step)] = " ".join(digest.hexdigest() for digest in running.values())
+    return noted
+
+
+def _bytes(value: Any) -> bytes:
+    array = np.asarray(value)
+    if array.dtype == object:  # no number has it
+        return repr(value).encode()
+    if array.dtype.kind == "f":
+        array = np.where(np.isnan(array), array.dtype.type(np.nan), array)  # one NaN for all
+    little: NDArray[Any] = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
+    return little.tobytes()
+
+
+def here() -> dict[str, str]:
+    """Return what may decide a bit on this machine."""
+    about = {"platform": platform_name(), "python": platform.python_version()}
+    about["libc"] = " ".join(platform.libc_ver())
+    return about | {name: version(name) for name in DECIDING}
+
+
+def platform_name() -> str:
+    """Return the name under which the record keeps what differs on this platform."""
+    return f"{platform.system()}-{platform.machine()}"
+
+
+def read_record() -> dict[str, Any]:
+    """Return the record as it is stored."""
+    record: dict[str, Any] = json.loads(RECORD.read_text(encoding="utf-8"))
+    return record
+
+
+def expected(record: dict[str, Any], name: str) -> Digests:
+    """Return the recorded digests of a golden trajectory on this platform."""
+    differs = record["differs"].get(platform_name(), {})
+    found: Digests = differs.get(name, record["stories"][name])
+    return found
+
+
+def parting(recorded: Digests, played: Digests) -> str | None:
+    """Return in words where two trajectories part, or None if they are equal."""
+    if list(recorded) != list(played):
+        return f"noted after the steps {', '.join(recorded)} then, {', '.join(played)} now"
+    before = "before the reset was over"
+    for step, digest in recorded.items():
+        pairs = zip(("observations", *GROUPS), digest.split(), played[step].split(), strict=True)
+        if groups := [group for group, then, now in pairs if then != now]:
+            return f"{', '.join(groups)} differ at step {step}, nothing did {before}"
+        before = f"up to step {step}"
+    return None
+
+
+def differences(names: Iterable[str] | None = None) -> dict[str, str]:
+    """Return the golden trajectories that this machine plays differently, and where they part."""
+    record = read_record()
+    found = {}
+    for name in names or GOLDEN:
+        words = parting(expected(record, name), digests(GOLDEN[name]))
+        if words:
+            found[name] = words
+    return found
+
+
+def explained(found: dict[str, str]) -> str:
+    """Return differences as text, with what is other than on the machine of the record."""
+    recorded, now = read_record()["recorded_on"], here()
+    other = [f"{what}: {recorded[what]} there, {now[what]} here"
+             for what in now if recorded.get(what) != now[what]]  # fmt: skip
+    why = "; ".join(other) or "the same platform and versions, so the code has changed it"
+    lines = [f"{name}: {words}" for name, words in found.items()]
+    return "\n".join([f"{len(found)} golden trajectories are not as recorded ({why})", *lines])
+
+
+def record() -> None:
+    """Write the record: all of it on its own platform, elsewhere what differs there."""
+    played = {name: digests(golden) for name, golden in GOLDEN.items()}
+    stored: dict[str, Any] = {"recorded_on": here(), "stories": {}, "differs": {}}
+    if RECORD.exists():
+        stored = read_record()
+    if stored["recorded_on"]["platform"] == platform_name():
+        stored |= {"recorded_on": here(), "stories": played}
+    else:
+        differs = {n: d for n, d in played.items() if d != stored["stories"].get(n)}
+        stored["differs"][platform_name()] = differs
+    RECORD.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+
+
+def main() -> int:
+    """Compare or record, as the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--record", action="store_true", help="write the record anew")
+    if parser.parse_args().record:
+        record()
+        print(f"{len(GOLDEN)} golden trajectories written to {RECORD.name}")
+        return 0
+    found = differences()
+    print(explained(found) if found else f"all {len(GOLDEN)} golden trajectories are as recorded")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
