@@ -34,7 +34,7 @@ from swarm_logistics_env.warehouse.structs import (
     DELIVERED,
     NOBODY,
     STORED,
-    NumberRows,
+    Numbers,
     Parameters,
     World,
     parameters_of,
@@ -94,8 +94,8 @@ def free_place(
     key: np.uint64,
     parameters: Parameters,
     nest_radius: float,
-    obstacles: NumberRows,
-    items: NumberRows,
+    obstacles: Numbers,
+    items: Numbers,
 ) -> tuple[float, float]:
     """Return a random place [m], clear of obstacles, of items and of what the nest's robots reach.
 
@@ -131,19 +131,17 @@ def forage(address: int, nest_radius: float, rows: NDArray[np.float32]) -> bool:
 @inlined_kernel
 def handle_items(world: World, nest_radius: float) -> tuple[int, bool]:
     """Carry along, let go, lift and bring home; returns how many, and whether there was room."""
-    robots, able, items, parameters = world.robots, world.able, world.items, world.parameters
-    commands, events = world.commands.now, world.claims.events
-    carry_along(robots, items, math.inf)
+    robots, parameters, commands = world.robots, world.parameters, world.commands.now
+    carry_along(world)
     for robot in range(len(robots.item)):
         dx = robots.position[robot, 0] - 0.5 * parameters.warehouse_width
         dy = robots.position[robot, 1] - 0.5 * parameters.warehouse_height
         robots.in_delivery[robot] = robots.present[robot] and math.hypot(dx, dy) <= nest_radius
-    n_events = open_grippers(commands, robots, able, items, NOBODY, events)
-    n_events = close_grippers(world, commands, NOBODY, n_events)
-    reach = parameters.robot_radius + parameters.item_radius
-    mask_below_lifters(world.engine, events, n_events, reach, robots, items, world.item_grid)
+    n_events = open_grippers(world, commands)
+    n_events = close_grippers(world, commands, n_events)
+    mask_below_lifters(world, n_events)
     n_events, n_delivered, is_room = bring_home(world, nest_radius, n_events)
-    follow(world.engine, events, n_events, items.position)
+    follow(world.engine, world.claims.events, n_events, world.items.position)
     return n_delivered, is_room
 
 
