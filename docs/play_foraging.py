@@ -13,6 +13,7 @@ from record_tables import table
 
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.policy_comparison import judged_policies
 from swarm_logistics_env.studies.results import StudyResults
 
@@ -35,13 +36,13 @@ def side_by_side(results: Iterable[StudyResults]) -> str:
     for found in results:
         world = found.plan.specification.played.name
         columns += [f"{world}: `{policy}`" for policy in judged_policies(found)]
-        for cell in found.cells:
+        for cell in rows_of(found.performance):
             if cell.arm.setting.kind in ("size", "parameter"):
                 row = rows.setdefault(f"P, {cell.arm.setting}", {})
-                row[f"{world}: `{cell.policy}`"] = wording.items(cell.mean)
-        for test in found.tests:
-            row = rows.setdefault(f"{test.indicator}, {test.comparison.label}", {})
-            mark = _EXACT if test.unaffected else ""
+                row[f"{world}: `{cell.policy}`"] = wording.mean_p(cell)
+        for test in rows_of(found.indicators):
+            row = rows.setdefault(f"{test.indicator}, {test.comparison}", {})
+            mark = _EXACT if test.verdict == "unaffected" else ""
             row[f"{world}: `{test.policy}`"] = wording.ratio(test) + mark
     body = [(label, *(row.get(column, "") for column in columns)) for label, row in rows.items()]
     return table(("", *columns), body)

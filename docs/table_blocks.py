@@ -6,14 +6,16 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+import pandas as pd
 from record_tables import table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies.agreement import agreement
 from swarm_logistics_env.studies.comparisons import Setting
+from swarm_logistics_env.studies.performance_table import Row, rows_of
 from swarm_logistics_env.studies.policy_comparison import judged_policies
-from swarm_logistics_env.studies.results import Cell, IndicatorTest, StudyResults
+from swarm_logistics_env.studies.results import StudyResults
 
 _EXACT = " ="
 _FAULTS = {
@@ -30,25 +32,20 @@ _FAULTS = {
 
 def paper_block(parts: list[StudyResults]) -> str:
     """Return the paper's table: P of the paper beside ours, and how well they agree."""
-    counted = [cell for part in parts for cell in part.cells if cell.counted]
-    counted.sort(key=lambda cell: ("size", "fault", "parameter").index(cell.arm.setting.kind))
-    cells = {cell.arm.setting: cell for cell in counted}
-    ablated = {
-        cell.arm.setting: cell
-        for part in parts
-        for cell in part.cells
-        if cell.arm.setting.kind == "policy"
-    }
-    figure = agreement("", tuple(cells.values()))
-    missed = {cell.arm.setting for cell in figure.misses or ()}
+    p = pd.concat([part.performance for part in parts])
+    kinds = ["size", "fault", "parameter"]
+    counted = p[p["counted"]].sort_values("kind", key=lambda k: k.map(kinds.index), kind="stable")
+    counted = counted.drop_duplicates("cell")
+    cells = {cell.arm.setting: cell for cell in rows_of(counted)}
+    figure = agreement("", counted)
+    missed = set() if figure.misses is None else set(figure.misses["cell"])
     rows = [
         _row(label, [cells[level] for level in levels if level in cells], missed)
         for label, levels in _paper_rows(cells)
     ]
     rows += [
-        (f"without taxis, N = {level.value:g}", "", _performance(cell), str(cell.performance.size))
-        for level, cell in ablated.items()
-        if level.name == "random-walk"
+        (f"without taxis, N = {cell.n_robots}", "", wording.mean_p(cell), str(cell.n_seeds))
+        for cell in rows_of(p[(p["kind"] == "policy") & (p["factor"] == "random-walk")])
     ]
     lines = [
         table(("", "paper's P", "ours, mean [95 %]", "seeds"), rows),
@@ -68,16 +65,16 @@ def paper_block(parts: list[StudyResults]) -> str:
             f"width is {figure.mean_interval_width:.1f} items (the others are bold). The second "
             "count is a weak test: quite different controllers pass it as well."
         )
-    if any(cell.saturated for cell in cells.values()):
+    if counted["saturated"].any():
         lines.append(
             f"{wording.SATURATED}: in some run every item was delivered, so this P is capped and "
             "what rests on it as well."
         )
-    lines += ["", *_claims([test for part in parts for test in part.tests])]
+    lines += ["", *_claims([test for part in parts for test in rows_of(part.indicators)])]
     return "\n".join(lines)
 
 
-def _paper_rows(cells: Mapping[Setting, Cell]) -> list[tuple[str, list[Setting]]]:
+def _paper_rows(cells: Mapping[Setting, Row]) -> list[tuple[str, list[Setting]]]:
     """Return the rows: a label, and the levels that stand side by side in it."""
     factors: dict[str, list[Setting]] = {}
     for level in cells:
@@ -101,32 +98,28 @@ def _label(levels: list[Setting], n_items: int) -> str:
     return f"{_FAULTS[name]}, m = {values}" if levels[0].value else "no fault"
 
 
-def _row(label: str, cells: list[Cell], missed: set[Setting]) -> tuple[str, ...]:
+def _row(label: str, cells: list[Row], missed: set[str]) -> tuple[str, ...]:
     published = [
-        f"**{cell.published:g}**" if cell.arm.setting in missed else f"{cell.published:g}"
+        f"**{cell.published:g}**" if cell.cell in missed else f"{cell.published:g}"
         for cell in cells
     ]
-    seeds = dict.fromkeys(str(cell.performance.size) for cell in cells)
-    ours = [_performance(cell) for cell in cells]
+    seeds = dict.fromkeys(str(cell.n_seeds) for cell in cells)
+    ours = [wording.mean_p(cell) for cell in cells]
     return label, ", ".join(published), ", ".join(ours), ", ".join(seeds)
 
 
-def _performance(cell: Cell) -> str:
-    return wording.items(cell.mean) + (wording.SATURATED if cell.saturated else "")
-
-
-def _claims(tests: list[IndicatorTest]) -> list[str]:
+def _claims(tests: list[Row]) -> list[str]:
     """Return how many claims of the paper's text are supported, and which are not."""
-    claims = [test for test in tests if test.claim is not None]
+    claims = [test for test in tests if test.claim]
     if not claims:
         return []
-    said = [wording.counted_as(test, test.on_claim(test.adjusted_verdict)) for test in claims]
+    said = [wording.counted_as(test, test.claim_verdict_holm) for test in claims]
     text = (
         f"Of {len(claims)} claims (those of the paper's text, and that P falls without taxis), "
         f"adjusted after Holm: {wording.counted(Counter(said))}."
     )
     refuted = [
-        f"{test.claim_text}, {test.comparison.label}"
+        f"{test.claim}, {test.comparison}"
         for test, verdict in zip(claims, said)
         if verdict == "refuted"
     ]
@@ -140,16 +133,15 @@ def policies_block(results: StudyResults, skewed: StudyResults) -> str:
     """Return P and the indicators of every policy, those of `skewed` in place of the others."""
     names = judged_policies(results)
     rows: dict[str, dict[str, str]] = {}
-    for cell in results.cells:
-        if cell.arm.setting.kind in ("size", "parameter"):
-            rows.setdefault(f"P, {cell.arm.setting}", {})[cell.policy] = _performance(cell)
-    for test in (*results.tests, *skewed.tests):
-        comparison = test.comparison
-        label = f"{comparison.indicator}, {comparison.label}"
-        mark = _EXACT if test.unaffected else ""
-        rows.setdefault(label, {})[comparison.policy] = wording.ratio(test) + mark
+    for cell in rows_of(results.performance):
+        if cell.kind in ("size", "parameter"):
+            rows.setdefault(f"P, {cell.cell}", {})[cell.policy] = wording.mean_p(cell)
+    for test in (*rows_of(results.indicators), *rows_of(skewed.indicators)):
+        mark = _EXACT if test.verdict == "unaffected" else ""
+        label = f"{test.indicator}, {test.comparison}"
+        rows.setdefault(label, {})[test.policy] = wording.ratio(test) + mark
     first, count, more = results.plan.seeds[0], len(results.plan.seeds), len(skewed.plan.seeds)
-    replaced = dict.fromkeys(f"{j.indicator}, {j.comparison.label}" for j in skewed.tests)
+    replaced = dict.fromkeys(f"{j.indicator}, {j.comparison}" for j in rows_of(skewed.indicators))
     fewer = [f"`{name}`" for name in judged_policies(skewed)]
     text = (
         f"{count} seeds from {first:,} on, on which nothing was fitted; {more} for "
@@ -157,7 +149,7 @@ def policies_block(results: StudyResults, skewed: StudyResults) -> str:
     )
     head = ("", *(f"`{name}`" for name in names))
     body = [(label, *(row.get(name, "") for name in names)) for label, row in rows.items()]
-    if any(test.unaffected for test in results.tests):
+    if (results.indicators["verdict"] == "unaffected").any():
         text += (
             f"\nThe sign{_EXACT} marks what is {wording.UNAFFECTED}: equal runs, an exact value, "
             "and no evidence."
@@ -167,17 +159,14 @@ def policies_block(results: StudyResults, skewed: StudyResults) -> str:
 
 def _shortfall(results: StudyResults) -> list[str]:
     """Return a sentence: by how much the networks fall short of `homing`, which they imitate."""
-    unbroken = {
-        cell.policy: cell
-        for cell in results.cells
-        if cell.arm.setting.kind == "fault" and cell.arm.setting.name == "none"
-    }
+    p = results.performance
+    unbroken = {cell.policy: cell for cell in rows_of(p[p["factor"] == "none"])}
     networks = [name for name in unbroken if name.startswith("ppo-")]
     if "homing" not in unbroken or not networks:
         return []
     told, short = [], True
     for name in networks:
-        change = spi.relative_change(unbroken["homing"].performance, unbroken[name].performance)
+        change = spi.relative_change(unbroken["homing"].by_seed, unbroken[name].by_seed)
         sign, word = (-1.0, "less") if change.value < 0.0 else (1.0, "more")
         limits = ""
         if change.low is not None and change.high is not None:
@@ -185,7 +174,7 @@ def _shortfall(results: StudyResults) -> list[str]:
             limits = f" [{low:.1f}, {high:.1f}]"
             short = short and change.high < 0.0
         told.append(f"`{name}` {100 * abs(change.value):.1f} %{limits} {word}")
-    robots = unbroken["homing"].arm.condition.scenario.n_robots
+    robots = unbroken["homing"].n_robots
     text = (
         f"The networks imitate `homing`{' and fall short of it' if short else ''}: at N = {robots} "
         f"without faults, paired by seed, {', '.join(told)}."

@@ -13,6 +13,7 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
 ROOT = Path(__file__).parents[1]
@@ -97,24 +98,24 @@ def test_the_blocks_quote_what_was_played(tables: Any, small: Path, tmp_path: Pa
     first, second = (study.findings() for study in tables.paper_studies(tmp_path / "out"))
     sizes = next(line for line in paper.splitlines() if line.startswith("| N = 5, 10 (60 items)"))
     assert "| 9, 18 |" in sizes.replace("**", "")
-    for cell in first.cells[:2]:
-        assert f"{cell.performance.mean():.1f} [" in sizes
-    counted = [c for c in (*first.cells, *second.cells) if c.counted]
-    inside = sum(bool(c.mean and c.mean.low <= c.published <= c.mean.high) for c in counted)
+    for mean in first.performance["mean"][:2]:
+        assert f"{mean:.1f} [" in sizes
+    counted = [c for part in (first, second) for c in rows_of(part.performance) if c.counted]
+    inside = sum(c.low <= c.published <= c.high for c in counted)
     assert f"{inside} of {len(counted)} lie inside the 95 % interval of our mean" in paper
-    logs = [abs(np.log(c.performance.mean() / c.published)) for c in counted]
+    logs = [abs(np.log(c.mean / c.published)) for c in counted]
     assert f"is {np.mean(logs):.3f} over the {len(counted)} published values" in paper
 
     main, skewed = (study.findings() for study in tables.policy_studies(tmp_path / "out"))
-    unbroken = {c.policy: c.performance for c in main.cells if c.arm.setting.name == "none"}
+    unbroken = {c.policy: c.by_seed for c in rows_of(main.performance) if c.factor == "none"}
     change = spi.relative_change(unbroken["homing"], unbroken["ppo-delivery"])
     assert f"`ppo-delivery` {abs(100 * change.value):.1f} %" in policies
     assert policies.rstrip().endswith("less." if change.value < 0 else "more.")
     assert "The networks imitate `homing`" in policies
     # FM4 of swarm-dt comes from the study with more seeds, of the others from the first.
     row = next(line for line in policies.splitlines() if line.startswith("| R, FM4, m = 2"))
-    values = {j.comparison.policy: j.estimate for j in main.tests if j.comparison.indicator == "R"}
-    (more,) = [j.estimate for j in skewed.tests if j.comparison.indicator == "R"]
+    values = {j.policy: j for j in rows_of(main.indicators) if j.indicator == "R"}
+    (more,) = [j for j in rows_of(skewed.indicators) if j.indicator == "R"]
     assert row.split("|")[2].strip().startswith(f"{more.value:.3f}")
     assert row.split("|")[3].strip().startswith(f"{values['homing'].value:.3f}")
 
@@ -174,10 +175,10 @@ def test_foraging_stands_beside_the_warehouse(
     assert text.startswith("|  | foraging: `forager` | warehouse: `swarm-dt` |")
     for study, column in zip(small, (2, 3), strict=True):
         results = study.findings()
-        five = next(c for c in results.cells if str(c.arm.setting) == "N = 5").performance
+        five = next(c for c in rows_of(results.performance) if c.cell == "N = 5")
         (row,) = [line for line in text.splitlines() if line.startswith("| P, N = 5 |")]
-        assert row.split("|")[column].strip().startswith(f"{five.mean():.1f} [")
-        (robustness,) = [test for test in results.tests if test.indicator == "R"]
+        assert row.split("|")[column].strip().startswith(f"{five.mean:.1f} [")
+        (robustness,) = [test for test in rows_of(results.indicators) if test.indicator == "R"]
         (row,) = [line for line in text.splitlines() if line.startswith("| R, FM4, m = 2 |")]
         assert wording.ratio(robustness) in row.split("|")[column]
     # The real studies ask the same of both worlds, and their table stands on the page.

@@ -172,7 +172,7 @@ def power_command(
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
     for demand in demands(results, effect, power):
-        comparison = demand.test.comparison
+        comparison = demand.test.compared
         name = f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}"
         if indicator not in (None, comparison.indicator) or at not in name:
             continue
@@ -189,7 +189,7 @@ def power_command(
     if not rows:
         asked_for = [] if indicator is None else [f"--indicator {indicator}"]
         asked_for += [f"--at {at!r}"] if at else []
-        made = dict.fromkeys(j.indicator for j in results.tests)
+        made = results.indicators["indicator"].unique()
         raise StudyError(
             f"{' '.join(asked_for) or asked}: the study makes no such comparison; "
             f"it asks about {', '.join(made) or 'nothing'}"

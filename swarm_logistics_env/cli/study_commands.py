@@ -59,16 +59,13 @@ def plan_command(
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.studies.pilot import expect
+    from swarm_logistics_env.studies.pilot import expected_seconds
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
-    expected = expect(plan)
+    seconds = expected_seconds(plan)
     show(_conditions(plan))
     typer.echo(plan)
-    typer.echo(
-        f"On one process of this machine at most {duration(expected.seconds)}, with a store of "
-        f"{expected.size / 1e6:.1f} MB"
-    )
+    typer.echo(f"On one process of this machine at most {duration(seconds)}")
 
 
 @study.command("run")

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from swarm_logistics_env.report.figures import (
-    Figure,
-    indicator_figures,
-    scaling_figure,
+from swarm_logistics_env.report.figures import Figure, indicator_figures, scaling_figure
+from swarm_logistics_env.report.further_measures import (
+    budget_sections,
+    load_sections,
+    look_sections,
+    size_sections,
 )
-from swarm_logistics_env.report.further_measures import beyond, beyond_faults, checks
-from swarm_logistics_env.report.policies_compared import compared
+from swarm_logistics_env.report.policies_compared import policy_sections
+from swarm_logistics_env.report.resilience_sections import resilience_sections
 from swarm_logistics_env.report.result_tables import Section, tables, warnings
 from swarm_logistics_env.report.setup_sheet import setup_sheet
 from swarm_logistics_env.report.wording import sentence
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import size_series
 
@@ -44,85 +47,60 @@ class Document:
     chapters: tuple[Chapter, ...]
     summary: tuple[Section, ...]
 
+    def figures(self) -> Iterator[Figure]:
+        """Yield every figure, in the order of the report."""
+        for chapter in self.chapters:
+            for section in chapter.sections:
+                yield from section.figures
+
 
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
-    text = [
-        (
-            f"{plan.specification.name}: {len(plan.conditions)} conditions, {len(plan.seeds)} "
-            f"{'seed' if len(plan.seeds) == 1 else 'seeds'} of each; every verdict holds for the "
-            "conditions of the set-up sheet below and for no others."
-        )
-    ]
+    seeds = "1 seed" if len(plan.seeds) == 1 else f"{len(plan.seeds)} seeds"
+    about = (
+        f"{plan.specification.name}: {len(plan.conditions)} conditions, {seeds} of each; every "
+        "verdict holds for the conditions of the set-up sheet below and for no others."
+    )
+    text = [about]
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
-    table_sections, fault_sections = tuple(tables(results)), tuple(beyond_faults(results))
-    chapters = _chapters(results, table_sections, fault_sections)
-    lines = warnings(results)
+    result_tables, lines = tuple(tables(results)), warnings(results)
+    faults = *budget_sections(results), *resilience_sections(results), *load_sections(results)
     summary = (
-        *table_sections,
+        *result_tables,
         *([Section("Warnings", lines=lines)] if lines else []),
-        *(replace(one, figures=()) for one in fault_sections if one.columns or one.lines),
+        *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
-    return Document(
-        f"Study {plan.specification.name!r}",
-        tuple(text),
-        tuple(_names_once(chapter for chapter in chapters if chapter.sections)),
-        summary,
-    )
-
-
-def _names_once(chapters: Iterable[Chapter]) -> Iterator[Chapter]:
-    """Yield chapters whose figures have names of their own, upper and lower case being one.
-
-    Policies and tables that differ in punctuation alone give equal names.
-    """
+    chapters = tuple(one for one in _chapters(results, result_tables, faults) if one.sections)
+    whole = Document(f"Study {plan.specification.name!r}", tuple(text), chapters, summary)
+    # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
-
-    def named(figure: Figure) -> Figure:
+    for figure in whole.figures():
         name, number = figure.name, 1
-        while name.lower() in taken:
+        while figure.name.lower() in taken:
             number += 1
-            name = f"{figure.name}-{number}"
-        taken.add(name.lower())
-        return replace(figure, name=name)
-
-    for chapter in chapters:
-        yield replace(
-            chapter,
-            sections=tuple(
-                replace(section, figures=tuple(named(figure) for figure in section.figures))
-                for section in chapter.sections
-            ),
-        )
-
-
-def figures_of(whole: Document) -> Iterator[Figure]:
-    """Yield every figure of a report, in its order."""
-    for chapter in whole.chapters:
-        for section in chapter.sections:
-            yield from section.figures
+            figure.name = f"{name}-{number}"
+        taken.add(figure.name.lower())
+    return whole
 
 
 def _chapters(
     results: StudyResults,
-    table_sections: tuple[Section, ...],
-    fault_sections: tuple[Section, ...],
+    result_tables: tuple[Section, ...],
+    faults: tuple[Section, ...],
 ) -> Iterator[Chapter]:
     series = size_series(results)
-    yield Chapter(
-        "Warnings", "", tuple([Section("", lines=lines)] if (lines := warnings(results)) else [])
-    )
+    figures = [
+        *indicator_figures(results),
+        *(scaling_figure(results, one) for one in series if one.cells["n_seeds"].any()),
+    ]
+    lines = warnings(results)
+    yield Chapter("Warnings", "", (Section("", lines=lines),) if lines else ())
     yield Chapter(
         "Figures",
         "The paper's indicators; raw P and the numbers stand in the tables below.",
-        tuple(Section("", figures=(figure,)) for figure in indicator_figures(results))
-        + tuple(
-            Section("", figures=(scaling_figure(results, one),))
-            for one in series
-            if one.performance
-        ),
+        tuple(Section("", figures=(figure,)) for figure in figures),
     )
     yield Chapter(
         "Verdicts",
@@ -134,31 +112,29 @@ def _chapters(
         "Results",
         "P is the number of items delivered. Square brackets hold intervals at the level that the "
         'heading gives; "one run" is where a single further run falls.',
-        table_sections,
+        result_tables,
     )
-    yield Chapter("Checks", "How far the verdicts hang on the method.", tuple(checks(results)))
+    yield Chapter(
+        "Checks", "How far the verdicts hang on the method.", tuple(look_sections(results))
+    )
     yield Chapter(
         "Policies compared",
         "Side by side, seed by seed; the first policy of the study is the one that the others are "
         "measured against.",
-        tuple(compared(results)),
+        tuple(policy_sections(results)),
     )
     yield Chapter(
         "Beyond the paper",
         "Measures that the paper does not define; none of them enters a verdict above.",
-        (*beyond(results, series), *fault_sections),
+        (*size_sections(results, series), *faults),
     )
     yield Chapter("Set-up", "", setup_sheet(results.plan))
 
 
 def _verdicts(results: StudyResults) -> Iterator[Section]:
-    families = dict.fromkeys((j.policy, j.indicator) for j in results.tests)
-    for policy, indicator in families:
+    families = groups_of(results.indicators, "policy", "indicator")
+    for (policy, indicator), tests in families:
         yield Section(
             f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(
-                sentence(results, test)
-                for test in results.tests
-                if (test.policy, test.indicator) == (policy, indicator)
-            ),
+            sentences=tuple(sentence(results, test) for test in rows_of(tests)),
         )

@@ -6,17 +6,20 @@ paper `PAPER`, so that a page can put its own colours in their place.
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from swarm_logistics_env.spi.scaling import ScalingFit
-from swarm_logistics_env.studies.size_series import SizeSeries
+from swarm_logistics_env.studies.fault_measures import RepairCurve
+from swarm_logistics_env.studies.performance_table import groups_of
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
@@ -27,42 +30,69 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # 
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
 WIDTH = 5.2  # inch: still legible at the width of a phone
+_STYLE: Any = {
+    "axes.edgecolor": INK,
+    "axes.facecolor": "none",
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.labelcolor": INK,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": "medium",
+    "figure.facecolor": PAPER,
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "grid.alpha": 0.25,
+    "grid.color": INK,
+    "grid.linewidth": 0.5,
+    "legend.columnspacing": 1.2,
+    "legend.fontsize": 9.0,
+    "legend.frameon": False,
+    "legend.handletextpad": 0.5,
+    "lines.linewidth": 1.6,
+    "savefig.facecolor": PAPER,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "swarm-logistics-env",
+    "text.color": INK,
+    "text.parse_math": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+_NO_METADATA = {"Creator": None, "Date": None, "Format": None, "Type": None}
+DOTS_PER_INCH = 200
 LAWS = {"usl": "USL", "power_exponential": "kN^p exp(-qN)"}
 
 
-@dataclass(frozen=True)
-class Point:
-    """One value in its category; None: it is not known."""
+def images(draw: Draw, height: float) -> tuple[str, bytes]:
+    """Return a drawing of the given height [inch] as SVG and as PNG; equal ones as equal bytes."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure as NewCanvas
 
-    category: str
-    value: float | None
-    low: float | None
-    high: float | None
-    decided: bool
-    saturated: bool
-    published: float | None
-
-
-@dataclass(frozen=True)
-class Series:
-    """Points of one label, drawn alike.
-
-    Attributes:
-        style: place of its colour and marker; None: that of the series in its panel.
-    """
-
-    label: str
-    points: tuple[Point, ...]
-    style: int | None = None
+    svg, png = io.StringIO(), io.BytesIO()
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        canvas = NewCanvas(figsize=(WIDTH, height), layout="constrained")
+        draw(canvas)
+        canvas.savefig(svg, format="svg", metadata=_NO_METADATA)
+        canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return svg.getvalue(), png.getvalue()
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes: series over shared categories, and thresholds."""
+    """One pair of axes: series over shared categories, and thresholds.
+
+    Attributes:
+        points: a row for each point, with the columns `series` (label), `style` (place of its
+            colour and marker), `category`, `value`, `low`, `high`, `decided` (filled), `saturated`
+            (marked) and `published` (a cross beside it); missing numbers are NaN.
+    """
 
     title: str
     y_label: str
-    series: tuple[Series, ...]
+    points: pd.DataFrame
     thresholds: tuple[float, ...]
     x_label: str
 
@@ -72,64 +102,58 @@ def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
     grid = canvas.subplots(len(panels), 1, squeeze=False)
     for axes, panel in zip(grid[:, 0], panels):
         _panel(axes, panel)
-    if len(panels[0].series) > 1:
-        legend(canvas, grid[0, 0], lines=False)
+    if len(panels[0].points["style"].unique()) > 1:
+        _legend(canvas, grid[0, 0], lines=False)
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
-    categories = list(dict.fromkeys(p.category for s in panel.series for p in s.points))
+    categories = list(panel.points["category"].unique())
     bottom, top = _range(panel)
     for threshold in panel.thresholds:
         if bottom <= threshold <= top:
             axes.axhline(threshold, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
-    spread = min(0.8, 0.24 * len(panel.series))
-    for index, series in enumerate(panel.series):
-        shift = spread * ((index + 0.5) / len(panel.series) - 0.5)
-        style = index if series.style is None else series.style
+    styles = sorted(panel.points["style"].unique())
+    spread = min(0.8, 0.24 * len(styles))
+    for index, style in enumerate(styles):
+        shift = spread * ((index + 0.5) / len(styles) - 0.5)
         colour, marker = COLOURS[style % len(COLOURS)], MARKERS[style % len(MARKERS)]
-        points = [(categories.index(p.category) + shift, p) for p in series.points]
-        known = [(x, point, point.value) for x, point in points if point.value is not None]
-        _bars(axes, [(x, p.low, p.high) for x, p, _ in known], (bottom, top), colour)
+        points = panel.points[panel.points["style"] == style]
+        points = points.assign(x=points["category"].map(categories.index) + shift)
+        known = points.dropna(subset="value")
+        _bars(axes, known["x"], known["low"], known["high"], (bottom, top), colour)
         for decided in (True, False):
-            here = [(x, value) for x, point, value in known if point.decided is decided]
-            axes.plot(
-                [x for x, _ in here],
-                [value for _, value in here],
-                marker,
-                color=colour,
-                markerfacecolor=colour if decided else PAPER,
-                markersize=6,
-                zorder=3,
-                # Only the filled marks name the series.
-                label=series.label if decided else None,
-            )
+            here = known[known["decided"] == decided]
+            # Only the filled marks name the series.
+            label = points["series"].iloc[0] if decided else None
+            fill = colour if decided else PAPER
+            (marks,) = axes.plot(here["x"], here["value"], marker, color=colour, zorder=3)
+            marks.set(markerfacecolor=fill, label=label)
         # Beside the mark, which would hide it.
-        published = [(x + 0.1, p.published) for x, p in points if p.published is not None]
-        axes.plot(*_columns(published), "x", color=INK, markersize=4.5, zorder=4)
-        for x, _, value in (point for point in known if point[1].saturated):
-            axes.annotate("†", (x, value), (-9, 3), textcoords="offset points", fontsize=9)
+        published = points.dropna(subset="published")
+        crosses = published["x"] + 0.1, published["published"]
+        axes.plot(*crosses, "x", color=INK, markersize=4.5, zorder=4)
+        capped = known[known["saturated"]]
+        for place in zip(capped["x"], capped["value"]):
+            axes.annotate("†", place, (-9, 3), textcoords="offset points", fontsize=9)
     axes.set_xticks(range(len(categories)), categories)
     if len(categories) > 6:
         axes.tick_params(axis="x", labelsize=8.0)
     if sum(len(category) + 2 for category in categories) > 80:
         axes.tick_params(axis="x", rotation=40)
-    axes.set_xlim(-0.6, len(categories) - 0.4)
-    axes.set_ylim(bottom, top)
-    axes.set(ylabel=panel.y_label, xlabel=panel.x_label)
-    axes.set_title(panel.title, fontsize="medium", loc="left")
-    axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
+    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=(bottom, top))
+    axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
 def _range(panel: Panel) -> tuple[float, float]:
     """Axis limits: all values and thresholds, and intervals up to twice their span beyond."""
-    points = [p for s in panel.series for p in s.points]
-    values = [x for p in points for x in (p.value, p.published) if x is not None]
+    values = [*panel.points["value"].dropna(), *panel.points["published"].dropna()]
     inner = [*values, *panel.thresholds[:1]]
     if values and max(values) > 0.5 * panel.thresholds[-1]:
         inner.append(panel.thresholds[-1])
     low, high = min(inner), max(inner)
     reach = max(2.0 * (high - low), 1.5)
-    ends = [x for p in points for x in (p.low, p.high) if x is not None and math.isfinite(x)]
+    limits = [*panel.points["low"], *panel.points["high"]]
+    ends = [limit for limit in limits if math.isfinite(limit)]
     low = max(low - reach, min([low, *ends]))
     high = min(high + reach, max([high, *ends]))
     margin = 0.06 * max(high - low, 0.5)
@@ -138,92 +162,129 @@ def _range(panel: Panel) -> tuple[float, float]:
 
 def _bars(
     axes: Axes,
-    bars: Sequence[tuple[float, float | None, float | None]],
+    x: pd.Series[float],
+    low: pd.Series[float],
+    high: pd.Series[float],
     limits: tuple[float, float],
     colour: str,
 ) -> None:
-    """Draw intervals (x, low, high); an arrow where one leaves the axis limits."""
+    """Draw intervals; an arrow where one leaves the axis limits."""
     bottom, top = limits
-    known = [(x, low, high) for x, low, high in bars if low is not None and high is not None]
-    axes.vlines(
-        [x for x, _, _ in known],
-        [max(low, bottom) for _, low, _ in known],
-        [min(high, top) for _, _, high in known],
-        color=colour,
-        linewidth=1.4,
-        zorder=2,
-    )
-    ends = [(x, end) for x, low, high in known for end in (low, high) if bottom <= end <= top]
-    axes.plot(*_columns(ends), "_", color=colour, markersize=5)
-    for edge, arrow, leaving in (
-        (bottom, "v", [x for x, low, _ in known if low < bottom]),
-        (top, "^", [x for x, _, high in known if high > top]),
-    ):
-        if leaving:  # an empty line that is not clipped spoils the layout
+    known = low.notna()
+    x, low, high = x[known], low[known], high[known]
+    ends = low.clip(lower=bottom), high.clip(upper=top)
+    axes.vlines(x, *ends, color=colour, linewidth=1.4, zorder=2)
+    for limit in (low, high):
+        inside = limit.between(bottom, top)
+        axes.plot(x[inside], limit[inside], "_", color=colour, markersize=5)
+    for edge, arrow, leaving in ((bottom, "v", x[low < bottom]), (top, "^", x[high > top])):
+        if len(leaving):  # an empty line that is not clipped spoils the layout
             edges = [edge] * len(leaving)
             axes.plot(leaving, edges, arrow, color=colour, markersize=5, clip_on=False)
 
 
-def _columns(pairs: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
-    return [x for x, _ in pairs], [y for _, y in pairs]
-
-
-def size_grid(sizes: Sequence[int]) -> list[float]:
+def size_grid(sizes: Iterable[float]) -> list[float]:
     """Return swarm sizes [robots] at which fitted laws are drawn."""
+    sizes = list(sizes)
     return [float(n) for n in np.linspace(min(sizes), 1.1 * max(sizes), 60).round(6)]
 
 
-def scaling(canvas: Canvas, series: SizeSeries, fits: Sequence[ScalingFit]) -> None:
+def scaling(canvas: Canvas, cells: pd.DataFrame, fits: Sequence[ScalingFit], label: str) -> None:
     """Draw P(N), fitted laws, and N* with its interval at the foot."""
     axes = canvas.subplots()
-    grid = size_grid(series.sizes)
+    grid = size_grid(cells["value"])
     right = grid[-1]
     curves = {fit.law: fit.predict(grid) for fit in fits}
-    tops = [mean.value if mean.high is None else mean.high for mean in series.performance]
+    tops = cells["high"].fillna(cells["mean"])
     highest = max([*tops, *(float(curve.max()) for curve in curves.values()), 1.0])
     for fit in sorted(fits, key=lambda fit: list(LAWS).index(fit.law)):
         place = list(LAWS).index(fit.law)
         colour, marker = COLOURS[place + 1], MARKERS[place + 1]
-        axes.plot(
-            grid, curves[fit.law], LINES[place], color=colour, label=LAWS[fit.law], linewidth=1.6
-        )
+        axes.plot(grid, curves[fit.law], LINES[place], color=colour, label=LAWS[fit.law])
         if fit.peak is None or fit.peak_low is None or fit.peak_high is None:
             continue
         height = -(0.06 + 0.07 * place) * highest
         low, high = min(fit.peak_low, right), min(fit.peak_high, right)
-        axes.plot([low, high], [height, height], color=colour, linewidth=1.6)
+        axes.plot([low, high], [height, height], color=colour)
         axes.plot(low, height, "|", color=colour, markersize=7)
-        goes_on = fit.peak_high > right
-        axes.plot(
-            high, height, ">" if goes_on else "|", color=colour, markersize=6, clip_on=not goes_on
-        )
+        end = ">" if fit.peak_high > right else "|"
+        axes.plot(high, height, end, color=colour, markersize=6, clip_on=end == "|")
         if fit.peak <= right:
             axes.plot(fit.peak, height, marker, color=colour, markersize=6)
-    means = [(float(size), mean) for size, mean in zip(series.sizes, series.performance)]
-    _bars(axes, [(n, mean.low, mean.high) for n, mean in means], (0.0, math.inf), COLOURS[0])
-    axes.plot(
-        *_columns([(n, mean.value) for n, mean in means]),
-        MARKERS[0],
-        color=COLOURS[0],
-        markersize=5,
-        zorder=3,
-        label="mean P" if series.policy else "P",
-    )
-    for (size, mean), saturated in zip(means, series.saturated):
-        if saturated:
-            axes.annotate("†", (size, mean.value), (5, 2), textcoords="offset points", fontsize=8)
+    _bars(axes, cells["value"], cells["low"], cells["high"], (0.0, math.inf), COLOURS[0])
+    (means,) = axes.plot(cells["value"], cells["mean"], MARKERS[0], color=COLOURS[0], zorder=3)
+    means.set(markersize=5, label=label)
+    capped = cells[cells["saturated"]]
+    for point in zip(capped["value"], capped["mean"]):
+        axes.annotate("†", point, (5, 2), textcoords="offset points", fontsize=8)
     if any(fit.peak is not None for fit in fits):
         axes.axhline(0.0, color=INK, linewidth=0.5)
         axes.annotate("N*", (0.0, -0.08 * highest), (4, -3), textcoords="offset points", fontsize=8)
-    axes.set_xlim(0.0, right)
-    axes.set_ylim(-0.2 * highest if fits else 0.0, 1.08 * highest)
+    axes.set(xlim=(0.0, right), ylim=(-0.2 * highest if fits else 0.0, 1.08 * highest))
     axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= 1.08 * highest])
     axes.set(xlabel="swarm size N [robots]", ylabel="P [items]")
-    axes.grid(axis="y", alpha=0.25, color=INK, linewidth=0.5)
-    legend(canvas, axes, lines=True)
+    _legend(canvas, axes, lines=True)
 
 
-def legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
+def rates(canvas: Canvas, panels: Mapping[str, pd.DataFrame], onset: float, y_label: str) -> None:
+    """Draw deliveries over time, one panel below the other, on one scale.
+
+    Args:
+        canvas: to draw on.
+        panels: the rates (`mid_run_faults.rate_curves`) by the title of their panel.
+        onset: when the fault begins [s].
+        y_label: label of the axis of the rates.
+    """
+    for axes, frame in _over_time(canvas, panels, "end of the window [s]", y_label):
+        for index, (runs, curve) in enumerate(groups_of(frame, "runs")):
+            colour = COLOURS[index % len(COLOURS)]
+            if curve["low"].notna().all():
+                low, high = curve["low"].clip(lower=0.0), curve["high"]
+                axes.fill_between(
+                    curve["seconds"], low, high, color=colour, alpha=0.16, linewidth=0
+                )
+            (line,) = axes.plot(curve["seconds"], curve["deliveries"], color=colour, label=runs)
+            line.set(linestyle=LINES[index % len(LINES)], marker=MARKERS[index % len(MARKERS)])
+            line.set(markevery=(index * 4, 12), markersize=4.5)
+        axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
+        axes.set_ylim(bottom=0.0)
+
+
+def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None:
+    """Draw the share of runs that are not back, one panel below the other, on one scale."""
+    for axes, curves in _over_time(canvas, panels, "time from the onset [s]", "share not back"):
+        # The fault's colour is that of the rates; the null's is none of theirs.
+        for curve, colour, line in zip(curves, (COLOURS[2], INK), LINES):
+            seconds, share, low, high = (
+                np.concatenate([[first], column, column[-1:] if column.size else [first]])
+                for first, column in zip((0.0, 1.0, 1.0, 1.0), curve.curve)
+            )
+            seconds[-1] = curve.followed
+            # Once all runs are back no interval is defined, so the last one ends there.
+            known = int(np.count_nonzero(share > 0.0))
+            ends = [*range(known), known - 1]
+            until = np.append(seconds[:known], seconds[min(known, seconds.size - 1)])
+            band = until, low[ends], high[ends]
+            axes.fill_between(*band, step="post", color=colour, alpha=0.14, linewidth=0)
+            axes.step(seconds, share, line, where="post", color=colour, label=curve.runs)
+            if curve.censored:
+                axes.plot(seconds[-1], share[-1], "x", color=colour, markersize=6, clip_on=False)
+        axes.set(xlim=(0.0, None), ylim=(0.0, 1.05))
+
+
+def _over_time(
+    canvas: Canvas, panels: Mapping[str, Any], x_label: str, y_label: str
+) -> Iterator[tuple[Axes, Any]]:
+    """Yield the axes of each panel to draw on, then label them."""
+    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
+    for axes, (title, curves) in zip(grid[:, 0], panels.items()):
+        yield axes, curves
+        axes.set(ylabel=y_label, title=title)
+    grid[-1, 0].set_xlabel(x_label)
+    _legend(canvas, grid[0, 0], lines=True)
+
+
+def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
     """Put the legend of one pair of axes above all of them."""
     handles, labels = axes.get_legend_handles_labels()
     canvas.legend(
@@ -231,8 +292,5 @@ def legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
         labels,
         loc="outside upper left",
         ncols=min(len(labels), 3),
-        frameon=False,
         handlelength=2.6 if lines else 1.0,
-        handletextpad=0.5,
-        columnspacing=1.2,
     )

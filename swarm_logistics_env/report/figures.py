@@ -1,49 +1,44 @@
-"""Figures of a report: what each shows, as numbers, and how it is drawn. Nothing is drawn here."""
+"""Figures of the indicators and of P against N: what each shows, as a table and as a drawing."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from swarm_logistics_env.report import drawing
-from swarm_logistics_env.report.drawing import Panel, Point, Series
+from swarm_logistics_env.report.drawing import Panel
 from swarm_logistics_env.report.wording import listed, percent, seeds_text
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
-from swarm_logistics_env.studies.results import IndicatorTest, StudyResults, Value
+from swarm_logistics_env.studies.performance_table import groups_of, rows_of
+from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import SizeSeries
 
-_Key = TypeVar("_Key")
+if TYPE_CHECKING:
+    import pandas as pd
 
 
-@dataclass(frozen=True)
+@dataclass
 class Figure:
     """One figure.
 
     Attributes:
         name: of its files, without ending; letters, digits and hyphens.
         caption: what it shows and under which conditions, in full.
-        columns, rows: its data.
+        data: what it shows, one row a point.
         height: of the drawing [inch]; the width is that of all figures.
         draw: draws it on an empty canvas.
     """
 
     name: str
     caption: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Value, ...], ...]
+    data: pd.DataFrame
     height: float
     draw: drawing.Draw
-
-
-def marks(results: StudyResults) -> str:
-    """Return what the marks of a figure of indicators mean."""
-    return (
-        "Filled: the Holm-adjusted verdict is decided; hollow: inconclusive; bars: "
-        f"{percent(results.confidence)} intervals, an arrow where a bar leaves the axis; dashed: "
-        "thresholds"
-    )
 
 
 def indicator_figures(results: StudyResults) -> Iterator[Figure]:
@@ -55,100 +50,128 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
 
 
 def _scalability(results: StudyResults) -> Iterator[Figure]:
-    for table, here in _grouped(_thresholded(results, "size"), lambda j: j.table):
-        yield _intervals(
+    for table, tests in groups_of(_asked(results, "size"), "table"):
+        yield _interval_figure(
             results,
-            slug(_symbols(here), table),
-            f"{_policies(here)}, {table}: {_caption(here, 'per step in N')}",
-            here,
-            _panels(here, "swarm size N → N + m", lambda js: _by_policy(js, _step)),
+            slug(_symbols(tests), table),
+            f"{_policies(tests)}, {table}: {_caption(tests, 'per step in N')}",
+            tests,
+            _panels(_by_policy(tests, _steps(tests)), "swarm size N → N + m"),
         )
 
 
 def _faults(results: StudyResults) -> Iterator[Figure]:
-    asked = _thresholded(results, "fault")
-    first = asked[0].policy if asked else ""
-    for (policy, table, onset), here in _grouped(
-        asked, lambda j: (j.policy, j.table, j.comparison.changed.setting.onset)
-    ):
-
-        def by_m(tests: list[IndicatorTest], shown: bool = policy == first) -> tuple[Series, ...]:
-            return tuple(
-                Series(f"m = {m:g}", tuple(_points(js, _mode, published=shown)))
-                for m, js in _grouped(tests, lambda j: j.comparison.changed.setting.value)
-            )
-
-        swarm = here[0].comparison.original.condition.size
+    asked = _asked(results, "fault")
+    groups = groups_of(asked, "policy", "table", "onset", "n_robots")
+    for (policy, table, onset, swarm), tests in groups:
         start = f", faults from {onset:g} s" if onset else ""
-        yield _intervals(
+        points = tests.assign(
+            series=tests["after"].map("m = {:g}".format), category=tests["factor"]
+        )
+        if policy != asked["policy"].iloc[0]:
+            points["published"] = np.nan  # crosses for one policy are enough
+        yield _interval_figure(
             results,
-            slug(_symbols(here), policy, table, f"{onset:g}s" if onset else ""),
+            slug(_symbols(tests), policy, table, f"{onset:g}s" if onset else ""),
             f"{policy}, {table}, N = {swarm}{start}: "
-            f"{_caption(here, 'per failure mode and number m of faulty robots')}",
-            here,
-            _panels(here, "failure mode", by_m),
+            f"{_caption(tests, 'per failure mode and number m of faulty robots')}",
+            tests,
+            _panels(points, "failure mode"),
         )
 
 
 def _adaptability(results: StudyResults) -> Iterator[Figure]:
-    asked = _thresholded(results, "parameter")
+    asked = _asked(results, "parameter")
+    if asked.empty:
+        return
+    points = _by_policy(asked, _steps(asked))
     panels = [
-        replace(panel, title=table)
-        for (table, name), here in _grouped(
-            asked, lambda j: (j.table, j.comparison.changed.setting.name)
-        )
-        for panel in _panels(here, f"{name}, x_o → x_new", lambda js: _by_policy(js, _step))
+        panel
+        for (table, name), here in groups_of(points, "table", "factor")
+        for panel in _panels(here, f"{name}, x_o → x_new", title=table)
     ]
-    if asked:
-        caption = f"{_policies(asked)}: {_caption(asked, 'per parameter')}"
-        yield _intervals(results, slug(_symbols(asked)), caption, asked, panels)
+    caption = f"{_policies(asked)}: {_caption(asked, 'per parameter')}"
+    yield _interval_figure(results, slug(_symbols(asked)), caption, asked, panels)
 
 
 def _ablations(results: StudyResults) -> Iterator[Figure]:
-    asked = [j for j in results.tests if j.comparison.definition.compares == "policy"]
-    for table, here in _grouped(asked, lambda j: j.table):
+    asked = results.indicators[results.indicators["kind"] == "policy"]
+    for table, tests in groups_of(asked, "table"):
         # 0 first: it is the threshold that always stands in the picture.
-        thresholds = tuple(dict.fromkeys([0.0, *(j.comparison.threshold for j in here)]))
-        panels = _panels(here, "in its place", lambda js: _by_policy(js, _label))
-        yield _intervals(
+        thresholds = tuple(dict.fromkeys([0.0, *tests["threshold"]]))
+        points = _by_policy(tests, tests["comparison"])
+        yield _interval_figure(
             results,
-            slug(_symbols(here), table),
-            f"{_policies(here)}, {table}: relative change of P where another policy takes its "
+            slug(_symbols(tests), table),
+            f"{_policies(tests)}, {table}: relative change of P where another policy takes its "
             "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share.",
-            here,
-            [replace(panel, thresholds=thresholds) for panel in panels],
+            tests,
+            _panels(points, "in its place", thresholds=thresholds),
         )
 
 
-def _by_policy(
-    tests: list[IndicatorTest], category: Callable[[IndicatorTest], str]
-) -> tuple[Series, ...]:
-    return tuple(
-        Series(policy, tuple(_points(js, category, published=not index)))
-        for index, (policy, js) in enumerate(_grouped(tests, lambda j: j.policy))
+def _by_policy(tests: pd.DataFrame, categories: pd.Series[str]) -> pd.DataFrame:
+    """Return points of one series a policy; the published values stand beside the first."""
+    first = tests["policy"] == tests["policy"].iloc[0]
+    return tests.assign(
+        series=tests["policy"], category=categories, published=tests["published"].where(first)
     )
 
 
+def _steps(tests: pd.DataFrame) -> pd.Series[str]:
+    return tests["before"].map("{:g}→".format) + tests["after"].map("{:g}".format)
+
+
 def _panels(
-    tests: list[IndicatorTest],
-    x_label: str,
-    series: Callable[[list[IndicatorTest]], tuple[Series, ...]],
+    points: pd.DataFrame, x_label: str, title: str = "", thresholds: tuple[float, ...] = ()
 ) -> list[Panel]:
     """Return a pair of axes for each indicator."""
+    decided = points["verdict_holm"].isin(["supported", "refuted"])
+    points = points.assign(decided=decided, style=points["series"].factorize()[0])
     return [
-        Panel("", definition.axis, series(js), tuple(definition.adjectives), x_label)
-        for definition, js in _by_definition(tests)
+        Panel(
+            title,
+            definition.heading,
+            points[points["indicator"] == definition.symbol],
+            thresholds or tuple(definition.adjectives),
+            x_label,
+        )
+        for definition in _definitions(points)
     ]
+
+
+def _interval_figure(
+    results: StudyResults, name: str, caption: str, tests: pd.DataFrame, panels: Sequence[Panel]
+) -> Figure:
+    """Return the figure of indicators with their intervals."""
+    columns = [
+        "policy", "table", "indicator", "comparison", "value", "low", "high",
+        "verdict", "verdict_holm", "published", "saturated",
+    ]  # fmt: skip
+    crosses = "; crosses: published" if tests["published"].notna().any() else ""
+    marks = (
+        "Filled: the Holm-adjusted verdict is decided; hollow: inconclusive; bars: "
+        f"{percent(results.confidence)} intervals, an arrow where a bar leaves the axis; dashed: "
+        f"thresholds{crosses}."
+    )
+    return Figure(
+        name,
+        f"{caption} {seeds_text(results).capitalize()}. {marks}{_saturation(tests)}",
+        tests[columns],
+        0.5 + 2.5 * len(panels),
+        partial(drawing.intervals, panels=panels),
+    )
 
 
 def scaling_figure(results: StudyResults, series: SizeSeries) -> Figure:
     """Return P(N) with the laws fitted to it under weights 1/P, and N* with its interval."""
-    rows: list[tuple[Value, ...]] = [
-        ("mean P", size, mean.value, mean.low, mean.high)
-        for size, mean in zip(series.sizes, series.performance)
-    ]
+    import pandas as pd
+
+    cells = series.cells.dropna(subset="mean")
     fits = tuple(fit for fit in series.fits if fit.weighting == "1/P")
-    grid = drawing.size_grid(series.sizes)
+    grid = drawing.size_grid(cells["value"])
+    means = cells[["value", "mean", "low", "high"]]
+    rows = [("mean P", *mean) for mean in rows_of(means)]
     for fit in fits:
         rows += [(fit.law, n, p, None, None) for n, p in zip(grid, fit.predict(grid).tolist())]
         rows.append((f"N* of {fit.law}", fit.peak, None, fit.peak_low, fit.peak_high))
@@ -166,57 +189,34 @@ def scaling_figure(results: StudyResults, series: SizeSeries) -> Figure:
     )
     return Figure(
         slug("P-N", series.policy or "published", series.table),
-        f"{who}, {series.table}: P against swarm size N ({seeds}); {laws}."
-        + _saturation(any(series.saturated)),
-        ("what", "N", "P", "low", "high"),
-        tuple(rows),
+        f"{who}, {series.table}: P against swarm size N ({seeds}); {laws}.{_saturation(cells)}",
+        pd.DataFrame(rows, columns=["what", "N", "P", "low", "high"]),
         3.6,
-        lambda canvas: drawing.scaling(canvas, series, fits),
+        partial(drawing.scaling, cells=cells, fits=fits, label="mean P" if series.policy else "P"),
     )
 
 
-def _intervals(
-    results: StudyResults,
-    name: str,
-    caption: str,
-    tests: list[IndicatorTest],
-    panels: Sequence[Panel],
-) -> Figure:
-    columns = (
-        "policy", "table", "indicator", "comparison", "value", "low", "high",
-        "verdict", "verdict_holm", "published", "saturated",
-    )  # fmt: skip
-    records = [test.record() for test in tests]
-    rows = tuple(tuple(record[column] for column in columns) for record in records)
-    published = any(test.published is not None for test in tests)
-    cross = "; crosses: published" if published else ""
-    capped = _saturation(any(test.saturated for test in tests))
-    return Figure(
-        name,
-        f"{caption} {seeds_text(results).capitalize()}. {marks(results)}{cross}.{capped}",
-        columns,
-        rows,
-        0.5 + 2.5 * len(panels),
-        lambda canvas: drawing.intervals(canvas, panels),
-    )
+def _saturation(rows: pd.DataFrame) -> str:
+    capped = rows["saturated"].any()
+    return " †: P is capped, every item was delivered in a run." if capped else ""
 
 
-def _saturation(saturated: bool) -> str:
-    return " †: P is capped, every item was delivered in a run." if saturated else ""
+def _definitions(tests: pd.DataFrame) -> list[Definition]:
+    asked = set(tests["indicator"])
+    return [definition for symbol, definition in DEFINITIONS.items() if symbol in asked]
 
 
-def _by_definition(tests: list[IndicatorTest]) -> list[tuple[Definition, list[IndicatorTest]]]:
-    by_symbol = dict(_grouped(tests, lambda j: j.indicator))
-    return [(row, by_symbol[symbol]) for symbol, row in DEFINITIONS.items() if symbol in by_symbol]
+def _symbols(tests: pd.DataFrame) -> str:
+    return "-".join(definition.symbol for definition in _definitions(tests))
 
 
-def _symbols(tests: list[IndicatorTest]) -> str:
-    return "-".join(definition.symbol for definition, _ in _by_definition(tests))
+def _policies(tests: pd.DataFrame) -> str:
+    return listed(list(tests["policy"].unique()))
 
 
-def _caption(tests: list[IndicatorTest], per: str) -> str:
+def _caption(tests: pd.DataFrame, per: str) -> str:
     """Return what a figure shows, e.g. "robustness R per failure mode; above 0 robust."."""
-    definitions = [definition for definition, _ in _by_definition(tests)]
+    definitions = _definitions(tests)
     above: dict[float, list[str]] = {}
     for definition in definitions:
         for threshold, adjective in definition.adjectives.items():
@@ -225,65 +225,14 @@ def _caption(tests: list[IndicatorTest], per: str) -> str:
     return f"{listed([definition.heading for definition in definitions])} {per}; {says}."
 
 
-def _thresholded(results: StudyResults, factor: Factor) -> list[IndicatorTest]:
+def _asked(results: StudyResults, factor: Factor) -> pd.DataFrame:
     """Return each indicator of a factor once: that asked against the lowest threshold."""
-    first: dict[object, IndicatorTest] = {}
-    for test in results.tests:
-        comparison = test.comparison
-        if comparison.definition.compares != factor:
-            continue
-        key = (
-            comparison.policy, comparison.table, comparison.indicator,
-            comparison.original.setting, comparison.changed.setting,
-        )  # fmt: skip
-        known = first.get(key)
-        if known is None or comparison.threshold < known.comparison.threshold:
-            first[key] = test
-    return list(first.values())
+    tests = results.indicators
+    once = ["policy", "table", "indicator", "comparison"]
+    lowest = tests.groupby(once)["threshold"].transform("min") == tests["threshold"]
+    return tests[(tests["kind"] == factor) & lowest].drop_duplicates(once)
 
 
-def _points(
-    tests: list[IndicatorTest], category: Callable[[IndicatorTest], str], *, published: bool = True
-) -> Iterator[Point]:
-    for test in tests:
-        estimate = test.estimate
-        yield Point(
-            category(test),
-            estimate.value if estimate else None,
-            estimate.low if estimate else None,
-            estimate.high if estimate else None,
-            test.decided,
-            test.saturated,
-            test.published if published else None,
-        )
-
-
-def _step(test: IndicatorTest) -> str:
-    before, after = test.comparison.original.setting, test.comparison.changed.setting
-    return f"{before.value:g}→{after.value:g}"
-
-
-def _mode(test: IndicatorTest) -> str:
-    return test.comparison.changed.setting.name
-
-
-def _label(test: IndicatorTest) -> str:
-    return test.comparison.label
-
-
-def _policies(tests: list[IndicatorTest]) -> str:
-    return listed(list(dict.fromkeys(test.policy for test in tests)))
-
-
-def _grouped(
-    tests: list[IndicatorTest], key: Callable[[IndicatorTest], _Key]
-) -> list[tuple[_Key, list[IndicatorTest]]]:
-    groups: dict[_Key, list[IndicatorTest]] = {}
-    for test in tests:
-        groups.setdefault(key(test), []).append(test)
-    return list(groups.items())
-
-
-def slug(*parts: str) -> str:
+def slug(*parts: object) -> str:
     """Return a name for files of letters, digits and hyphens."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(parts)).strip("-")
+    return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(map(str, parts))).strip("-")

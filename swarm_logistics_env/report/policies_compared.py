@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 from swarm_logistics_env.report import drawing, wording
-from swarm_logistics_env.report.drawing import Panel, Point, Series
+from swarm_logistics_env.report.drawing import Panel
 from swarm_logistics_env.report.figures import Figure, slug
-from swarm_logistics_env.report.result_tables import Section
-from swarm_logistics_env.report.wording import listed, seeds_text
+from swarm_logistics_env.report.result_tables import Column, Section, table_section
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Setting
+from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.policy_comparison import (
     CellAgainstBaseline,
     IndicatorAgainstBaseline,
@@ -19,7 +20,7 @@ from swarm_logistics_env.studies.policy_comparison import (
     indicators_against_baseline,
     judged_policies,
 )
-from swarm_logistics_env.studies.results import StudyResults, Value
+from swarm_logistics_env.studies.results import StudyResults
 
 _HOW_TO_READ = (
     "How many questions got which Holm-adjusted verdict; the questions themselves follow.",
@@ -36,151 +37,153 @@ _HOW_TO_READ = (
 )
 
 
-def compared(results: StudyResults) -> Iterator[Section]:
+def policy_sections(results: StudyResults) -> Iterator[Section]:
     """Yield policy x indicator: verdicts counted, values with differences, P cell by cell."""
     policies = judged_policies(results)
     if len(policies) < 2:
         return
     yield _matrix(results, policies)
-    entries = tuple(indicators_against_baseline(results))
+    questions = list(indicators_against_baseline(results))
     cells_by_table = cells_against_baseline(results)
-    for figure in difference_figures(results, cells_by_table, entries):
-        yield Section("", figures=(figure,))
-    confidence = wording.percent(results.confidence)
-    for table in dict.fromkeys(one.table for one in entries):
-        here = [one for one in entries if one.table == table]
-        yield _indicators(table, here, policies, confidence)
+    for table, cells in cells_by_table.items():
+        here = [one for one in questions if one.test.table == table]
+        yield from _difference_figure(results, table, policies, cells, here)
+    for table in dict.fromkeys(one.test.table for one in questions):
+        here = [one for one in questions if one.test.table == table]
+        yield _indicators(table, here, policies, wording.percent(results.confidence))
     for table, cells in cells_by_table.items():
         yield _cells(table, cells, policies[0])
 
 
-def _matrix(results: StudyResults, policies: tuple[str, ...]) -> Section:
-    properties = dict.fromkeys(
-        j.property_name for j in results.tests if j.comparison.definition.compares != "policy"
-    )
-    rows = []
-    for policy in policies:
-        row = [policy]
-        for name in properties:
-            verdicts = Counter[str](
-                wording.counted_as(j, j.adjusted_verdict)
-                for j in results.tests
-                if j.policy == policy and j.property_name == name
-            )
-            row.append(wording.counted(verdicts) or wording.NOTHING)
-        rows.append(tuple(row))
-    return Section(
-        "Policy x indicator",
-        ("policy", *properties),
-        tuple(rows),
-        (
-            *_HOW_TO_READ,
-            f"All over {wording.seeds_text(results)}.",
-        ),
-    )
+def _matrix(results: StudyResults, policies: Sequence[str]) -> Section:
+    tests = results.indicators[results.indicators["kind"] != "policy"]
+
+    def verdicts(policy: str, name: str) -> str:
+        here = rows_of(tests[(tests["policy"] == policy) & (tests["property"] == name)])
+        counts = Counter(wording.counted_as(test, test.verdict_holm) for test in here)
+        return wording.counted(counts) or wording.NOTHING
+
+    columns: list[Column] = [("policy", str)]
+    columns += [(name, partial(verdicts, name=name)) for name in tests["property"].unique()]
+    lines = (*_HOW_TO_READ, f"All over {wording.seeds_text(results)}.")
+    return table_section("Policy x indicator", policies, columns, *lines)
 
 
 def _indicators(
-    table: str, entries: list[IndicatorAgainstBaseline], policies: tuple[str, ...], confidence: str
+    table: str,
+    questions: Sequence[IndicatorAgainstBaseline],
+    policies: Sequence[str],
+    confidence: str,
 ) -> Section:
-    columns = ["question", *(f"{policy} [{confidence}]" for policy in policies)]
-    columns += [f"{policy} - {policies[0]} [95 %]" for policy in policies[1:]]
-    rows = []
-    for one in entries:
-        test = next(j for j in one.tests if j is not None)
-        label = f"{test.property_name}, {test.comparison.label}"
-        values = [
-            wording.NOTHING if j is None else f"{wording.ratio(j)} {wording.verdict(j)}"
-            for j in one.tests
-        ]
-        differences = [wording.bracketed(d, 3) for d in one.differences[1:]]
-        rows.append((label, *values, *differences))
-    return Section(
-        f"Indicators side by side: {table}",
-        tuple(columns),
-        tuple(rows),
-    )
+    def answer(one: IndicatorAgainstBaseline, policy: str) -> str:
+        test = one.tests.get(policy)
+        return f"{wording.ratio(test)} {wording.verdict(test)}" if test else wording.NOTHING
 
+    def difference(one: IndicatorAgainstBaseline, policy: str) -> str:
+        return wording.bracketed(one.differences.get(policy), 3)
 
-def _cells(table: str, entries: list[CellAgainstBaseline], baseline: str) -> Section:
-    rows = tuple(
-        (
-            str(one.cell.arm.setting),
-            one.cell.policy,
-            wording.items(one.cell.mean) + (wording.SATURATED if one.cell.saturated else ""),
-            f"{one.interquartile_mean:.1f}",
-            f"{one.worst_decile:.1f}",
-            wording.bracketed(one.difference, 1),
-            wording.bracketed(one.ratio, 2),
-            wording.bracketed(one.improvement, 2),
-        )
-        for one in entries
-    )
-    return Section(
-        f"P side by side: {table}",
-        (
-            "condition", "policy", "mean P [95 %]", "IQM of P", "worst tenth",
-            f"P - {baseline}'s [95 %]", f"P / {baseline}'s [95 %]",
-            f"delivers more than {baseline} [95 %]",
-        ),
-        rows,
-    )  # fmt: skip
-
-
-Differences = list[tuple[str, str, Interval]]  # policy, category, difference
-
-
-def difference_figures(
-    results: StudyResults,
-    cells: dict[str, list[CellAgainstBaseline]],
-    indicators: tuple[IndicatorAgainstBaseline, ...],
-) -> Iterator[Figure]:
-    """Yield one figure a table: differences of P, then of every indicator."""
-    baseline, *others = judged_policies(results)
-    for table, entries in cells.items():
-        names = list(dict.fromkeys(one.cell.arm.setting.name for one in entries))
-        found: dict[str, Differences] = {
-            "P": [
-                (one.cell.policy, _cell(one.cell.arm.setting), one.difference)
-                # One failure mode after the other, as in the tables.
-                for one in sorted(entries, key=lambda c: names.index(c.cell.arm.setting.name))
-                if one.difference is not None
-            ]
-        }
-        for indicator in indicators:
-            if indicator.table == table:
-                label, differences = _of_indicator(indicator)
-                found.setdefault(label, []).extend(differences)
-        panels = tuple(
-            Panel(
-                "",
-                f"difference of {label}" + (" [items]" if label == "P" else ""),
-                tuple(_series(differences, others)),
-                (0.0,),
-                _x_label(entries[0].cell.arm.setting, stepwise=label != "P"),
-            )
-            for label, differences in found.items()
-            if differences
-        )
-        if panels:
-            yield _figure(results, table, baseline, others, found, panels)
-
-
-def _of_indicator(one: IndicatorAgainstBaseline) -> tuple[str, Differences]:
-    (first, *_) = (test for test in one.tests if test is not None)
-    comparison = first.comparison
-    before, after = comparison.original.setting, comparison.changed.setting
-    category = _cell(after) if after.kind == "fault" else f"{before.value:g}→{after.value:g}"
-    differences = [
-        (test.policy, category, difference)
-        for test, difference in zip(one.tests, one.differences)
-        if test is not None and difference is not None
+    baseline, *others = policies
+    columns: list[Column] = [
+        ("question", lambda one: f"{one.test.property}, {one.test.comparison}"),
+        *((f"{policy} [{confidence}]", partial(answer, policy=policy)) for policy in policies),
+        *((f"{one} - {baseline} [95 %]", partial(difference, policy=one)) for one in others),
     ]
-    # Asked against two thresholds, its value is one.
-    return comparison.indicator, differences if comparison.threshold == 0.0 else []
+    return table_section(f"Indicators side by side: {table}", questions, columns)
 
 
-def _cell(setting: Setting) -> str:
+def _cells(table: str, cells: Sequence[CellAgainstBaseline], baseline: str) -> Section:
+    columns: list[Column] = [
+        ("condition", lambda one: one.cell.cell),
+        ("policy", lambda one: one.cell.policy),
+        ("mean P [95 %]", lambda one: wording.mean_p(one.cell)),
+        ("IQM of P", lambda one: f"{one.interquartile_mean:.1f}"),
+        ("worst tenth", lambda one: f"{one.worst_decile:.1f}"),
+        (f"P - {baseline}'s [95 %]", lambda one: wording.bracketed(one.difference, 1)),
+        (f"P / {baseline}'s [95 %]", lambda one: wording.bracketed(one.ratio, 2)),
+        (
+            f"delivers more than {baseline} [95 %]",
+            lambda one: wording.bracketed(one.improvement, 2),
+        ),
+    ]
+    return table_section(f"P side by side: {table}", cells, columns)
+
+
+def _difference_figure(
+    results: StudyResults,
+    table: str,
+    policies: Sequence[str],
+    cells: Sequence[CellAgainstBaseline],
+    questions: Sequence[IndicatorAgainstBaseline],
+) -> Iterator[Section]:
+    """Yield the differences of P in one table, then those of every indicator."""
+    import pandas as pd
+
+    baseline, *others = policies
+    columns = ["of", "policy", "less", "cell", "difference", "low", "high"]
+    rows = [
+        (what, policy, baseline, category, *difference)
+        for what, policy, category, difference in _differences(cells, questions)
+        if difference is not None
+    ]
+    if not rows:
+        return
+    data = pd.DataFrame(rows, columns=columns).astype({"low": float, "high": float})
+    data = pd.concat([here for _, here in groups_of(data, "of")])
+    points = data.assign(
+        series=data["policy"],
+        # The baseline has the first style in every other figure.
+        style=data["policy"].map(policies.index),
+        category=data["cell"],
+        value=data["difference"],
+        # Clear of 0.
+        decided=(data["low"] > 0.0) | (data["high"] < 0.0),
+        saturated=False,
+        published=float("nan"),
+    )
+    setting = cells[0].cell.arm.setting
+    panels = [
+        Panel(
+            "",
+            f"difference of {what}" + (" [items]" if what == "P" else ""),
+            here,
+            (0.0,),
+            _x_label(setting, stepwise=what != "P"),
+        )
+        for what, here in groups_of(points, "of")
+    ]
+    figure = Figure(
+        slug("differences", table),
+        f"{wording.listed(others)} less {baseline}, {table}: differences of P and of the "
+        f"indicators, paired by seed. {wording.seeds_text(results).capitalize()}. Bars: 95 % "
+        "intervals (t for P, jackknife for indicators), unadjusted; filled: the interval is clear "
+        "of 0.",
+        data,
+        0.5 + 2.5 * len(panels),
+        partial(drawing.intervals, panels=panels),
+    )
+    yield Section("", figures=(figure,))
+
+
+def _differences(
+    cells: Sequence[CellAgainstBaseline], questions: Sequence[IndicatorAgainstBaseline]
+) -> Iterator[tuple[str, str, str, Interval | None]]:
+    """Yield what differs, the policy, the category of the axis, and the difference."""
+    # One failure mode after the other, as in the tables.
+    names = list(dict.fromkeys(one.cell.factor for one in cells))
+    for one in sorted(cells, key=lambda one: names.index(one.cell.factor)):
+        yield "P", one.cell.policy, _category(one.cell.arm.setting), one.difference
+    for question in questions:
+        test = question.test
+        # An indicator that is asked against two thresholds has one value.
+        if test.threshold == 0.0:
+            category = f"{test.before:g}→{test.after:g}"
+            if test.kind == "fault":
+                category = _category(test.compared.changed.setting)
+            for policy, difference in question.differences.items():
+                yield test.indicator, policy, category, difference
+
+
+def _category(setting: Setting) -> str:
     if setting.kind != "fault":
         return f"{setting.value:g}"
     if not setting.value:
@@ -194,43 +197,3 @@ def _x_label(setting: Setting, *, stepwise: bool) -> str:
     if setting.kind == "size":
         return "swarm size N → N + m" if stepwise else "swarm size N"
     return f"{setting.name}, x_o → x_new" if stepwise else setting.name
-
-
-def _series(differences: Differences, others: list[str]) -> Iterator[Series]:
-    # The baseline has the first style in every other figure.
-    for style, policy in enumerate(others, start=1):
-        points = tuple(
-            Point(category, value, low, high, _clear(low, high), saturated=False, published=None)
-            for owner, category, (value, low, high) in differences
-            if owner == policy
-        )
-        yield Series(policy, points, style)
-
-
-def _clear(low: float | None, high: float | None) -> bool:
-    return low is not None and high is not None and not low <= 0.0 <= high
-
-
-def _figure(
-    results: StudyResults,
-    table: str,
-    baseline: str,
-    others: list[str],
-    found: dict[str, Differences],
-    panels: tuple[Panel, ...],
-) -> Figure:
-    rows: list[tuple[Value, ...]] = [
-        (label, policy, baseline, category, *interval)
-        for label, differences in found.items()
-        for policy, category, interval in differences
-    ]
-    return Figure(
-        slug("differences", table),
-        f"{listed(others)} less {baseline}, {table}: differences of P and of the indicators, "
-        f"paired by seed. {seeds_text(results).capitalize()}. Bars: 95 % intervals (t for P, "
-        "jackknife for indicators), unadjusted; filled: the interval is clear of 0.",
-        ("of", "policy", "less", "cell", "difference", "low", "high"),
-        tuple(rows),
-        0.5 + 2.5 * len(panels),
-        lambda canvas: drawing.intervals(canvas, panels),
-    )

@@ -3,213 +3,180 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.drawing_over_time import TimePanel, rates, repairs
+from swarm_logistics_env.report.drawing import rates, repairs
 from swarm_logistics_env.report.figures import Figure, slug
-from swarm_logistics_env.report.result_tables import Section
+from swarm_logistics_env.report.result_tables import Column, Section, table_section
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Comparison
-from swarm_logistics_env.studies.mid_run_faults import (
+from swarm_logistics_env.studies.fault_measures import (
     RepairCurve,
-    Resilience,
     mid_run_faults,
     rate_curves,
     resiliences,
     window_of,
 )
+from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 
+_WHO: list[Column] = [
+    ("policy", lambda one: one.compared.policy),
+    ("fault", lambda one: str(one.compared.changed.setting)),
+]
+_RESILIENCE: list[Column] = [
+    *_WHO,
+    ("over the removed robots' [95 %]", lambda one: wording.bracketed(one.against_removed, 3)),
+    ("above 1", lambda one: _verdict(one.against_removed)),
+    ("over the whole swarm's [95 %]", lambda one: wording.bracketed(one.against_whole, 3)),
+    ("above 1 - m/N", lambda one: _verdict(one.against_whole)),
+]
+_REPAIR: list[Column] = [
+    *_WHO,
+    ("self-repair [s, 95 %]", lambda one: _seconds(one.repair)),
+    ("p of no loss", lambda one: wording.p_text(one.repair.p_value)),
+    ("followed for [s]", lambda one: f"{one.repair.followed:.0f}"),
+    ("without a fault [s]", lambda one: f"{one.repair.null_seconds:.0f}"),
+    ("reading", lambda one: _reading(one.repair)),
+]
+_SINGLE: list[Column] = [
+    *_WHO,
+    ("median [s]", lambda one: _median(one.single[0])),
+    ("not back", lambda one: _not_back(one.single[0])),
+    ("null's median [s]", lambda one: _median(one.single[1])),
+    ("null not back", lambda one: _not_back(one.single[1])),
+]
+_REPAIR_TEXT = (
+    "From the onset to the change point of the delivery counts, pooled over seeds: before it the "
+    "swarm delivers a share of what the paired runs with the robots removed do, after it as much. "
+    "Interval: every time that an inverted simulated likelihood ratio keeps. p: pairs swapped at "
+    "random lose as much; where it is not below 5 %, the time measures noise, as does that of a "
+    "pair without a fault that differs in behaviour seeds alone. ∞ and \"censored\": that the loss "
+    "lasted to the end of the run is not excluded."
+)  # fmt: skip
+_SINGLE_TEXT = (
+    "Kaplan and Meier's curves of each run's own time, those that are not back censored at the "
+    "last moment that could show it. A single run's rate scatters, so what counts is the distance "
+    "from the no-fault null, not the times."
+)
 
-def beyond_resilience(results: StudyResults) -> Iterator[Section]:
+
+def resilience_sections(results: StudyResults) -> Iterator[Section]:
     """Yield what there is to say of faults that begin during the run."""
-    found = tuple(resiliences(results))
+    found = list(resiliences(results))
     if not found:
         return
-    rows, times, singles, problems = [], [], [], []
-    for one in found:
-        who = one.comparison.policy, str(one.comparison.changed.setting)
-        rows.append((*who, *_index(one.against_removed), *_index(one.against_whole)))
-        if one.repair is not None:
-            times.append((*who, *_repair(one.repair)))
-        if one.single is not None:
-            singles.append((*who, *_single(one.single.fault), *_single(one.single.null)))
-        if one.problem:
-            problems.append(f"{who[0]}, {who[1]}: no self-repair time: {one.problem}.")
-    yield Section(
+    yield table_section(
         "Resilience: deliveries after the onset",
-        (
-            "policy", "fault", "over the removed robots' [95 %]", "above 1",
-            "over the whole swarm's [95 %]", "above 1 - m/N",
-        ),
-        tuple(rows),
-        (
-            ("Deliveries after the onset over those of the paired reference. Reference with the "
-            "robots removed at the onset: fault tolerance local in time; whole swarm: robustness "
-            f"local in time. Verdicts unadjusted; {wording.seeds_text(results)}."),
-        ),
-    )  # fmt: skip
-    yield Section(
-        "Self-repair time",
-        (
-            "policy", "fault", "self-repair [s, 95 %]", "p of no loss", "followed for [s]",
-            "without a fault [s]", "reading",
-        ),
-        tuple(times),
-        (
-            ("From the onset to the change point of the delivery counts, pooled over seeds: before "
-            "it the swarm delivers a share of what the paired runs with the robots removed do, "
-            "after it as much. Interval: every time that an inverted simulated likelihood ratio "
-            "keeps. p: pairs swapped at random lose as much; where it is not below 5 %, the time "
-            "measures noise, as does that of a pair without a fault that differs in behaviour "
-            "seeds alone. ∞ and \"censored\": that the loss lasted to the end of the run is not "
-            "excluded."),
-            *problems,
-        ),
-    )  # fmt: skip
-    yield Section("Deliveries over time", figures=tuple(rate_figures(results)))
-    if singles:
-        yield Section(
-            "Self-repair run by run",
-            (
-                "policy",
-                "fault",
-                "median [s]",
-                "not back",
-                "null's median [s]",
-                "null not back",
-            ),
-            tuple(singles),
-            (
-                (
-                    "Kaplan and Meier's curves of each run's own time, those that are not back "
-                    "censored at the last moment that could show it. A single run's rate scatters, "
-                    "so what counts is the distance from the no-fault null, not the times."
-                ),
-            ),
-            figures=tuple(repair_figures(results, found)),
+        found,
+        _RESILIENCE,
+        "Deliveries after the onset over those of the paired reference. Reference with the robots "
+        "removed at the onset: fault tolerance local in time; whole swarm: robustness local in "
+        f"time. Verdicts unadjusted; {wording.seeds_text(results)}.",
+    )
+    repaired = [one for one in found if one.repair is not None]
+    problems = [
+        f"{one.compared.policy}, {one.compared.changed.setting}: no self-repair time: "
+        f"{one.problem}."
+        for one in found
+        if one.problem
+    ]
+    yield table_section("Self-repair time", repaired, _REPAIR, _REPAIR_TEXT, *problems)
+    yield Section("Deliveries over time", figures=tuple(_rate_figures(results)))
+    if repaired:
+        singles = {one.compared: one.single for one in repaired}
+        yield replace(
+            table_section("Self-repair run by run", repaired, _SINGLE, _SINGLE_TEXT),
+            figures=tuple(_repair_figures(results, singles)),
         )
 
 
-def _index(estimate: Estimate | None) -> tuple[str, str]:
-    if estimate is None:
-        return wording.NOTHING, "undefined"
-    interval = Interval(estimate.value, estimate.low, estimate.high)
-    return wording.bracketed(interval, 3), estimate.verdict
+def _verdict(estimate: Estimate | None) -> str:
+    return "undefined" if estimate is None else estimate.verdict
 
 
-def _repair(repair: SelfRepair) -> tuple[str, ...]:
+def _seconds(repair: SelfRepair) -> str:
     seconds = math.inf if repair.seconds is None else repair.seconds
+    return wording.bracketed(Interval(seconds, repair.low, repair.high), 0)
+
+
+def _reading(repair: SelfRepair) -> str:
     if not repair.distinguishable:
-        reading = "not distinguishable from no fault"
-    elif repair.censored:
-        reading = "censored: a loss to the end is not excluded"
-    else:
-        reading = "a loss, and back"
-    return (
-        wording.bracketed(Interval(seconds, repair.low, repair.high), 0),
-        wording.p_text(repair.p_value),
-        f"{repair.followed:.0f}",
-        f"{repair.null_seconds:.0f}",
-        reading,
-    )
+        return "not distinguishable from no fault"
+    return "censored: a loss to the end is not excluded" if repair.censored else "a loss, and back"
 
 
-def _single(curve: RepairCurve) -> tuple[str, str]:
+def _median(curve: RepairCurve) -> str:
     median = curve.curve.median()
-    return (
-        "not reached" if median is None else f"{median:g}",
-        f"{curve.censored} of {curve.runs} runs",
-    )
+    return "not reached" if median is None else f"{median:g}"
 
 
-def repair_figures(results: StudyResults, found: tuple[Resilience, ...]) -> Iterator[Figure]:
+def _not_back(curve: RepairCurve) -> str:
+    return f"{curve.censored} of {curve.total} runs"
+
+
+def _rate_figures(results: StudyResults) -> Iterator[Figure]:
+    """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
+    import pandas as pd
+
+    for (*where, mode, onset), tests in groups_of(mid_run_faults(results), *_ONE_FIGURE):
+        curves = {_members(test): rate_curves(results, test.compared) for test in rows_of(tests)}
+        data = pd.concat(curves, names=["panel"]).reset_index(level="panel")
+        window = window_of(tests["compared"].iloc[0])
+        if not data.empty:
+            yield Figure(
+                slug("deliveries", *where[:2], mode, f"{onset:g}s"),
+                f"{_where(*where)}: deliveries in the trailing {window:g} s around failure mode "
+                f"{mode} from {onset:g} s (dotted line). Mean over {wording.seeds_text(results)} "
+                "with pointwise 95 % t-intervals.",
+                data,
+                0.6 + 2.3 * len(curves),
+                partial(rates, panels=curves, onset=onset, y_label=f"deliveries in {window:g} s"),
+            )
+
+
+def _repair_figures(
+    results: StudyResults, singles: Mapping[Comparison, tuple[RepairCurve, ...]]
+) -> Iterator[Figure]:
     """Yield the curves of single runs' self-repair times, a figure per failure mode."""
-    singles = {one.comparison: one.single for one in found if one.single is not None}
-    for fault, comparisons in _by_fault(singles):
-        panels = tuple(TimePanel(_members(c), singles[c]) for c in comparisons)
-        rows = tuple(
-            (panel.title, curve.label, *values)
-            for panel in panels
-            for curve in panel.curves
-            for values in zip(*(column.tolist() for column in curve.curve))
-        )
+    import pandas as pd
+
+    tests = mid_run_faults(results)
+    tests = tests[tests["compared"].isin(list(singles))]
+    for (*where, mode, onset), here in groups_of(tests, *_ONE_FIGURE):
+        panels = {_members(test): singles[test.compared] for test in rows_of(here)}
+        rows = [
+            (title, curve.runs, *point)
+            for title, curves in panels.items()
+            for curve in curves
+            for point in zip(*curve.curve)
+        ]
         if rows:
             yield Figure(
-                slug("self-repair", *fault.names),
-                f"{fault.where}: share of runs whose delivery rate is not back yet after failure "
-                f"mode {fault.mode} from {fault.onset:g} s, beside pairs of runs without fault "
-                "that differ in behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals "
+                slug("self-repair", *where[:2], mode, f"{onset:g}s"),
+                f"{_where(*where)}: share of runs whose delivery rate is not back yet after "
+                f"failure mode {mode} from {onset:g} s, beside pairs of runs without fault that "
+                "differ in behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals "
                 f"(Greenwood, log-log); {wording.seeds_text(results)}; a cross where runs are "
                 "censored.",
-                ("panel", "runs", "seconds", "share_not_back", "low", "high"),
-                rows,
+                pd.DataFrame(rows, columns=_REPAIR_DATA),
                 0.6 + 2.1 * len(panels),
                 partial(repairs, panels=panels),
             )
 
 
-def rate_figures(results: StudyResults) -> Iterator[Figure]:
-    """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
-    for fault, comparisons in _by_fault(mid_run_faults(results)):
-        panels = tuple(TimePanel(_members(c), rate_curves(results, c)) for c in comparisons)
-        window = window_of(comparisons[0])
-        rows = tuple(
-            (panel.title, curve.label, second, *rate)
-            for panel in panels
-            for curve in panel.curves
-            for second, rate in zip(curve.seconds, curve.rates)
-        )
-        if rows:
-            yield Figure(
-                slug("deliveries", *fault.names),
-                f"{fault.where}: deliveries in the trailing {window:g} s around failure mode "
-                f"{fault.mode} from {fault.onset:g} s (dotted line). Mean over "
-                f"{wording.seeds_text(results)} with pointwise 95 % t-intervals.",
-                ("panel", "runs", "seconds", "deliveries", "low", "high"),
-                rows,
-                0.6 + 2.3 * len(panels),
-                partial(
-                    rates,
-                    panels=panels,
-                    onset=fault.onset,
-                    y_label=f"deliveries in {window:g} s",
-                ),
-            )
+_ONE_FIGURE = ("policy", "table", "n_robots", "factor", "onset")
+_REPAIR_DATA = ["panel", "runs", "seconds", "share_not_back", "low", "high"]
 
 
-class _Fault(NamedTuple):
-    """A failure mode and its onset [s], in the swarm that one table is about."""
-
-    policy: str
-    table: str
-    n_robots: int
-    mode: str
-    onset: float
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.policy, self.table, self.mode, f"{self.onset:g}s"
-
-    @property
-    def where(self) -> str:
-        return f"{self.policy}, {self.table}, N = {self.n_robots}"
+def _where(policy: str, table: str, n_robots: int) -> str:
+    return f"{policy}, {table}, N = {n_robots}"
 
 
-def _by_fault(comparisons: Iterable[Comparison]) -> list[tuple[_Fault, list[Comparison]]]:
-    groups: dict[_Fault, list[Comparison]] = {}
-    for c in comparisons:
-        setting = c.changed.setting
-        size = c.original.condition.size
-        fault = _Fault(c.policy, c.table, size, setting.name, setting.onset)
-        groups.setdefault(fault, []).append(c)
-    return list(groups.items())
-
-
-def _members(comparison: Comparison) -> str:
-    return f"m = {comparison.changed.setting.value:g}"
+def _members(test: Row) -> str:
+    return f"m = {test.after:g}"

@@ -1,30 +1,38 @@
-"""Sections of a report: tables, claims, published values and the set-up, as plain text."""
+"""Tables of results, claims and agreement with published values, and the warnings."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.report.figures import Figure
-from swarm_logistics_env.report.wording import Sentence
+from swarm_logistics_env.report.wording import NOTHING, Sentence
+from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.agreement import Agreement, agreements
-from swarm_logistics_env.studies.results import Cell, IndicatorTest, StudyResults
+from swarm_logistics_env.studies.comparisons import Arm, Comparison
+from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+from swarm_logistics_env.studies.results import StudyResults
 
-NOTHING = wording.NOTHING
+if TYPE_CHECKING:
+    import pandas as pd
+
 _MOST_MISSES = 8  # more are no list that anybody reads
 _FLAGS = {
-    "single_seed": "one seed gives a value, no interval and no verdict",
-    "identical": "unaffected by construction: both conditions gave the same runs, so the value is "
-    "exact and no evidence; it stands outside Holm's family",
-    "too_few_seeds": "two seeds give no verdict, as counts agree by chance",
-    "degenerate": "no spread between seeds, so no interval and no verdict",
-    "capped": "inconclusive, because P is capped on the side that the verdict leans to",
-    "unbounded": "mean P_o is not distinguishable from 0 at so few seeds, so the interval is "
-    "infinite; the verdict comes from the test",
-    "assumes_normal": "below ten paired seeds, or unpaired, the verdict assumes normal differences",
-    "skewed": "so skewed that at so few seeds the verdict errs more often than its level",
+    "single_seed": "One seed gives a value, but no interval and no verdict",
+    "identical": "Both conditions gave the same runs, so the value is exact, but it is no evidence "
+    "and stands outside Holm's family",
+    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
+    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
+    "capped": "P is capped on the side that the verdict leans to, so the verdict is inconclusive",
+    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
+    "the verdict comes from the test",
+    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
+    "ten, or unpaired",
+    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
+    "its level says",
 }
 
 
@@ -40,122 +48,122 @@ class Section:
     figures: tuple[Figure, ...] = ()
 
 
+Column = tuple[str, Callable[[Any], str]]  # heading, and what stands there for a record
+
+
+def table_section(
+    title: str, records: Iterable[Any], columns: Sequence[Column], *lines: str
+) -> Section:
+    """Return a table with a row for each record, and lines of text below it."""
+    rows = tuple(tuple(text(record) for _, text in columns) for record in records)
+    return Section(title, tuple(heading for heading, _ in columns), rows, lines)
+
+
 def tables(results: StudyResults) -> Iterator[Section]:
     """Yield the tables of a study's results, policy by policy."""
-    policies = tuple(dict.fromkeys(cell.policy for cell in results.cells))
     figures = {figure.policy: figure for figure in agreements(results)}
-    for policy in policies:
-        for table in dict.fromkeys(cell.table for cell in results.cells if cell.policy == policy):
-            yield from _tables(results, policy, table)
-        yield from _claims(results, policy)
+    for policy, cells in groups_of(results.performance, "policy"):
+        tests = results.indicators[results.indicators["policy"] == policy]
+        for table, here in groups_of(cells, "table"):
+            asked = tests[tests["table"] == table]
+            yield from _tables(f"{policy}: {table}", here, asked, results.confidence)
+        if tests["claim"].notna().any():
+            yield _claims(f"{policy}: claims", tests[tests["claim"].notna()], results.confidence)
         if policy in figures:
             yield _agreement(figures[policy])
 
 
-def warnings(results: StudyResults) -> tuple[str, ...]:
-    """Return what a reader has to know before any verdict, one sentence each."""
-    return tuple(_warnings(results))
-
-
-def _tables(results: StudyResults, policy: str, table: str) -> Iterator[Section]:
+def _tables(
+    title: str, cells: pd.DataFrame, tests: pd.DataFrame, confidence: float
+) -> Iterator[Section]:
     """Yield a table of P and the first indicator, then one of each further indicator."""
-    cells = _grouped(
-        [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
-    )
-    tests = [test for test in results.tests if (test.policy, test.table) == (policy, table)]
-    published = any(cell.published is not None for cell in cells)
-    performance = [_performance(cell, published=published) for cell in cells]
-    columns = ["", *(["P paper", "P ours [95 %]"] if published else ["P [95 %]"])]
-    columns.append("one run [95 %]")
-    title = f"{policy}: {table}"
-    for indicator in dict.fromkeys(test.indicator for test in tests):
-        asked = [j for j in tests if j.indicator == indicator]
-        more, answers = _answers(results, cells, asked, published=published)
-        rows = [tuple(left + right) for left, right in zip(performance, answers)]
-        judged = [row for row in rows if row[-len(more)] != NOTHING]
-        yield Section(title, (*columns, *more), tuple(rows if len(columns) > 1 else judged))
-        # P is printed once: the tables of further indicators start with the setting alone.
-        columns, performance = columns[:1], [left[:1] for left in performance]
-        title = f"{policy}: {table}, continued"
-
-
-def _performance(cell: Cell, *, published: bool) -> list[str]:
-    row = [str(cell.arm.setting)]
+    published = bool(cells["published"].notna().any())
+    # Rows of one failure mode (or other factor) stand together, in order of appearance.
+    rows = [cell for _, here in groups_of(cells, "factor") for cell in rows_of(here)]
+    setting: Column = ("", lambda cell: cell.cell)
+    columns: list[Column] = [setting]
     if published:
-        row.append(NOTHING if cell.published is None else f"{cell.published:g}")
-    mark = wording.SATURATED if cell.saturated else ""
-    return [*row, wording.items(cell.mean) + mark, wording.limits(cell.prediction)]
+        columns.append(("P paper", lambda cell: _plain(cell.published)))
+    columns.append(("P ours [95 %]" if published else "P [95 %]", wording.mean_p))
+    columns.append(("one run [95 %]", _one_run))
+    for indicator, asked in groups_of(tests, "indicator"):
+        answers = _answers(indicator, asked, confidence, published=published)
+        yield table_section(title, rows, [*columns, *answers])
+        # P is printed once: the tables of further indicators hold what was asked alone.
+        rows = [cell for cell in rows if cell.arm in set(tests["compared"].map(_changed))]
+        columns, title = [setting], title.removesuffix(", continued") + ", continued"
 
 
-def _grouped(cells: list[Cell]) -> list[Cell]:
-    """Put the rows of one failure mode (or other factor) together, in order of appearance."""
-    names = list(dict.fromkeys(cell.arm.setting.name for cell in cells))
-    return sorted(cells, key=lambda cell: names.index(cell.arm.setting.name))
+def _changed(comparison: Comparison) -> Arm:
+    return comparison.changed
+
+
+def _plain(value: float) -> str:
+    return f"{value:g}" if wording.is_known(value) else NOTHING
+
+
+def _one_run(cell: Row) -> str:
+    if not wording.is_known(cell.prediction_low):
+        return NOTHING
+    return f"[{cell.prediction_low:.1f}, {cell.prediction_high:.1f}]"
 
 
 def _answers(
-    results: StudyResults, cells: list[Cell], asked: list[IndicatorTest], *, published: bool
-) -> tuple[list[str], list[list[str]]]:
-    """Return the columns of one indicator and their rows, one a cell.
+    indicator: str, tests: pd.DataFrame, confidence: float, *, published: bool
+) -> Iterator[Column]:
+    """Yield the columns of one indicator in a table of cells.
 
     Value with interval, the paper's value, and per property (scalable, superlinear, ...) the
     verdict, with Holm's in brackets where it differs, beside what the paper claims.
     """
-    indicator = asked[0].comparison.indicator
-    properties = list(dict.fromkeys(test.property_name for test in asked))
-    columns = [f"{indicator} [{wording.percent(results.confidence)}]"]
-    columns += [f"{indicator} paper"] if published else []
-    for name in properties:
-        columns += [name, "paper"] if published else [name]
-    rows = []
-    for cell in cells:
-        here = {test.property_name: test for test in asked if test.comparison.changed == cell.arm}
-        row = [NOTHING] * len(columns)
-        for name, test in here.items():
-            row[0] = wording.ratio(test)
-            place = 1 + published + properties.index(name) * (1 + published)
-            row[place] = wording.verdict(test)
-            if published:
-                row[1] = wording.number(test.published)
-                row[place + 1] = {None: NOTHING, True: "yes", False: "no"}[test.claim]
-        rows.append(row)
-    return columns, rows
+
+    def column(heading: str, asked: pd.DataFrame, text: Callable[[Row], str]) -> Column:
+        by_arm = {test.compared.changed: test for test in rows_of(asked)}
+        return heading, lambda cell: text(by_arm[cell.arm]) if cell.arm in by_arm else NOTHING
+
+    yield column(f"{indicator} [{wording.percent(confidence)}]", tests, wording.ratio)
+    if published:
+        yield column(f"{indicator} paper", tests, lambda test: wording.number(test.published))
+    for name, asked in groups_of(tests, "property"):
+        yield column(name, asked, wording.verdict)
+        if published:
+            yield column("paper", asked, _claimed)
 
 
-def _claims(results: StudyResults, policy: str) -> Iterator[Section]:
-    claims = [test for test in results.tests if test.policy == policy and test.claim is not None]
-    if not claims:
-        return
-    rows, plain, adjusted = [], Counter[str](), Counter[str]()
-    for test in claims:
-        estimate = test.estimate
-        says = test.on_claim(estimate.verdict if estimate else None)
-        says_adjusted = test.on_claim(test.adjusted_verdict)
-        plain[wording.counted_as(test, says)] += 1
-        adjusted[wording.counted_as(test, says_adjusted)] += 1
-        unaffected = wording.UNAFFECTED if test.unaffected else None
-        rows.append(
-            (
-                f"{test.indicator}, {test.comparison.label}",
-                test.claim_text or NOTHING,
-                wording.number(test.published),
-                wording.ratio(test),
-                unaffected or says or "blocked",
-                unaffected or says_adjusted or "blocked",
-                wording.power(test),
-            )
-        )
-    columns = (
-        "indicator", "claim", "paper", f"ours [{wording.percent(results.confidence)}]", "claim is",
-        "under Holm", "seeds for 80 % power at the paper's value",
-    )  # fmt: skip
-    lines = (
-        f"Unadjusted: {wording.counted(plain)}.",
-        f"Under Holm, family = all comparisons of one indicator: {wording.counted(adjusted)}.",
-        'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
-        *(f"undefined: {reason}." for reason in dict.fromkeys(j.no_plan for j in claims) if reason),
+def _claimed(test: Row) -> str:
+    return {True: "yes", False: "no"}.get(test.claimed, NOTHING)
+
+
+def _claims(title: str, claims: pd.DataFrame, confidence: float) -> Section:
+    tests = list(rows_of(claims))
+    plain, adjusted = (
+        wording.counted(Counter(wording.counted_as(test, getattr(test, name)) for test in tests))
+        for name in ("claim_verdict", "claim_verdict_holm")
     )
-    yield Section(f"{policy}: claims", columns, tuple(rows), lines)
+    columns: list[Column] = [
+        ("indicator", lambda test: f"{test.indicator}, {test.comparison}"),
+        ("claim", lambda test: test.claim),
+        ("paper", lambda test: wording.number(test.published)),
+        (f"ours [{wording.percent(confidence)}]", wording.ratio),
+        ("claim is", lambda test: wording.said(test.claim_verdict)),
+        ("under Holm", lambda test: wording.said(test.claim_verdict_holm)),
+        ("seeds for 80 % power at the paper's value", _seeds_needed),
+    ]
+    return table_section(
+        title,
+        tests,
+        columns,
+        f"Unadjusted: {plain}.",
+        f"Under Holm, family = all comparisons of one indicator: {adjusted}.",
+        'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
+        *(f"undefined: {reason}." for reason in claims["no_plan"].dropna().unique()),
+    )
+
+
+def _seeds_needed(test: Row) -> str:
+    if test.estimate is None or not wording.is_known(test.published):
+        return NOTHING
+    return "undefined" if test.seeds_for_power_80 is None else f"{test.seeds_for_power_80}"
 
 
 def _agreement(figure: Agreement) -> Section:
@@ -176,7 +184,7 @@ def _agreement(figure: Agreement) -> Section:
     lines.append(f"Mean relative error of our mean P: {figure.mean_relative_error:.1%}.")
     if figure.mean_log_error is not None:
         lines.append(f"Mean |log error| of our mean P: {figure.mean_log_error:.3f}.")
-    pairs = [f"{a.arm.setting} and {b.arm.setting}" for a, b in figure.disorder]
+    pairs = [f"{a.cell} and {b.cell}" for a, b in figure.disorder]
     lines.append(
         f"Swarm sizes up to {figure.largest_ordered} in the opposite order to the published one, "
         f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
@@ -184,54 +192,55 @@ def _agreement(figure: Agreement) -> Section:
     return Section(f"{figure.policy}: agreement with the published values", lines=tuple(lines))
 
 
-def _misses(cells: tuple[Cell, ...]) -> str:
-    told = [_miss(cell) for cell in cells[:_MOST_MISSES]]
+def _misses(cells: pd.DataFrame) -> str:
+    told = []
+    for cell in rows_of(cells[:_MOST_MISSES]):
+        ours: Row = cell
+        one_run = Interval(ours.mean, ours.prediction_low, ours.prediction_high)
+        told.append(
+            f"{ours.cell} ({ours.published:g} published, {wording.bracketed(one_run, 1)} ours)"
+        )
     if len(cells) > _MOST_MISSES:
         told.append(f"and {len(cells) - _MOST_MISSES} more, in cells.csv")
     return ", ".join(told) or "none"
 
 
-def _miss(cell: Cell) -> str:
-    return (
-        f"{cell.arm.setting} ({cell.published:g} published, {wording.items(cell.prediction)} ours)"
-    )
+def warnings(results: StudyResults) -> tuple[str, ...]:
+    """Return what a reader has to know before any verdict, one sentence each."""
+    return tuple(_warnings(results))
 
 
 def _warnings(results: StudyResults) -> Iterator[str]:
-    if any(cell.saturated for cell in results.cells):
+    if results.performance["saturated"].any():
         yield (
-            f"{wording.SATURATED} saturated: in at least one run every item was delivered, so P is "
-            "capped; indicators that rest on it are marked as well. A capped reference cannot "
-            "support that an indicator lies above its threshold, a capped changed condition cannot "
+            f"{wording.SATURATED} marks a P that is capped, because every item was delivered in at "
+            "least one run, and the indicators that rest on it. A capped reference cannot support "
+            "that an indicator lies above its threshold, and a capped changed condition cannot "
             "refute it."
         )
     if results.exploratory:
-        since = "it is judged at a look that was not declared before its first run"
-        if not results.looks:
-            since = "seeds were added after the study began"
-        yield f"Exploratory: {since}, so the verdicts' error level is not the nominal one."
-    for cell in results.cells:
+        because = "seeds were added after the study began"
+        if results.looks:
+            because = "the study is judged at a look that was not declared before its first run"
+        yield f"The verdicts are exploratory: {because}, so they err more often than their level."
+    for cell in rows_of(results.performance):
         if cell.problem:
-            yield f"{cell.policy}, {cell.table}, {cell.arm.setting}: {cell.problem}."
-    for test in results.tests:
-        if test.estimate is None:
-            comparison = test.comparison
-            yield (
-                f"{comparison.policy}, {comparison.indicator}, {comparison.label} is blocked: "
-                f"{test.problem}."
-            )
+            yield f"{cell.policy}, {cell.table}, {cell.cell} is incomplete: {cell.problem}."
+    for test in rows_of(results.indicators):
+        if test.problem:
+            yield f"{test.policy}, {test.indicator}, {test.comparison} is blocked: {test.problem}."
+    flags = results.indicators["flags"].fillna("").str.split()
     for flag, meaning in _FLAGS.items():
-        flagged = [j for j in results.tests if j.estimate and flag in j.estimate.flags]
-        if flagged:
-            yield f"{flag}: {meaning}: {'; '.join(_families(results, flagged))}."
+        flagged = flags.map(lambda here, flag=flag: flag in here)
+        if flagged.any():
+            yield f"{meaning}: {'; '.join(_families(results.indicators, flagged))}."
 
 
-def _families(results: StudyResults, some: list[IndicatorTest]) -> Iterator[str]:
-    """Name comparisons, those of one policy and indicator together."""
-    for family in dict.fromkeys(test.comparison.family for test in some):
-        policy, indicator = family
-        labels = {j.comparison.label: None for j in some if j.comparison.family == family}
-        whole = {j.comparison.label for j in results.tests if j.comparison.family == family}
-        all_of_them = len(labels) == len(whole) > 1
-        which = f"all {len(whole)}" if all_of_them else "; ".join(labels)
-        yield f"{policy}: {indicator} ({which})"
+def _families(tests: pd.DataFrame, chosen: pd.Series[bool]) -> Iterator[str]:
+    """Name the chosen comparisons, those of one policy and indicator together."""
+    for (policy, indicator), family in groups_of(tests, "policy", "indicator"):
+        labels = family["comparison"][chosen[family.index]].unique()
+        whole = family["comparison"].nunique()
+        which = f"all {whole}" if len(labels) == whole > 1 else "; ".join(labels)
+        if len(labels):
+            yield f"{policy}: {indicator} ({which})"

@@ -1,16 +1,21 @@
-"""Numbers and verdicts in words, the same in every table; every verdict as one sentence."""
+"""Numbers and verdicts in words, the same in every table; every verdict as one sentence.
+
+What is missing is None or, in a column of numbers, NaN.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeGuard
 
-from swarm_logistics_env import spi
-from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.results import POWER, IndicatorTest, StudyResults
+from swarm_logistics_env.studies.indicator_table import POWER
+from swarm_logistics_env.studies.performance_table import Row
+from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import seeds_in_words
 
 SATURATED = "†"
@@ -19,21 +24,19 @@ _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differenc
 NOTHING = "–"
 
 
-def items(interval: Interval | None) -> str:
-    """Return a performance with its limits, e.g. "28.7 [27.1, 30.3]"."""
-    if interval is None:
-        return "no run"
-    if interval.low is None or interval.high is None:
-        return f"{interval.value:.1f}"
-    return f"{interval.value:.1f} [{interval.low:.1f}, {interval.high:.1f}]"
+def is_known(value: float | None) -> TypeGuard[float]:
+    """Return whether a number is there."""
+    return value is not None and not math.isnan(value)
 
 
-def bracketed(interval: Interval | None, digits: int) -> str:
+def bracketed(interval: Interval | Estimate | Row | None, digits: int) -> str:
     """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
-    if interval is None:
+    if interval is None or not is_known(interval.value):
         return NOTHING
-    value, low, high = (None if x is None else fixed(x, digits) for x in interval)
-    return f"{value}" if low is None or high is None else f"{value} [{low}, {high}]"
+    if not (is_known(interval.low) and is_known(interval.high)):
+        return fixed(interval.value, digits)
+    low, high = fixed(interval.low, digits), fixed(interval.high, digits)
+    return f"{fixed(interval.value, digits)} [{low}, {high}]"
 
 
 def fixed(value: float, digits: int) -> str:
@@ -44,55 +47,14 @@ def fixed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number without interval."""
+    return f"{value:.{digits}f}" if is_known(value) else NOTHING
+
+
 def percent(confidence: float) -> str:
-    """Return a confidence, e.g. "95 %"; of an early look never rounded up to 100 %."""
+    """Return a confidence level, e.g. "95 %"; of an early look never rounded up to 100 %."""
     return "> 99.99 %" if confidence > 0.9999 else f"{100 * confidence:.4g} %"
-
-
-def limits(interval: Interval | None) -> str:
-    """Return the limits alone."""
-    if interval is None or interval.low is None or interval.high is None:
-        return NOTHING
-    return f"[{interval.low:.1f}, {interval.high:.1f}]"
-
-
-def number(value: float | None) -> str:
-    """Return an indicator's value without interval."""
-    return NOTHING if value is None else f"{value:.3f}"
-
-
-def ratio(test: IndicatorTest) -> str:
-    """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
-    estimate = test.estimate
-    if estimate is None:
-        return NOTHING
-    mark = SATURATED if test.saturated else ""
-    return bracketed(Interval(estimate.value, estimate.low, estimate.high), 3) + mark
-
-
-def verdict(test: IndicatorTest) -> str:
-    """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
-    if test.estimate is None:
-        return "blocked"
-    if test.unaffected:
-        return UNAFFECTED
-    plain = test.on_property(test.estimate.verdict)
-    adjusted = test.on_property(test.adjusted_verdict)
-    return f"{plain}" if adjusted == plain else f"{plain} ({adjusted or 'blocked'})"
-
-
-def counted_as(test: IndicatorTest, verdict: Verdict | None) -> str:
-    """Return what a verdict on this test counts as in `counted`.
-
-    A count is a headline: a verdict that assumes normal differences does not stand in it.
-    """
-    if test.unaffected:
-        return UNAFFECTED
-    if test.estimate is None or verdict is None:
-        return "blocked"
-    if verdict != "inconclusive" and "assumes_normal" in test.estimate.flags:
-        return _NOT_COUNTED
-    return verdict
 
 
 def p_text(p: float) -> str:
@@ -100,13 +62,48 @@ def p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def power(test: IndicatorTest) -> str:
-    """Return the seeds that 80 % power needs at the published value."""
-    if test.published is None or test.estimate is None:
-        return NOTHING
-    if test.seeds_needed is None:
-        return "undefined"
-    return str(test.seeds_needed)
+def mean_p(cell: Row) -> str:
+    """Return the mean P of a row of performances with its limits, e.g. "28.7 [27.1, 30.3]†"."""
+    if not cell.n_seeds:
+        return "no run"
+    return bracketed(Interval(cell.mean, cell.low, cell.high), 1) + mark(cell)
+
+
+def mark(row: Row) -> str:
+    """Return the sign of a P that is capped, or of what rests on it."""
+    return SATURATED if row.saturated else ""
+
+
+def ratio(test: Row) -> str:
+    """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
+    return NOTHING if test.estimate is None else bracketed(test, 3) + mark(test)
+
+
+def said(verdict: str | None) -> str:
+    """Return a verdict in words."""
+    return {None: "blocked", "unaffected": UNAFFECTED}.get(verdict, f"{verdict}")
+
+
+def verdict(test: Row) -> str:
+    """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
+    plain, adjusted = said(test.answer), said(test.answer_holm)
+    return plain if plain in (adjusted, "blocked") else f"{plain} ({adjusted})"
+
+
+def counted_as(test: Row, verdict: str | None) -> str:
+    """Return what a verdict on this test counts as in `counted`.
+
+    A count is a headline: a verdict that assumes normal differences does not stand in it.
+    """
+    if verdict in ("supported", "refuted") and "assumes_normal" in test.flags:
+        return _NOT_COUNTED
+    return said(verdict)
+
+
+def counted(verdicts: Counter[str]) -> str:
+    """Return how many of each verdict, e.g. "7 supported, 1 refuted"."""
+    order = ("supported", "refuted", "inconclusive", _NOT_COUNTED, UNAFFECTED, "blocked")
+    return ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in order if verdicts[verdict])
 
 
 def listed(names: Sequence[str]) -> str:
@@ -124,12 +121,6 @@ def seeds_text(results: StudyResults) -> str:
     return f"{count} ({seeds_in_words(seeds)})"
 
 
-def counted(verdicts: Counter[str]) -> str:
-    """Return how many of each verdict, e.g. "7 supported, 1 refuted"."""
-    order = ("supported", "refuted", "inconclusive", _NOT_COUNTED, UNAFFECTED, "blocked")
-    return ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in order if verdicts[verdict])
-
-
 @dataclass(frozen=True)
 class Sentence:
     """One verdict in words; `verdict`: Holm's on the property, "unaffected" or "blocked"."""
@@ -139,106 +130,76 @@ class Sentence:
     verdict: str
 
 
-def sentence(results: StudyResults, test: IndicatorTest) -> Sentence:
+def sentence(results: StudyResults, test: Row) -> Sentence:
     """Return the verdict on one comparison in words."""
-    comparison, estimate = test.comparison, test.estimate
-    head = f"{comparison.policy}, {test.property_name}? {_conditions(test)}."
-    if estimate is None:
-        return Sentence(head, f"Blocked: {test.problem}.", "blocked")
-    if test.unaffected:
-        text = (
-            f"{comparison.indicator} = {estimate.value:.3f} exactly, over "
-            f"{_seeds(results, estimate)}: {UNAFFECTED}. Both conditions gave the same "
-            "runs, so there is nothing to test."
-        )
-        return Sentence(head, text, "unaffected")
-    plain = test.on_property(estimate.verdict)
-    adjusted = test.on_property(test.adjusted_verdict) or "blocked"
+    head = f"{test.policy}, {test.property}? {_conditions(test)}."
+    text = " ".join(_parts(results, test))
+    return Sentence(head, text, "blocked" if test.problem else test.answer_holm or "blocked")
+
+
+def _parts(results: StudyResults, test: Row) -> Iterator[str]:
+    if test.problem:
+        yield f"Blocked: {test.problem}."
+        return
+    seeds = f"{test.n_seeds} runs a condition, unpaired"
+    if results.plan.paired:
+        seeds = seeds_text(results)
+    if test.verdict == "unaffected":
+        yield f"{test.indicator} = {test.value:.3f} exactly, over {seeds}: {UNAFFECTED}."
+        yield "Both conditions gave the same runs, so there is nothing to test."
+        return
+    value, brackets, limits = bracketed(test, 3).partition("[")
+    interval = f", {percent(test.confidence)} interval [{limits}" if brackets else " (no interval)"
+    yield f"{test.indicator}{mark(test)} = {value.rstrip()}{interval} over {seeds}."
     # One seed gives no p, and Holm's placeholder of 1 says nothing.
-    adjusted_p = None if estimate.p_value is None else test.adjusted_p
-    mark = SATURATED if test.saturated else ""
-    parts = [
-        f"{comparison.indicator}{mark} = {_interval(estimate)} over {_seeds(results, estimate)}.",
-        (f"Unadjusted: {plain}{_p(estimate.p_value)}; Holm-adjusted: {adjusted}{_p(adjusted_p)}."),
-        *_claim(test, estimate),
-        *_what_it_takes(test, estimate, adjusted),
-    ]
-    if estimate.pairing_correlation is not None:
-        parts.append(f"Pairing correlation {estimate.pairing_correlation:.2f}.")
-    if "assumes_normal" in estimate.flags:
-        parts.append("The verdict assumes normal differences.")
-    if "skewed" in estimate.flags:
-        parts.append("Skewed: at so few seeds the verdict errs more often than its level.")
+    adjusted_p = test.p_holm if is_known(test.p_value) else None
+    yield f"Unadjusted: {test.answer}{_p(test.p_value)};"
+    yield f"Holm-adjusted: {said(test.answer_holm)}{_p(adjusted_p)}."
+    if test.claim:
+        plain, adjusted = test.claim_verdict, said(test.claim_verdict_holm)
+        both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
+        yield f'Claim "{test.claim}": {both}.'
+    if "inconclusive" in (test.answer, test.answer_holm):
+        yield from _what_it_takes(test)
+    if is_known(test.pairing_correlation):
+        yield f"Pairing correlation {test.pairing_correlation:.2f}."
+    if "assumes_normal" in test.flags:
+        yield "The verdict assumes normal differences."
+    if "skewed" in test.flags:
+        yield "Skewed: at so few seeds the verdict errs more often than its level."
     if results.exploratory:
-        parts.append("Exploratory.")
-    return Sentence(head, " ".join(parts), adjusted)
+        yield "Exploratory."
 
 
-def _conditions(test: IndicatorTest) -> str:
-    comparison = test.comparison
-    before, after = comparison.original.setting, comparison.changed.setting
-    swarm = comparison.original.condition.size
-    if after.kind == "size":
-        return f"N = {before.value:g} → {after.value:g} (m = {after.value - before.value:g} more)"
-    if after.kind == "fault":
-        start = f" from {after.onset:g} s" if after.onset else ""
-        return f"Failure mode {after.name}{start}, m = {after.value:g} of N = {swarm}"
-    if after.kind == "parameter":
-        return f"{after.name} {before.value:g} → {after.value:g}, N = {swarm}"
-    return f"{before.name} → {after.name}, N = {swarm}"
-
-
-def _interval(estimate: Estimate) -> str:
-    confidence = percent(estimate.confidence)
-    if estimate.low is None or estimate.high is None:
-        return f"{estimate.value:.3f} (no interval)"
-    low, high = fixed(estimate.low, 3), fixed(estimate.high, 3)
-    return f"{fixed(estimate.value, 3)}, {confidence} interval [{low}, {high}]"
-
-
-def _seeds(results: StudyResults, estimate: Estimate) -> str:
-    if estimate.paired:
-        return seeds_text(results)
-    return f"{estimate.n_seeds} runs a condition, unpaired"
+def _conditions(test: Row) -> str:
+    if test.kind == "size":
+        return f"N = {test.before:g} → {test.after:g} (m = {test.after - test.before:g} more)"
+    if test.kind == "fault":
+        start = f" from {test.onset:g} s" if test.onset else ""
+        return f"Failure mode {test.factor}{start}, m = {test.after:g} of N = {test.n_robots}"
+    before = test.policy if test.kind == "policy" else f"{test.factor} {test.before:g}"
+    after = test.factor if test.kind == "policy" else f"{test.after:g}"
+    return f"{before} → {after}, N = {test.n_robots}"
 
 
 def _p(p: float | None) -> str:
-    if p is None:
+    if not is_known(p):
         return ""
     text = p_text(p)
     return f" (p {text})" if text.startswith("<") else f" (p = {text})"
 
 
-def _claim(test: IndicatorTest, estimate: Estimate) -> list[str]:
-    if test.claim is None:
-        return []
-    plain, adjusted = (
-        test.on_claim(verdict) or "blocked" for verdict in (estimate.verdict, test.adjusted_verdict)
-    )
-    both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
-    return [f'Claim "{test.claim_text}": {both}.']
-
-
-def _what_it_takes(test: IndicatorTest, estimate: Estimate, adjusted: str) -> list[str]:
-    if "inconclusive" not in (adjusted, estimate.verdict):
-        return []
-    parts = []
-    smallest = spi.minimum_detectable_effect(estimate, POWER)
-    if smallest is not None:
-        parts.append(
-            f"{estimate.n_seeds} seeds find an effect {smallest:.3f} away from "
-            f"{estimate.threshold:.3g} with {100 * POWER:.0f} % power, unadjusted."
+def _what_it_takes(test: Row) -> Iterator[str]:
+    if is_known(test.detectable):
+        yield (
+            f"{test.n_seeds} seeds find an effect {test.detectable:.3f} away from "
+            f"{test.threshold:.3g} with {100 * POWER:.0f} % power, unadjusted."
         )
-    if test.published is not None and test.seeds_needed is not None:
-        parts.append(
-            f"The published value {test.published:.3f} needs {test.seeds_needed} seeds"
-            f"{_least_power(test, estimate)}."
+    if test.seeds_for_power_80 is not None:
+        least = ""
+        if is_known(test.least_power):
+            least = f" ({test.least_power:.0%} power or more in nine pilots of ten)"
+        yield (
+            f"The published value {test.published:.3f} needs {test.seeds_for_power_80} seeds"
+            f"{least}."
         )
-    return parts
-
-
-def _least_power(test: IndicatorTest, estimate: Estimate) -> str:
-    assert test.published is not None
-    assert test.seeds_needed is not None
-    least = spi.lower_decile_of_power(estimate, test.published, test.seeds_needed)
-    return "" if least is None else f" ({least:.0%} power or more in nine pilots of ten)"

@@ -43,24 +43,22 @@ class Definition:
 
     Attributes:
         symbol: as in the paper, e.g. "FT".
-        name: in words, e.g. "fault tolerance"; empty: `heading` says it all.
+        heading: its name and symbol, for headings and axes, e.g. "fault tolerance FT".
         compares: the factor that differs between the conditions compared.
         performances: argument of `function` to the paper's symbol: P of the original condition, of
             the changed one and, where there is a third, of the one with the robots removed.
         function: from performances over seeds to an `Estimate`.
         arguments: the function's further arguments, from what differs.
         adjectives: threshold to what a swarm above it is called.
-        axis: label of a figure's axis.
     """
 
     symbol: str
-    name: str
+    heading: str
     compares: Factor
     performances: Mapping[str, str]
     function: Callable[..., Estimate]
     arguments: Callable[[Change], dict[str, Any]]
     adjectives: Mapping[float, str]
-    axis: str
 
     @property
     def needs_removed(self) -> bool:
@@ -72,11 +70,6 @@ class Definition:
         """The paper's symbols of all performances but the changed condition's."""
         original, _, *removed = self.performances.values()
         return (original, *removed)
-
-    @property
-    def heading(self) -> str:
-        """Name and symbol, e.g. "fault tolerance FT"."""
-        return f"{self.name} {self.symbol}" if self.name else self.axis
 
     def property_name(self, threshold: float, *, claimed_below: bool = False) -> str:
         """Return what a verdict is about, e.g. "scalable", "S > 0.5" or "P falls".
@@ -95,53 +88,48 @@ DEFINITIONS: dict[str, Definition] = {
     for definition in (
         Definition(
             symbol="S",
-            name="scalability",
+            heading="scalability S",
             compares="size",
             performances={"p_n": "P_N", "p_nm": "P_N+m"},
             function=scalability,
             arguments=lambda c: {"n": int(c.before), "m": int(c.after - c.before)},
             adjectives={0.0: "scalable", 1.0: "superlinear"},
-            axis="scalability S",
         ),
         Definition(
             symbol="FT",
-            name="fault tolerance",
+            heading="fault tolerance FT",
             compares="fault",
             performances={"p_o": "P_o", "p_f": "P_F", "p_s": "P_S"},
             function=fault_tolerance,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "tolerant"},
-            axis="fault tolerance FT",
         ),
         Definition(
             symbol="R",
-            name="robustness",
+            heading="robustness R",
             compares="fault",
             performances={"p_o": "P_o", "p_f": "P_F"},
             function=robustness,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "robust"},
-            axis="robustness R",
         ),
         Definition(
             symbol="A",
-            name="adaptability",
+            heading="adaptability A",
             compares="parameter",
             performances={"p_o": "P_o", "p_new": "P_new"},
             function=adaptability,
             arguments=lambda c: {"x_o": c.before, "x_new": c.after},
             adjectives={0.0: "adaptable", 1.0: "P has grown"},
-            axis="A",
         ),
         Definition(
             symbol="change",
-            name="",
+            heading="change of P",
             compares="policy",
             performances={"p_o": "P_o", "p_new": "P_new"},
             function=relative_change,
             arguments=lambda _: {},
             adjectives={},
-            axis="change of P",
         ),
     )
 }

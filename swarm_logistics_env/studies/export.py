@@ -1,15 +1,27 @@
-"""Export: the rows of a store as one file. Equal rows give equal bytes."""
+"""Export: every run of a study as one file. Equal runs give equal bytes."""
 
 from __future__ import annotations
 
-import csv
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.results import Value
 from swarm_logistics_env.studies.store import Store
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+_TYPES = {
+    "seed": "Int64",
+    "delivered": "Int64",
+    "behaviour": "Int64",
+    "ended_at": "Float64",
+    "anchoring_seconds": "Float64",
+    "all_delivered": "boolean",
+    "delivery_times": "object",
+}
 
 
 def export(store: Store, path: Path) -> tuple[int, str]:
@@ -21,75 +33,44 @@ def export(store: Store, path: Path) -> tuple[int, str]:
     Raises:
         StudyError: another suffix, pyarrow is missing, or the file cannot be written.
     """
+    import pandas as pd
+
+    runs = pd.DataFrame(store.rows(), dtype=object)
     if path.suffix == ".csv":
-        count = _csv(store, path)
+        if not runs.empty:
+            runs["delivery_times"] = runs["delivery_times"].map(
+                lambda times: " ".join(map(repr, times)), na_action="ignore"
+            )
+        write_csv(path, runs)
     elif path.suffix == ".parquet":
-        count = _parquet(store, path)
+        _write_parquet(path, runs)
     else:
         raise StudyError(f"cannot export to {path}: should end in .csv or .parquet")
-    return count, hashlib.sha256(path.read_bytes()).hexdigest()
+    return len(runs), hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _csv(store: Store, path: Path) -> int:
-    rows = list(store.rows())
-    columns = list(rows[0]) if rows else []
-    write_csv(path, columns, (list(row.values()) for row in rows))
-    return len(rows)
-
-
-def _parquet(store: Store, path: Path) -> int:
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise StudyError(
-            "Parquet needs pyarrow: pip install 'swarm-logistics-env[study]', or export to .csv"
-        ) from None
-    numbers = {
-        "seed": pa.int64(),
-        "delivered": pa.int64(),
-        "behaviour": pa.int64(),
-        "ended_at": pa.float64(),
-        "anchoring_seconds": pa.float64(),
-        "all_delivered": pa.bool_(),
-        "delivery_times": pa.list_(pa.float64()),
-    }
-    rows = list(store.rows())
-    for row in rows:
-        if row["all_delivered"] is not None:
-            row["all_delivered"] = bool(row["all_delivered"])
-    if any(isinstance(row["delivered"], float) for row in rows):
-        numbers["delivered"] = pa.float64()
-    names = list(rows[0]) if rows else []
-    # Named types: a column of failed runs alone would have none.
-    schema = pa.schema([(name, numbers.get(name, pa.string())) for name in names])
-    try:
-        pq.write_table(pa.Table.from_pylist(rows, schema=schema), path)
-    except OSError as error:
-        raise StudyError(f"cannot write {path}: {error}") from error
-    return len(rows)
-
-
-def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Value]]) -> None:
-    """Write a CSV file with Unix line ends; floats in shortest exact form.
+def write_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write a table as CSV with Unix line ends; floats in shortest exact form.
 
     Raises:
         StudyError: the file cannot be written.
     """
     try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(_texts(row) for row in rows)
+        table.to_csv(path, index=False, lineterminator="\n")
     except OSError as error:
-        raise StudyError(f"cannot write {path}: {error.strerror}") from error
+        raise StudyError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def _texts(row: Sequence[Value]) -> Iterator[str]:
-    for value in row:
-        if isinstance(value, list):
-            yield " ".join(repr(number) for number in value)
-        elif isinstance(value, float):
-            yield repr(value)
-        else:
-            yield "" if value is None else str(value)
+def _write_parquet(path: Path, runs: pd.DataFrame) -> None:
+    # Named types: a column of failed runs alone would have none.
+    types = {name: _TYPES.get(name, "string") for name in runs.columns}
+    if any(isinstance(number, float) for number in runs.get("delivered", ())):
+        types["delivered"] = "Float64"  # a task measures fractions
+    try:
+        runs.astype(types).to_parquet(path, engine="pyarrow", index=False)
+    except ImportError:
+        raise StudyError(
+            "Parquet needs pyarrow: pip install 'swarm-logistics-env[study]', or export to .csv"
+        ) from None
+    except OSError as error:
+        raise StudyError(f"cannot write {path}: {error}") from error

@@ -27,8 +27,10 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.studies.indicator_table import estimate_of, same_runs
 from swarm_logistics_env.studies.matching import Match, match, outcomes
-from swarm_logistics_env.studies.results import StudyResults, estimate_of, same_runs
+from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import seeds_in_words
 
 SUBJECTS = "|".join(DEFINITIONS)
@@ -152,8 +154,8 @@ def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -
 def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
     # A comparison tested against several thresholds answers once.
     comparisons = dict.fromkeys(
-        replace(test.comparison, threshold=gate.number)
-        for test in new.tests
+        replace(test.compared, threshold=gate.number)
+        for test in rows_of(new.indicators)
         if test.indicator == gate.subject
     )
     labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
@@ -181,9 +183,10 @@ def _change(
     gate: Gate, old: StudyResults, new: StudyResults, matched: Match, seeds: Sequence[int] | None
 ) -> _Found:
     before, after = matched.before, matched.after
-    if problem := before.problem or after.problem:
+    problem: str | None = before.problem or after.problem
+    if problem:
         return problem
-    p_o, p_new = before.performance, after.performance
+    p_o, p_new = before.by_seed, after.by_seed
     if seeds is not None:
         if not seeds:
             return (

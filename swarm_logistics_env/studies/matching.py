@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from swarm_logistics_env.studies.results import Cell, StudyResults
+from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import seeds_in_words
 from swarm_logistics_env.tasks.task import Outcome
 
 _Content = tuple[object, ...]  # everything about a condition but its policy
-_Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
+_Judged = dict[str, dict[_Content, Row]]  # keyed by the policy's label
 
 
 @dataclass(frozen=True)
@@ -23,12 +24,12 @@ class Match:
 
     Attributes:
         name: policy, "change" and condition.
-        before, after: the cells of the old and of the new study.
+        before, after: the rows of P in the old and of the new study.
     """
 
     name: str
-    before: Cell
-    after: Cell
+    before: Row
+    after: Row
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     return Matching(tuple(matches), tuple(unmatched), seeds, tuple(notes))
 
 
-def outcomes(results: StudyResults, cell: Cell, seeds: Sequence[int]) -> list[Outcome]:
+def outcomes(results: StudyResults, cell: Row, seeds: Sequence[int]) -> list[Outcome]:
     """Return the outcomes of a cell at the given seeds, in their order.
 
     Raises:
@@ -116,7 +117,7 @@ def _judged(results: StudyResults) -> _Judged:
         if comparison.definition.compares == "policy"
     }
     found: _Judged = {}
-    for cell in results.cells:
+    for cell in rows_of(results.performance):
         if (cell.policy, cell.table, cell.arm) in second:
             continue
         condition = cell.arm.condition
@@ -127,7 +128,7 @@ def _judged(results: StudyResults) -> _Judged:
     return found
 
 
-def _name(policy: str, cell: Cell) -> str:
+def _name(policy: str, cell: Row) -> str:
     return f"{policy}: change, {cell.arm.setting} ({cell.table})"
 
 
@@ -145,7 +146,7 @@ def _without_partner(
 
 
 def _only_in(
-    study: str, policy: str, own: Mapping[_Content, Cell], others: Mapping[_Content, Cell]
+    study: str, policy: str, own: Mapping[_Content, Row], others: Mapping[_Content, Row]
 ) -> Iterator[str]:
     lacking = [cell for content, cell in own.items() if content not in others]
     if lacking:

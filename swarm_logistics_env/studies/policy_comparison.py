@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.comparisons import Comparison, Setting
-from swarm_logistics_env.studies.results import Cell, IndicatorTest, StudyResults
+from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.results import StudyResults
 
 
-@dataclass(frozen=True)
-class CellAgainstBaseline:
+class CellAgainstBaseline(NamedTuple):
     """P of one policy in one cell, beside that of the baseline, the study's first policy.
 
     Attributes:
-        cell: of the policy.
+        cell: the policy's row in the table of performances.
         interquartile_mean, worst_decile: of its P [items].
         difference: its P less the baseline's, paired by seed, with 95 % interval [items]; None
             for the baseline itself, or where runs are missing or share no seeds.
@@ -28,69 +28,65 @@ class CellAgainstBaseline:
         improvement: share of seeds on which it delivers more, ties counting half; None as above.
     """
 
-    cell: Cell
+    cell: Row
     interquartile_mean: float
     worst_decile: float
-    difference: Interval | None
-    ratio: Interval | None
-    improvement: Interval | None
+    difference: Interval | None = None
+    ratio: Interval | None = None
+    improvement: Interval | None = None
 
 
-@dataclass(frozen=True)
-class IndicatorAgainstBaseline:
+class IndicatorAgainstBaseline(NamedTuple):
     """One question asked of every policy.
 
     Attributes:
-        tests: policy by policy; None: the policy was not asked.
-        differences: each policy's indicator less the baseline's with 95 % jackknife interval; None
-            for the baseline, or where it is undefined.
+        tests: rows of the table of indicators by policy, the baseline first.
+        differences: each further policy's indicator less the baseline's with 95 % jackknife
+            interval; None where it is undefined.
     """
 
-    table: str
-    tests: tuple[IndicatorTest | None, ...]
-    differences: tuple[Interval | None, ...]
+    tests: dict[str, Row]
+    differences: dict[str, Interval | None]
+
+    @property
+    def test(self) -> Row:
+        """The first policy's row, for what is the same for all of them."""
+        return next(iter(self.tests.values()))
 
 
 def judged_policies(results: StudyResults) -> tuple[str, ...]:
     """Return the labels of the study's policies, the baseline first."""
-    return tuple(dict.fromkeys(c.policy for c in results.plan.comparisons))
+    return tuple(dict.fromkeys(results.indicators["policy"]))
 
 
 def cells_against_baseline(results: StudyResults) -> dict[str, list[CellAgainstBaseline]]:
-    """Return, table by table, every cell of every policy; cells side by side."""
-    policies = judged_policies(results)
-    found: dict[str, dict[Setting, dict[str, Cell]]] = {}
-    for cell in results.cells:
-        if cell.arm.setting.kind != "policy" and cell.performance.size:
-            cells = found.setdefault(cell.table, {}).setdefault(cell.arm.setting, {})
-            cells[cell.policy] = cell
+    """Return, table by table, every cell of every policy; the policies of a cell one by one."""
+    found: dict[str, dict[Setting, list[Row]]] = {}
+    for cell in rows_of(results.performance):
+        if cell.kind != "policy" and cell.n_seeds:
+            found.setdefault(cell.table, {}).setdefault(cell.arm.setting, []).append(cell)
     return {
         table: [
-            _cell_against_baseline(results, cells[policy], cells.get(policies[0]))
+            _cell_against_baseline(results, cell, cells[0])
             for cells in by_setting.values()
-            for policy in policies
-            if policy in cells
+            for cell in cells
         ]
         for table, by_setting in found.items()
     }
 
 
-def _cell_against_baseline(
-    results: StudyResults, cell: Cell, baseline: Cell | None
-) -> CellAgainstBaseline:
-    difference = ratio = improvement = None
-    comparable = baseline is not None and not (cell.problem or baseline.problem)
-    if baseline is not None and baseline is not cell and comparable and results.plan.paired:
-        difference = difference_interval(baseline.performance, cell.performance)
-        ratio = _ratio(baseline.performance, cell.performance)
-        improvement = spi.probability_of_improvement(baseline.performance, cell.performance)
+def _cell_against_baseline(results: StudyResults, cell: Row, baseline: Row) -> CellAgainstBaseline:
+    p = cell.by_seed
+    summaries = spi.interquartile_mean(p), spi.worst_decile(p)
+    is_baseline = cell is baseline or baseline.policy != judged_policies(results)[0]
+    if is_baseline or cell.problem or baseline.problem or not results.plan.paired:
+        return CellAgainstBaseline(cell, *summaries)
     return CellAgainstBaseline(
         cell,
-        spi.interquartile_mean(cell.performance),
-        spi.worst_decile(cell.performance),
-        difference,
-        ratio,
-        improvement,
+        *summaries,
+        difference_interval(baseline.by_seed, p),
+        _ratio(baseline.by_seed, p),
+        spi.probability_of_improvement(baseline.by_seed, p),
     )
 
 
@@ -105,45 +101,33 @@ def _ratio(baseline: NDArray[np.float64], performance: NDArray[np.float64]) -> I
 
 def indicators_against_baseline(results: StudyResults) -> Iterator[IndicatorAgainstBaseline]:
     """Yield every question that more than one policy was asked, with the differences."""
-    policies = judged_policies(results)
-    asked: dict[object, dict[str, IndicatorTest]] = {}
-    for test in results.tests:
-        comparison = test.comparison
-        if comparison.definition.compares != "policy":
-            asked.setdefault((comparison.table, comparison.question), {})[comparison.policy] = test
-    for by_policy in asked.values():
-        if len(by_policy) < 2:
-            continue
-        tests = tuple(by_policy.get(policy) for policy in policies)
-        baseline = tests[0]
-        yield IndicatorAgainstBaseline(
-            next(iter(by_policy.values())).comparison.table,
-            tests,
-            tuple(
-                None
-                if baseline is None or test is None or test is baseline
-                else _difference(results, baseline, test)
-                for test in tests
-            ),
-        )
+    baseline = judged_policies(results)[0]
+    asked: dict[object, dict[str, Row]] = {}
+    for test in rows_of(results.indicators):
+        if test.kind != "policy":
+            asked.setdefault((test.table, test.compared.question), {})[test.policy] = test
+    for tests in asked.values():
+        if len(tests) > 1:
+            differences = {
+                policy: _difference(results, tests[baseline], test) if baseline in tests else None
+                for policy, test in tests.items()
+                if policy != baseline
+            }
+            yield IndicatorAgainstBaseline(tests, differences)
 
 
-def _difference(
-    results: StudyResults,
-    baseline: IndicatorTest,
-    test: IndicatorTest,
-) -> Interval | None:
+def _difference(results: StudyResults, baseline: Row, test: Row) -> Interval | None:
     if baseline.estimate is None or test.estimate is None or not results.plan.paired:
         return None
 
-    def value(comparison: Comparison, seeds: NDArray[np.intp]) -> float:
-        key = comparison.policy, comparison.table
-        return comparison.estimate(lambda arm: results.by_arm[*key, arm].performance[seeds]).value
+    def value(compared: Comparison, seeds: NDArray[np.intp]) -> float:
+        key = compared.policy, compared.table
+        return compared.estimate(lambda arm: results.by_arm[*key, arm].by_seed[seeds]).value
 
     try:
         return jackknife_interval(
             len(results.plan.seeds),
-            lambda seeds: value(test.comparison, seeds) - value(baseline.comparison, seeds),
+            lambda seeds: value(test.compared, seeds) - value(baseline.compared, seeds),
         )
     except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
         return None

@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.studies.results import IndicatorTest, StudyResults
+from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.results import StudyResults
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """The number of seeds that one comparison needs.
 
     Attributes:
-        test: of the pilot.
+        test: the row of the pilot's table of indicators.
         effect: assumed true value of the indicator: the one named, or the published one.
         seeds: for a verdict at that effect with the wanted power on average; None: `problem` says
             why.
-        least_power: that so many seeds have in nine pilots of ten; None as `seeds`.
+        least_power: power that so many seeds reach in nine pilots of ten; None as `seeds`.
         detectable: distance from the threshold that the pilot's own seeds would find.
         problem: why there is no number of seeds.
     """
 
-    test: IndicatorTest
+    test: Row
     effect: float | None
-    seeds: int | None
-    least_power: float | None
-    detectable: float | None
-    problem: str | None
+    seeds: int | None = None
+    least_power: float | None = None
+    detectable: float | None = None
+    problem: str | None = None
 
 
 def demands(
@@ -46,23 +47,19 @@ def demands(
     Raises:
         IndicatorError: effect not finite, power outside (0, 1).
     """
-    return tuple(_demand(test, effect, power) for test in results.tests)
+    return tuple(_demand(test, effect, power) for test in rows_of(results.indicators))
 
 
-def _demand(test: IndicatorTest, effect: float | None, power: float) -> Demand:
-    assumed = test.published if effect is None else effect
+def _demand(test: Row, effect: float | None, power: float) -> Demand:
     estimate = test.estimate
+    if effect is None and not math.isnan(test.published):
+        effect = test.published
     if estimate is None:
-        return Demand(test, assumed, None, None, None, test.problem)
+        return Demand(test, effect, problem=test.problem)
     detectable = spi.minimum_detectable_effect(estimate, power)
-    if assumed is None:
-        return Demand(test, None, None, None, detectable, "no effect is named")
-    seeds = spi.seeds_for_power(estimate, assumed, power)
-    return Demand(
-        test,
-        assumed,
-        seeds,
-        None if seeds is None else spi.lower_decile_of_power(estimate, assumed, seeds),
-        detectable,
-        spi.no_plan_because(estimate, assumed),
-    )
+    if effect is None:
+        return Demand(test, None, detectable=detectable, problem="no effect is named")
+    seeds = spi.seeds_for_power(estimate, effect, power)
+    least = None if seeds is None else spi.lower_decile_of_power(estimate, effect, seeds)
+    problem = spi.no_plan_because(estimate, effect)
+    return Demand(test, effect, seeds, least, detectable, problem)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.scaling import ScalingFit, Weighting
 from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.policy_comparison import difference_interval
-from swarm_logistics_env.studies.results import Cell, StudyResults
+from swarm_logistics_env.studies.results import StudyResults
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # The weighting that the laws are fitted with, then the one that shows how far N* hangs on it.
 WEIGHTINGS: tuple[Weighting, ...] = ("1/P", "none")
@@ -24,24 +29,20 @@ class SizeSeries:
     Attributes:
         policy: label; None: the reference's published runs.
         table: heading of the table whose sizes they are.
-        sizes: swarm sizes N [robots], ascending.
-        performance: mean P at each size with its interval [items]; published runs have none.
-        saturated: whether P is capped, at each size.
+        cells: rows of the table of performances, by ascending swarm size; of the published runs
+            with P as `mean`, without limits.
         fits: both laws under both weightings, the better law of a weighting first.
         problem: why there are no fits; None: there are.
     """
 
     policy: str | None
     table: str
-    sizes: tuple[int, ...]
-    performance: tuple[Interval, ...]
-    saturated: tuple[bool, ...]
+    cells: pd.DataFrame
     fits: tuple[ScalingFit, ...]
     problem: str | None
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """The gain of the step from one swarm size to the next.
 
     Attributes:
@@ -49,7 +50,7 @@ class Step:
         efficiency: P/N at the larger size with its interval [items per robot].
         marginal_gain: P(N2) - (N2/N1) P(N1) with its paired interval [items]; above 0 where S > 1.
         karp_flatt: serial fraction with the interval that S's gives; None where P(N1) is 0.
-        saturated: it rests on a P that is capped.
+        saturated: whether it rests on a P that is capped.
     """
 
     before: int
@@ -62,84 +63,64 @@ class Step:
 
 def size_series(results: StudyResults) -> tuple[SizeSeries, ...]:
     """Return every series of swarm sizes, the reference's published ones last."""
-    found = [
-        _series(policy, table, [(cell, cell.mean) for cell in cells])
-        for (policy, table), cells in _by_table(results).items()
-    ]
-    published = {
-        table: cells
-        for (_, table), cells in _by_table(results).items()
-        if all(cell.published is not None for cell in cells)
-    }
-    for table, cells in published.items():
-        runs = [(c, Interval(float(c.published or 0.0), None, None)) for c in cells]
-        found.append(_series(None, table, runs))
-    return tuple(found)
+    found, published = [], {}
+    p = results.performance
+    for (policy, table), cells in groups_of(p[p["kind"] == "size"], "policy", "table"):
+        ascending = cells.sort_values("value")
+        problem = None
+        for cell in rows_of(ascending[ascending["problem"].notna()][:1]):
+            problem = f"{cell.cell}: {cell.problem}"
+        found.append(_series(policy, table, ascending, problem))
+        if ascending["published"].notna().all():
+            runs = ascending.assign(
+                mean=ascending["published"], low=math.nan, high=math.nan, saturated=False
+            )
+            published[table] = _series(None, table, runs, None)
+    return (*found, *published.values())
 
 
-def steps(results: StudyResults, policy: str, table: str) -> Iterator[Step]:
+def _series(policy: str | None, table: str, cells: pd.DataFrame, problem: str | None) -> SizeSeries:
+    known = cells.dropna(subset="mean")
+    sizes, means = known["value"].tolist(), known["mean"].tolist()
+    fits: list[ScalingFit] = []
+    if problem is None and len(set(means)) == 1 < len(means):
+        problem = f"P is {means[0]:.1f} at every size"
+    if problem is None:
+        try:
+            for weighting in WEIGHTINGS:
+                fits += spi.compare_scaling(sizes, means, weighting=weighting)
+        except spi.IndicatorError as error:
+            problem = str(error)
+    return SizeSeries(policy, table, cells, tuple(fits), problem)
+
+
+def steps(results: StudyResults, series: SizeSeries) -> Iterator[Step]:
     """Yield the steps between neighbouring sizes whose runs are complete."""
-    cells = _by_table(results)[policy, table]
-    for small, large in itertools.pairwise(cells):
+    paired = results.plan.paired
+    for small, large in itertools.pairwise(rows_of(series.cells)):
         if small.problem or large.problem:
             continue
-        n_1, n_2 = int(small.arm.setting.value), int(large.arm.setting.value)
+        n_1, n_2 = int(small.value), int(large.value)
         yield Step(
             n_1,
             n_2,
-            _scaled(spi.mean_interval(large.performance), 1 / n_2),
-            _gain(small, large, n_1, n_2, paired=results.plan.paired),
-            _karp_flatt(small, large, n_1, n_2, paired=results.plan.paired),
+            _scaled(spi.mean_interval(large.by_seed), 1 / n_2),
+            _gain(small, large, paired=paired),
+            _karp_flatt(small, large, n_1, n_2, paired=paired),
             small.saturated or large.saturated,
         )
 
 
-def _by_table(results: StudyResults) -> dict[tuple[str, str], list[Cell]]:
-    tables: dict[tuple[str, str], list[Cell]] = {}
-    for cell in results.cells:
-        if cell.arm.setting.kind == "size":
-            tables.setdefault((cell.policy, cell.table), []).append(cell)
-    return {
-        name: sorted(cells, key=lambda cell: cell.arm.setting.value)
-        for name, cells in tables.items()
-    }
-
-
-def _series(
-    policy: str | None, table: str, cells: Sequence[tuple[Cell, Interval | None]]
-) -> SizeSeries:
-    known = [(cell, mean) for cell, mean in cells if mean is not None]
-    sizes = tuple(int(cell.arm.setting.value) for cell, _ in known)
-    means = tuple(mean for _, mean in known)
-    problem: str | None = None
-    fits: list[ScalingFit] = []
-    incomplete = [cell for cell, _ in cells if policy is not None and cell.problem]
-    if incomplete:
-        problem = f"{incomplete[0].arm.setting}: {incomplete[0].problem}"
-    elif len({mean.value for mean in means}) == 1 < len(means):
-        problem = f"P is {means[0].value:.1f} at every size"
-    else:
-        try:
-            for weighting in WEIGHTINGS:
-                fits += spi.compare_scaling(
-                    sizes, [mean.value for mean in means], weighting=weighting
-                )
-        except spi.IndicatorError as error:
-            problem = str(error)
-    saturated = tuple(cell.saturated and policy is not None for cell, _ in known)
-    return SizeSeries(policy, table, sizes, means, saturated, tuple(fits), problem)
-
-
-def _gain(small: Cell, large: Cell, n_1: int, n_2: int, *, paired: bool) -> Interval:
-    before, after = n_2 / n_1 * small.performance, large.performance
+def _gain(small: Row, large: Row, *, paired: bool) -> Interval:
+    before, after = large.value / small.value * small.by_seed, large.by_seed
     if paired:
         return difference_interval(before, after)
     return Interval(float(after.mean() - before.mean()), None, None)
 
 
-def _karp_flatt(small: Cell, large: Cell, n_1: int, n_2: int, *, paired: bool) -> Interval | None:
+def _karp_flatt(small: Row, large: Row, n_1: int, n_2: int, *, paired: bool) -> Interval | None:
     try:
-        s = spi.scalability(small.performance, large.performance, n=n_1, m=n_2 - n_1, paired=paired)
+        s = spi.scalability(small.by_seed, large.by_seed, n=n_1, m=n_2 - n_1, paired=paired)
     except spi.IndicatorError:
         return None
     # The speed-up X = 1 + S m/N is S's, so Fieller's limits carry over; e falls as X rises.

@@ -250,19 +250,25 @@ class Study:
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error."""
-        _need_pandas()
         import pandas as pd
 
         wanted = {run.key for run in self.plan().runs()}
         with self._store(existing=True) as store:
             return pd.DataFrame(row for row in store.rows() if row["run"] in wanted)
 
-    def indicators(self) -> pd.DataFrame:
-        """Return one row per comparison: indicator, interval, verdicts, claim."""
-        _need_pandas()
-        import pandas as pd
+    def performance(self) -> pd.DataFrame:
+        """Return one row per policy and condition: mean P, its intervals, P seed by seed.
 
-        return pd.DataFrame(self.findings().indicator_table())
+        The columns are those of `performance_table.PERFORMANCE`.
+        """
+        return self.findings().performance
+
+    def indicators(self) -> pd.DataFrame:
+        """Return one row per comparison: indicator, interval, verdicts, claim.
+
+        The columns are those of `indicator_table.INDICATORS`.
+        """
+        return self.findings().indicators
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
         """Write report.md, cells.csv and claims.csv into a directory; return their paths.
@@ -312,12 +318,3 @@ class Study:
             self._memory = Store(None)
             finalize(self, self._memory.close)
         yield self._memory
-
-
-def _need_pandas() -> None:
-    try:
-        import pandas  # noqa: F401 - whether it is there
-    except ImportError:
-        raise StudyError(
-            "a DataFrame needs pandas: pip install 'swarm-logistics-env[study]'"
-        ) from None

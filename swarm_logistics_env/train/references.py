@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from swarm_logistics_env.errors import StudyError, TrainingError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.wrappers.condition import Condition, changes_of
 
@@ -27,18 +26,17 @@ def performances_of_study(directory: str | Path, own: Scenario) -> dict[Conditio
         results = Study.stored(directory).findings()
     except StudyError as error:
         raise TrainingError(f"indicators.references: {error}") from error
-    labels = {cell.policy for cell in results.cells}
+    labels = set(results.performance["policy"])
     if len(labels) != 1:
         raise TrainingError(
             f"indicators.references: the study in {directory} is of {', '.join(sorted(labels))}: "
             "should be of one policy"
         )
     performances: dict[Condition, float] = {}
-    for cell in results.cells:
+    for cell in rows_of(results.performance):
         condition = cell.arm.condition
-        if cell.performance.size and not condition.behaviour:
-            met = _met(condition.scenario, condition.faults, own)
-            performances[met] = float(np.mean(cell.performance))
+        if cell.n_seeds and not condition.behaviour:
+            performances[_met(condition.scenario, condition.faults, own)] = cell.mean
     return performances
 
 

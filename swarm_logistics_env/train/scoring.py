@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Arm
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.train.training import Training
 
@@ -49,26 +51,30 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
 
 def scores_of(results: StudyResults) -> tuple[Score, ...]:
     """Return every P and every indicator of a study with its interval."""
-    found: list[tuple[str, Arm, Any, int]] = [
-        ("P", cell.arm, cell.mean, cell.performance.size) for cell in results.cells
-    ]
-    found += [
-        (test.comparison.indicator, test.comparison.changed, estimate, estimate.n_seeds)
-        for test in results.tests
-        if (estimate := test.estimate) is not None
-    ]
-    scores = (
+    scores = [
         Score(
-            measure=measure,
-            condition=_in_words(arm),
+            measure="P",
+            condition=_in_words(cell.arm),
+            value=cell.mean,
+            low=None if isnan(cell.low) else cell.low,
+            high=None if isnan(cell.high) else cell.high,
+            seeds=cell.n_seeds,
+        )
+        for cell in rows_of(results.performance)
+        if cell.n_seeds
+    ]
+    scores += [
+        Score(
+            measure=comparison.indicator,
+            condition=_in_words(comparison.changed),
             value=estimate.value,
             low=estimate.low,
             high=estimate.high,
-            seeds=seeds,
+            seeds=estimate.n_seeds,
         )
-        for measure, arm, estimate, seeds in found
+        for estimate, comparison in rows_of(results.indicators[["estimate", "compared"]])
         if estimate is not None
-    )
+    ]
     return tuple(dict.fromkeys(scores))
 
 

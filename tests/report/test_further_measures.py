@@ -11,19 +11,24 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report.document import document, figures_of
+from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import NO_FAULT, OTHER_BEHAVIOUR, Setting
-from swarm_logistics_env.studies.fault_runs import anchoring_loads, fault_budgets
-from swarm_logistics_env.studies.mid_run_faults import Resilience, rate_curves, resiliences
+from swarm_logistics_env.studies.fault_measures import (
+    Resilience,
+    anchoring_loads,
+    fault_budgets,
+    rate_curves,
+    resiliences,
+)
 from swarm_logistics_env.studies.policy_comparison import (
     cells_against_baseline,
     indicators_against_baseline,
     jackknife_interval,
 )
 from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.size_series import steps
+from swarm_logistics_env.studies.size_series import size_series, steps
 from swarm_logistics_env.tasks.task import Outcome
 
 ONSET, END = 600.0, 2000.0
@@ -96,13 +101,12 @@ def test_swarm_that_comes_back_has_a_self_repair_time(repaired: StudyResults) ->
     assert one.repair.low <= 600 <= one.repair.high < 660
     ((*_, reading),) = table(repaired, "Self-repair time")
     assert reading == "a loss, and back"
-    assert one.single is not None
     fault, null = one.single
-    assert (fault.runs, null.runs) == (SEEDS, SEEDS)
+    assert (fault.total, null.total) == (SEEDS, SEEDS)
     medians = fault.curve.median(), null.curve.median()
     assert None not in medians
     assert medians[0] > 550 > medians[1]  # type: ignore[operator]
-    names = [figure.name for figure in figures_of(document(repaired))]
+    names = [figure.name for figure in document(repaired).figures()]
     assert "self-repair-swarm-dt-Fault-tolerance-and-robustness-dead-600s" in names
 
 
@@ -155,16 +159,15 @@ def test_null_that_ran_out_of_items_is_none(repaired: StudyResults) -> None:
 
 def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) -> None:
     (comparison,) = (c for c in repaired.plan.comparisons if c.indicator == "FT")
-    whole, removed, fault = rate_curves(repaired, comparison)
-    assert (whole.label, removed.label, fault.label) == ("no fault", "removed", "fault")
-    at = {second: index for index, second in enumerate(fault.seconds)}
-    assert fault.seconds[0] == 100.0
-    assert fault.seconds[-1] == END
+    rates = rate_curves(repaired, comparison)
+    assert list(rates["runs"].unique()) == ["no fault", "removed", "fault"]
+    assert (rates["seconds"].min(), rates["seconds"].max()) == (100.0, END)
     # 0.5 deliveries a second, in 100 s.
-    assert whole.rates[at[900.0]].value == pytest.approx(50, abs=6)
-    assert fault.rates[at[900.0]].value == pytest.approx(20, abs=6)
-    assert fault.rates[at[1800.0]].value == pytest.approx(50, abs=6)
-    names = [figure.name for figure in figures_of(document(repaired))]
+    deliveries = rates.set_index(["runs", "seconds"])["deliveries"]
+    assert deliveries["no fault", 900.0] == pytest.approx(50, abs=6)
+    assert deliveries["fault", 900.0] == pytest.approx(20, abs=6)
+    assert deliveries["fault", 1800.0] == pytest.approx(50, abs=6)
+    names = [figure.name for figure in document(repaired).figures()]
     assert "deliveries-swarm-dt-Fault-tolerance-and-robustness-dead-600s" in names
 
 
@@ -231,12 +234,11 @@ def two_policies(seeds: int, factor: float) -> StudyResults:
 def test_policies_are_set_against_the_first() -> None:
     found = two_policies(8, 2.0)
     entries = {
-        (c.cell.policy, str(c.cell.arm.setting)): c
-        for c in cells_against_baseline(found)["Scalability"]
+        (c.cell.policy, c.cell.cell): c for c in cells_against_baseline(found)["Scalability"]
     }
     first, second = entries["swarm-dt", "N = 10"], entries["random-walk", "N = 10"]
     assert first.difference is None
-    assert first.cell.performance.tolist() == [20, 22, 24, 26] * 2
+    assert first.cell.by_seed.tolist() == [20, 22, 24, 26] * 2
     assert (first.interquartile_mean, first.worst_decile) == (23.0, 20.0)
     assert second.difference == spi.mean_interval([20, 22, 24, 26] * 2)
     assert first.ratio is None
@@ -245,8 +247,7 @@ def test_policies_are_set_against_the_first() -> None:
     assert second.improvement.value == 1.0
     # Twice the deliveries everywhere leaves every ratio as it was.
     one, *_ = indicators_against_baseline(found)
-    assert one.differences[0] is None
-    assert one.differences[1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert one.differences["random-walk"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     titles = {chapter.title for chapter in document(found).chapters}
     assert "Policies compared" in titles
     alone = judge(Study(sizes=[{"values": [5, 10]}]).plan(), {}, declared_seeds=20)
@@ -268,12 +269,12 @@ def test_several_policies_over_one_seed_give_values_alone() -> None:
     text = markdown(document(two_policies(1, 2.0)))
     assert "## Policies compared" in text
     one, *_ = indicators_against_baseline(two_policies(1, 2.0))
-    assert one.differences[1] == (0.0, None, None)
+    assert one.differences["random-walk"] == (0.0, None, None)
 
 
 def test_what_robots_are_worth() -> None:
     found = two_policies(4, 1.0)
-    first, second, third = steps(found, "swarm-dt", "Scalability")
+    first, second, third = steps(found, size_series(found)[0])
     # Means 13, 23, 33, 39 at N = 5, 10, 20, 40.
     assert first.efficiency.value == pytest.approx(2.3)
     assert second.marginal_gain.value == pytest.approx(33 - 2 * 23)
@@ -291,7 +292,7 @@ def test_serial_fraction_is_unbounded_where_growth_may_be_nil() -> None:
     found = judged(
         study, lambda _, level, seed: Outcome("", np.arange(float(p[int(level.value)][seed])))
     )
-    (step,) = steps(found, "swarm-dt", "Scalability")
+    (step,) = steps(found, *size_series(found))
     assert step.karp_flatt is not None
     assert step.karp_flatt.high == math.inf
 
@@ -306,17 +307,17 @@ def test_jackknife_of_a_mean_is_its_t_interval() -> None:
 
 
 def test_differences_of_policies_are_drawn_table_by_table() -> None:
-    figures = {f.name: f for f in figures_of(document(two_policies(8, 2.0)))}
+    figures = {f.name: f for f in document(two_policies(8, 2.0)).figures()}
     sizes = figures["differences-Scalability"]
-    assert {row[:3] for row in sizes.rows} == {
-        ("P", "random-walk", "swarm-dt"),
-        ("S", "random-walk", "swarm-dt"),
-    }
-    at_10 = next(row for row in sizes.rows if row[0] == "P" and row[3] == "10")
-    assert at_10[4:] == pytest.approx(spi.mean_interval([20, 22, 24, 26] * 2))
+    (at_10,) = sizes.data.query("of == 'P' and cell == '10'")[
+        ["policy", "less", "difference", "low", "high"]
+    ].to_numpy()
+    assert set(sizes.data["of"]) == {"P", "S"}
+    assert at_10[:2].tolist() == ["random-walk", "swarm-dt"]
+    assert tuple(at_10[2:]) == pytest.approx(spi.mean_interval([20, 22, 24, 26] * 2))
     faults = figures["differences-Fault-tolerance-and-robustness"]
-    assert {row[0] for row in faults.rows} == {"P", "FT", "R"}
-    assert {row[3] for row in faults.rows} == {"no fault", "removed 1", "FM1 1"}
+    assert set(faults.data["of"]) == {"P", "FT", "R"}
+    assert set(faults.data["cell"]) == {"no fault", "removed 1", "FM1 1"}
 
 
 def test_ablation_is_drawn_with_its_threshold() -> None:
@@ -327,9 +328,9 @@ def test_ablation_is_drawn_with_its_threshold() -> None:
             "", np.arange(float((20 if level.name == "random-walk" else 40) + seed))
         ),
     )
-    (figure,) = figures_of(document(found))
+    (figure,) = document(found).figures()
     assert figure.name == "change-Ablation"
-    ((_, _, indicator, label, value, *_),) = figure.rows
+    ((_, _, indicator, label, value, *_),) = figure.data.to_numpy().tolist()
     assert (indicator, label) == ("change", "random-walk, N = 25")
     assert value == pytest.approx(21.5 / 41.5 - 1)
 
@@ -340,7 +341,7 @@ def test_policies_that_differ_in_punctuation_have_files_of_their_own() -> None:
         policies=["swarm-dt", *chosen], seeds=1, faults=[{"modes": ["FM1"], "robots": [1]}]
     )
     found = judged(study, lambda *_: Outcome("", np.arange(30.0)))
-    names = [figure.name for figure in figures_of(document(found))]
+    names = [figure.name for figure in document(found).figures()]
     assert len({name.lower() for name in names}) == len(names)
     assert "FT-R-swarm-dt-Fault-tolerance-and-robustness" in names
     assert "FT-R-Swarm-DT-Fault-tolerance-and-robustness-2" in names

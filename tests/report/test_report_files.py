@@ -13,12 +13,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from swarm_logistics_env.report.document import document, figures_of
+from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.report_files import write_report
 from swarm_logistics_env.report.wording import sentence
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Setting
 from swarm_logistics_env.studies.paper import PAPER
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -87,7 +88,7 @@ def test_page_needs_nothing_but_itself(directory: Path) -> None:
 
 
 def test_every_figure_comes_as_drawing_and_data(found: StudyResults, directory: Path) -> None:
-    names = [figure.name for figure in figures_of(document(found))]
+    names = [figure.name for figure in document(found).figures()]
     assert len(names) == len(set(names)) >= 5
     page, text = (directory / "report.html").read_text(), (directory / "report.md").read_text()
     for name in names:
@@ -100,7 +101,7 @@ def test_every_figure_comes_as_drawing_and_data(found: StudyResults, directory: 
 
 
 def test_every_verdict_quotes_seeds_interval_and_both_verdicts(found: StudyResults) -> None:
-    for test in found.tests:
+    for test in rows_of(found.indicators):
         estimate = test.estimate
         assert estimate is not None
         told = sentence(found, test)
@@ -109,16 +110,15 @@ def test_every_verdict_quotes_seeds_interval_and_both_verdicts(found: StudyResul
         assert "Unadjusted: " in told.text
         assert "Holm-adjusted: " in told.text
         assert re.search(r"N = \d+", told.head)
-        if test.comparison.changed.setting.kind == "fault":
-            level = test.comparison.changed.setting
-            assert f"Failure mode {level.name}, m = {level.value}" in told.head
+        if test.kind == "fault":
+            assert f"Failure mode {test.factor}, m = {test.after:g}" in told.head
 
 
 def test_blocked_verdict_says_why(found: StudyResults) -> None:
     key = found.plan.comparisons[0].changed.condition.run(found.plan.code, 2).key
     outcomes = {name: o for name, o in found.outcomes.items() if name != key}
     blocked = judge(found.plan, outcomes, declared_seeds=4)
-    told = sentence(blocked, blocked.tests[0])
+    told = sentence(blocked, next(rows_of(blocked.indicators)))
     assert told.verdict == "blocked"
     assert "N = 10: 1 of 4 runs missing" in told.text
 
@@ -126,10 +126,12 @@ def test_blocked_verdict_says_why(found: StudyResults) -> None:
 def test_saturated_cells_and_all_that_rests_on_them_are_marked(
     found: StudyResults, directory: Path
 ) -> None:
-    marked = {test.comparison.label for test in found.tests if "†" in sentence(found, test).text}
+    marked = {
+        test.comparison for test in rows_of(found.indicators) if "†" in sentence(found, test).text
+    }
     assert marked == {f"warehouse_width 5 -> {x}" for x in (10, 15, 20)}
     page = (directory / "report.html").read_text()
-    assert "† saturated" in page
+    assert "† marks a P that is capped" in page
     drawing = ElementTree.parse(directory / "figures" / "A.svg")
     assert sum(element.text == "†" for element in drawing.iter()) == 3
     drawing = ElementTree.parse(directory / "figures" / "S-Table-I-scalability.svg")

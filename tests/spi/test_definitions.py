@@ -13,6 +13,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition
 from swarm_logistics_env.spi.estimate import Estimate, judge
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
 
 
 def test_each_row_calls_its_function_with_the_paper_s_numbers() -> None:
@@ -43,21 +44,20 @@ def test_a_new_row_reaches_the_report(
 ) -> None:
     row = Definition(
         symbol="K",
-        name="performance kept",
+        heading="performance kept K",
         compares="fault",
         performances={"p_o": "P_o", "p_f": "P_F"},
         function=kept,
         arguments=lambda _: {},
         adjectives={0.0: "alive"},
-        axis="performance kept K",
     )
     monkeypatch.setitem(DEFINITIONS, "K", row)
     study = Study(**small, indicators=["K"])
     study.run()
-    (*_, test) = study.findings().tests
+    (*_, test) = rows_of(study.findings().indicators)
     p_f, p_o = (
         [o.delivered for o in study.findings().outcomes_of(arm) or ()]
-        for arm in (test.comparison.changed, test.comparison.original)
+        for arm in (test.compared.changed, test.compared.original)
     )
     assert test.estimate is not None
     assert test.estimate.value == pytest.approx(sum(p_f) / sum(p_o))

@@ -9,8 +9,9 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study, paper
+from swarm_logistics_env.studies.fault_measures import resiliences
 from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.mid_run_faults import resiliences
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
@@ -202,7 +203,7 @@ size,n_robots,10,22
 
 
 def test_unequally_many_runs_are_judged_unpaired(tmp_path: Path) -> None:
-    (test,) = imported(tmp_path, MANY).findings().tests
+    (test,) = rows_of(imported(tmp_path, MANY).findings().indicators)
     assert test.estimate is not None
     assert not test.estimate.paired
     assert test.estimate.value == pytest.approx(1.0)
@@ -219,11 +220,11 @@ def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
         ]
     )
     study = imported(tmp_path, text)
-    (test,) = study.findings().tests
-    assert test.comparison.policy == "theirs"
+    (test,) = rows_of(study.findings().indicators)
+    assert test.policy == "theirs"
     assert test.estimate is not None
     assert test.estimate.paired
-    cells = {cell.arm.setting.value: cell.performance.tolist() for cell in study.findings().cells}
+    cells = {cell.value: cell.by_seed.tolist() for cell in rows_of(study.findings().performance)}
     assert cells == {5: [20, 10], 10: [40, 21]}
     # The file's own seeds, so that it can be compared with another file by them.
     assert list(study.plan().seeds) == [3, 7]

@@ -12,6 +12,7 @@ from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
 from swarm_logistics_env.spi.estimate import verdict_at
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
 
 FIELDS: dict[str, Any] = {
     "scenario": {
@@ -33,12 +34,10 @@ def test_each_declared_look_is_taken_at_its_level(tmp_path: Path) -> None:
         results = study.findings()
         assert not results.exploratory
         assert results.confidence == pytest.approx(1 - alpha)
-        (test,) = results.tests
+        (test,) = rows_of(results.indicators)
         assert test.estimate is not None
         assert test.estimate.confidence == results.confidence
-        plain = spi.scalability(
-            *(cell.performance for cell in results.cells), n=2, m=4, confidence=0.95
-        )
+        plain = spi.scalability(*results.performance["by_seed"], n=2, m=4, confidence=0.95)
         assert test.estimate.verdict == verdict_at(alpha, plain.p_value, plain.probability)
     assert results.confidence < 0.96
 
@@ -50,7 +49,7 @@ def test_first_look_of_very_many_has_a_level_below_1() -> None:
     results = study.findings()
     assert not results.exploratory
     assert 0.9999 < results.confidence < 1.0
-    (test,) = results.tests
+    (test,) = rows_of(results.indicators)
     assert test.estimate is not None
     assert test.estimate.verdict == "inconclusive"
     assert "> 99.99 % interval" in markdown(document(results))

@@ -13,8 +13,9 @@ from swarm_logistics_env.report.markup import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.agreement import agreement, agreements
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Setting
-from swarm_logistics_env.studies.fault_runs import fault_budgets
+from swarm_logistics_env.studies.fault_measures import fault_budgets
 from swarm_logistics_env.studies.paper import PAPER
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -69,7 +70,7 @@ def test_the_papers_own_values_agree_with_the_paper(published: StudyResults) -> 
     assert len(figure.cells) == 33
     assert figure.misses is not None
     # Three cells share the base run with 39 under other published values: 41 twice missing.
-    assert {str(cell.arm.setting) for cell in figure.misses} <= {"warehouse_width = 10"}
+    assert set(figure.misses["cell"]) <= {"warehouse_width = 10"}
     assert figure.mean_relative_error < 0.03
     assert figure.mean_log_error == pytest.approx(figure.mean_relative_error, rel=0.1)
     assert figure.met is not None
@@ -91,10 +92,8 @@ def test_misses_and_disorder_are_found() -> None:
 
     (figure,) = agreements(results(p))
     assert figure.misses is not None
-    assert {"N = 20", "N = 30"} <= {str(cell.arm.setting) for cell in figure.misses}
-    assert [(str(a.arm.setting), str(b.arm.setting)) for a, b in figure.disorder] == [
-        ("N = 20", "N = 30")
-    ]
+    assert {"N = 20", "N = 30"} <= set(figure.misses["cell"])
+    assert [(a.cell, b.cell) for a, b in figure.disorder] == [("N = 20", "N = 30")]
 
 
 def test_a_value_in_the_interval_of_one_run_may_lie_outside_that_of_the_mean() -> None:
@@ -103,11 +102,7 @@ def test_a_value_in_the_interval_of_one_run_may_lie_outside_that_of_the_mean() -
     assert figure.met is not None
     assert len(figure.cells) - len(figure.misses) > 20
     assert len(figure.met) < 5
-    logs = [
-        abs(math.log(cell.performance.mean() / cell.published))
-        for cell in figure.cells
-        if cell.published
-    ]
+    logs = [abs(math.log(c.by_seed.mean() / c.published)) for c in rows_of(figure.cells)]
     assert figure.mean_log_error == pytest.approx(np.mean(logs))
 
 
@@ -115,16 +110,14 @@ def test_a_mean_of_zero_has_no_log_error() -> None:
     nothing = results(lambda level: -100.0 if level.kind == "size" else as_published(level))
     (figure,) = agreements(nothing)
     assert figure.mean_log_error is None
-    rest = tuple(cell for cell in figure.cells if cell.arm.setting.kind != "size")
+    rest = figure.cells[figure.cells["kind"] != "size"]
     assert agreement(figure.policy, rest).mean_log_error is not None
 
 
 def test_claims_are_judged_in_their_own_direction(published: StudyResults) -> None:
     verdicts = {
-        (j.comparison.indicator, j.comparison.label, j.comparison.threshold): j.on_claim(
-            j.estimate.verdict if j.estimate else None
-        )
-        for j in published.tests
+        (j.indicator, j.comparison, j.threshold): j.claim_verdict
+        for j in rows_of(published.indicators)
     }
     assert verdicts["FT", "FM4, m = 3", 0.0] == "supported"  # claimed: not tolerant
     assert verdicts["S", "N 100 -> 150", 0.0] == "supported"  # claimed: not scalable
@@ -137,15 +130,13 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
     published: StudyResults,
 ) -> None:
     power = {
-        (j.comparison.indicator, j.comparison.label): j
-        for j in published.tests
-        if j.comparison.threshold == 0
+        (j.indicator, j.comparison): j for j in rows_of(published.indicators) if j.threshold == 0
     }
     at_threshold = power["FT", "FM4, m = 1"]
     assert at_threshold.published == 0
-    assert at_threshold.seeds_needed is None
+    assert at_threshold.seeds_for_power_80 is None
     assert "threshold" in str(at_threshold.no_plan)
-    needed = power["FT", "FM4, m = 3"].seeds_needed
+    needed = power["FT", "FM4, m = 3"].seeds_for_power_80
     assert needed is not None
     assert needed < 10
     text = markdown(document(published))
@@ -154,19 +145,17 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
 
 
 def test_holm_never_adds_a_verdict(published: StudyResults) -> None:
-    for test in published.tests:
-        assert test.estimate is not None
-        assert test.adjusted_p is not None
-        assert test.adjusted_p >= (test.estimate.p_value or 0.0)
-        if test.estimate.verdict == "inconclusive":
-            assert test.adjusted_verdict == "inconclusive"
+    for test in rows_of(published.indicators):
+        assert test.p_holm >= test.p_value
+        if test.verdict == "inconclusive":
+            assert test.verdict_holm == "inconclusive"
 
 
 def test_saturated_cell_marks_what_rests_on_it() -> None:
     narrow = Setting("parameter", "warehouse_width", 5.0)
     found = results(as_published, full=narrow)
-    assert [cell.arm.setting for cell in found.cells if cell.saturated] == [narrow]
-    marked = {j.comparison.label for j in found.tests if j.saturated}
+    assert [cell.arm.setting for cell in rows_of(found.performance) if cell.saturated] == [narrow]
+    marked = set(found.indicators["comparison"][found.indicators["saturated"]])
     assert marked == {f"warehouse_width 5 -> {x}" for x in (10, 15, 20)}
     text = markdown(document(found))
     # The cell; its indicators in a table, the claims and a sentence; caption and explanation.
@@ -179,33 +168,27 @@ def test_ablation_that_falls_is_supported(published: StudyResults) -> None:
             return 30.0
         return as_published(level)
 
-    changes = [j for j in results(p).tests if j.comparison.indicator == "change"]
+    found = results(p).indicators
+    changes = found[found["indicator"] == "change"]
     # At N = 25: 39 -> 30; at N = 100: 74 -> 30, beyond a third.
-    assert [j.on_claim(j.adjusted_verdict) for j in changes] == ["supported", "supported"]
+    assert list(changes["claim_verdict_holm"]) == ["supported", "supported"]
     titles = [section.title for section in document(published).summary]
     assert "swarm-dt: Ablation: without taxis" in titles
 
 
 def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
     found = results(as_published, same=frozenset({"FM2"}))
-    unaffected = [j for j in found.tests if j.unaffected]
-    assert {(j.comparison.indicator, j.comparison.changed.setting.name) for j in unaffected} == {
-        ("R", "FM2")
-    }
-    for test in unaffected:
-        assert test.estimate is not None
-        assert test.estimate.value == test.comparison.changed.setting.value / 25
-        assert (test.adjusted_p, test.adjusted_verdict) == (None, None)
-        record = test.record()
-        assert (record["verdict"], record["claim_verdict_holm"]) == ("unaffected", "unaffected")
+    tests = found.indicators
+    unaffected = tests[tests["verdict"] == "unaffected"]
+    assert set(zip(unaffected["indicator"], unaffected["factor"])) == {("R", "FM2")}
+    assert list(unaffected["value"]) == list(unaffected["after"] / 25)
+    assert unaffected["p_holm"].isna().all()
+    assert set(unaffected["claim_verdict_holm"]) == {"unaffected"}
     # Holm's family of R has nine members left, so the smallest p counts nine times.
-    rest = [j for j in found.tests if j.comparison.family == ("swarm-dt", "R")]
-    p_values = [j.estimate.p_value for j in rest if j.estimate and not j.unaffected]
-    assert len(p_values) == 9
-    assert min(j.adjusted_p for j in rest if j.adjusted_p is not None) == pytest.approx(
-        9 * min(p for p in p_values if p is not None)
-    )
-    budgets = {b.comparison.changed.setting.name: b.budget for b in fault_budgets(found)}
+    rest = tests[(tests["indicator"] == "R") & (tests["verdict"] != "unaffected")]
+    assert len(rest) == 9
+    assert rest["p_holm"].min() == pytest.approx(9 * rest["p_value"].min())
+    budgets = {b.compared.changed.setting.name: b.budget for b in fault_budgets(found)}
     assert budgets["FM2"] == (3, None)
     text = markdown(document(found))
     assert "R = 0.080 exactly, over 10 paired seeds (0 to 9): unaffected by construction" in text
@@ -214,8 +197,8 @@ def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
 
 def test_two_seeds_of_the_paper_give_no_verdict() -> None:
     found = results(as_published, seeds=2)
-    assert {j.estimate.verdict for j in found.tests if j.estimate} == {"inconclusive"}
-    assert {j.adjusted_verdict for j in found.tests} == {"inconclusive"}
+    assert set(found.indicators["verdict"]) == {"inconclusive"}
+    assert set(found.indicators["verdict_holm"]) == {"inconclusive"}
 
 
 def test_below_ten_seeds_no_verdict_is_counted() -> None:
@@ -236,5 +219,5 @@ def test_a_study_at_its_cap_everywhere_decides_nothing() -> None:
         for run in plan.runs()
     }
     found = judge(plan, outcomes, declared_seeds=SEEDS)
-    assert {j.estimate.verdict for j in found.tests if j.estimate} == {"inconclusive"}
-    assert {j.adjusted_verdict for j in found.tests} == {"inconclusive"}
+    assert set(found.indicators["verdict"]) == {"inconclusive"}
+    assert set(found.indicators["verdict_holm"]) == {"inconclusive"}

@@ -42,7 +42,7 @@ def test_observed_effect_is_never_taken() -> None:
 
 
 def test_published_effect_is_taken_where_there_is_one() -> None:
-    by_step = {d.test.comparison.label: d for d in demands(pilot("paper"))}
+    by_step = {d.test.comparison: d for d in demands(pilot("paper"))}
     assert by_step["N 10 -> 20"].effect == pytest.approx(0.611, abs=1e-3)
     assert by_step["FM4, m = 2"].effect is not None
 

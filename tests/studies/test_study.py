@@ -23,6 +23,8 @@ from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.export import export
+from swarm_logistics_env.studies.indicator_table import INDICATORS
+from swarm_logistics_env.studies.performance_table import PERFORMANCE
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.studies.shards import Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store
@@ -307,10 +309,9 @@ def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:
     errors = study.results()["error"]
     assert errors.str.contains("RuntimeError: a wheel came off").all()
     assert errors.str.contains("Traceback").all()
-    for test in study.findings().tests:
-        assert test.estimate is None
-        assert test.adjusted_verdict is None
-        assert "3 of 3 runs failed" in str(test.problem)
+    tests = study.indicators()
+    assert tests[["value", "verdict", "verdict_holm"]].isna().all(axis=None)
+    assert tests["problem"].str.contains("3 of 3 runs failed").all()
     study.report()
     assert "blocked" in (tmp_path / "report.md").read_text()
     Failing.broken = False
@@ -319,7 +320,7 @@ def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:
     finally:
         Failing.broken = True
     assert study.results()["error"].isna().all()
-    assert all(test.estimate for test in study.findings().tests)
+    assert study.indicators()["value"].notna().all()
 
 
 def test_one_failed_run_blocks_its_family_under_holm(tmp_path: Path) -> None:
@@ -333,10 +334,10 @@ def test_one_failed_run_blocks_its_family_under_holm(tmp_path: Path) -> None:
             (largest.run(study.plan().code, 1).key,),
         )
     database.close()
-    first, second = study.findings().tests
-    assert first.estimate is not None
-    assert first.adjusted_verdict is None
-    assert second.problem == "N = 6: 1 of 3 runs failed"
+    tests = study.indicators()
+    assert tests["value"].notna().tolist() == [True, False]
+    assert tests["verdict_holm"].isna().all()
+    assert tests["problem"].tolist() == [None, "N = 6: 1 of 3 runs failed"]
 
 
 def test_policy_that_returns_nan_fails_in_words_and_spoils_nothing_else() -> None:
@@ -407,18 +408,17 @@ def test_policy_that_cannot_travel_is_refused(tmp_path: Path) -> None:
     assert study.run(processes=1).failed == 0
 
 
-def test_study_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_study_in_memory() -> None:
     study = Study(**{**SMALL, "seeds": 2})
     with pytest.raises(StudyError, match="nothing has been run"):
         study.results()
     study.run()
-    with monkeypatch.context() as patched:
-        patched.setitem(sys.modules, "pandas", None)
-        for frame in (study.results, study.indicators):
-            with pytest.raises(StudyError, match=r"pip install 'swarm-logistics-env\[study\]'"):
-                frame()
     table = study.indicators()
     assert list(table["indicator"].unique()) == ["S", "FT", "R", "A", "change"]
     assert table["problem"].isna().all()
+    assert list(table.columns) == list(INDICATORS)
+    performance = study.performance()
+    assert list(performance.columns) == list(PERFORMANCE)
+    assert [p.mean() for p in performance["by_seed"]] == performance["mean"].tolist()
     with pytest.raises(StudyError, match="report needs a path"):
         study.report()

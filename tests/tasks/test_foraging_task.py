@@ -54,9 +54,9 @@ def test_a_study_of_every_indicator_runs_resumes_and_reports(tmp_path: Path) -> 
     assert (more.failed, more.kept, more.played) == (0, tally.played, tally.played // 2)
     study = Study.stored(out)
     results = study.findings()
-    asked = {test.comparison.indicator for test in results.tests}
+    asked = set(results.indicators["indicator"])
     assert asked == {"S", "R", "FT", "A", "change"}
-    assert all(cell.performance.size == 3 for cell in results.cells)
+    assert (results.performance["n_seeds"] == 3).all()
     study.report()
     report = (out / "report.md").read_text()
     assert "Performance P is the number of items brought into the nest." in report
@@ -66,8 +66,10 @@ def test_a_study_of_every_indicator_runs_resumes_and_reports(tmp_path: Path) -> 
     # The same bits, whether one process played them or two.
     again = Study.from_file(file, out=tmp_path / "again", seeds=3)
     again.run()
-    for one, other in zip(results.cells, again.findings().cells, strict=True):
-        assert one.performance.tolist() == other.performance.tolist()
+    for one, other in zip(
+        results.performance["by_seed"], again.findings().performance["by_seed"], strict=True
+    ):
+        assert one.tolist() == other.tolist()
 
 
 def test_what_an_outcome_tells_fits_together() -> None:

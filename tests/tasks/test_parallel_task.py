@@ -17,6 +17,7 @@ from swarm_logistics_env.cli.study_commands import study_of
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.engines import execute
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks import ParallelTask, SumOfInfos
@@ -59,7 +60,7 @@ def test_a_study_plays_sizes_parameters_and_failure_modes(file: Path, tmp_path: 
     # N = 2, 4 (which is no fault and length 6), silent, blind, removed, length 12; two policies.
     assert (tally.played, tally.failed) == (6 * 2 * 4, 0)
     results = study.findings()
-    p = {(c.policy, str(c.arm.setting)): c.performance for c in results.cells}
+    p = {(c.policy, c.cell): c.by_seed for c in rows_of(results.performance)}
     assert p["walker", "N = 2"].mean() > 5
     assert p["walker", "length = 12"].mean() < p["walker", "length = 6"].mean()
     assert p["random", "N = 4"].mean() < p["walker", "N = 4"].mean()
@@ -71,8 +72,8 @@ def test_a_study_plays_sizes_parameters_and_failure_modes(file: Path, tmp_path: 
     )
     (test,) = (
         t
-        for t in results.tests
-        if (t.policy, t.indicator, t.comparison.label) == ("walker", "FT", "silent, m = 1")
+        for t in rows_of(results.indicators)
+        if (t.policy, t.indicator, t.comparison) == ("walker", "FT", "silent, m = 1")
     )
     assert test.estimate is not None
     assert test.estimate.value == by_hand.value
@@ -146,11 +147,11 @@ def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Pa
     study.run()
     results = Study.stored(tmp_path, task=task).findings()
     assert all(o.untimed is not None and o.digest for o in results.outcomes.values())
-    blind, frozen = (t for t in results.tests)
+    blind, frozen = rows_of(results.indicators)
     # Random actions do not look: a blind robot changes nothing, and the report says so.
-    assert blind.unaffected
-    assert not frozen.unaffected
-    assert any(p % 1 for cell in results.cells for p in cell.performance)
+    assert blind.verdict == "unaffected"
+    assert frozen.verdict != "unaffected"
+    assert any(p % 1 for p in np.concatenate(list(results.performance["by_seed"])))
 
 
 def test_a_killed_study_goes_on_where_it_was(file: Path, tmp_path: Path) -> None:
@@ -316,5 +317,5 @@ def test_robots_that_fail_in_mid_run_and_recover() -> None:
     late = {**FAULT, "onsets": [20], "duration": 10}
     study = Study(task=LANE, seeds=3, policies=["walker"], indicators=["R"], faults=[FAULT, late])
     assert study.run().failed == 0
-    p = {str(c.arm.setting): c.performance.mean() for c in study.findings().cells}
+    p = {c.cell: c.mean for c in rows_of(study.findings().performance)}
     assert p["silent, m = 1"] < p["silent, m = 1 from 20 s"] < p["no fault"]

@@ -9,6 +9,7 @@ import pytest
 
 from swarm_logistics_env.errors import ScenarioError, StudyError
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.tasks.task import Outcome, Playable
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario, WarehouseTask
@@ -42,7 +43,7 @@ def test_a_study_of_another_task(tmp_path: Path) -> None:
     )
     tally = study.run(processes=2)
     assert (tally.played, tally.failed) == (5 * 3, 0)
-    p = {str(cell.arm.setting): cell.performance.tolist() for cell in study.findings().cells}
+    p = {cell.cell: cell.by_seed.tolist() for cell in rows_of(study.findings().performance)}
     assert p["N = 2"] == [6, 7, 6]
     assert p["dead, m = 1"] == p["removed, m = 1"] == [72, 73, 72]
     study.report()

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.references import performances_of_study
 from swarm_logistics_env.wrappers import Condition
 
@@ -39,8 +39,8 @@ def test_a_study_tells_the_performance_under_each_condition(tmp_path: Path) -> N
     }
     assert set(told) == expected
     (no_fault,) = {
-        float(np.mean(cell.performance))
-        for cell in results.cells
+        cell.mean
+        for cell in rows_of(results.performance)
         if cell.arm.condition.scenario == OWN
         and not cell.arm.condition.faults
         and not cell.arm.condition.behaviour

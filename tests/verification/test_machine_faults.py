@@ -192,8 +192,7 @@ def test_a_worker_out_of_memory_is_a_failed_run_and_nothing_more(
     errors = study.results()["error"].dropna()
     assert len(errors) == 2
     assert errors.str.contains("MemoryError").all()
-    problems = [test.problem for test in study.findings().tests]
-    assert problems == ["N = 4: 2 of 2 runs failed"] * 2
+    assert study.indicators()["problem"].tolist() == ["N = 4: 2 of 2 runs failed"] * 2
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="ray is not installed")

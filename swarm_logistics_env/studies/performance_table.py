@@ -1,0 +1,143 @@
+"""The table of performances: one row for each policy and condition of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.comparisons import Arm, Reference
+from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.tasks.task import Outcome
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Row: TypeAlias = Any  # one row of a table, as `DataFrame.itertuples` gives it
+Columns = Mapping[str, tuple[type, str]]  # name to type and meaning; missing floats are NaN
+
+PERFORMANCE: Columns = {
+    "policy": (object, "label of the policy"),
+    "table": (object, "heading of the report's table"),
+    "cell": (object, "the condition in words, e.g. N = 10"),
+    "kind": (object, "what is varied: size, fault, parameter or policy"),
+    "factor": (object, "its name: n_robots, a failure mode, a parameter, or a policy"),
+    "value": (float, "swarm size N, faulty robots m, or the parameter's value in its unit"),
+    "onset": (float, "when the fault begins [s]"),
+    "n_robots": (int, "swarm size N"),
+    "published": (float, "P of the reference [items]"),
+    "counted": (bool, "whether it is one of the cells of the reference's tables"),
+    "n_seeds": (int, "number of runs that succeeded"),
+    "mean": (float, "mean P [items]"),
+    "low": (float, "lower limit of the 95 % interval of the mean; missing at one seed"),
+    "high": (float, "upper limit of it"),
+    "prediction_low": (float, "lower limit of the 95 % interval of one further run"),
+    "prediction_high": (float, "upper limit of it"),
+    "published_inside": (object, "whether the published P lies in that interval; None: unknown"),
+    "saturated": (bool, "whether a run delivered every item, so that P is capped"),
+    "problem": (object, "why runs are missing; None: they are complete"),
+    "arm": (object, "the setting and the condition"),
+    "by_seed": (object, "P seed by seed [items], shape (n_seeds,)"),
+    "digests": (object, "digest of each run; equal digests: the same run"),
+}
+_UNKNOWN = Interval(np.nan, None, None)
+
+
+def performance_table(
+    plan: Plan, outcomes: Mapping[str, Outcome], reference: Reference | None
+) -> pd.DataFrame:
+    """Return P of every policy and condition of a plan, in the order of the report.
+
+    Args:
+        plan: of the study.
+        outcomes: of its runs, by key.
+        reference: the published performances; None: there are none.
+
+    Returns:
+        A table with the columns of `PERFORMANCE`.
+    """
+    rows = [_row(*cell, plan, outcomes, reference) for cell in plan.cells]
+    return table_of(rows, PERFORMANCE)
+
+
+def rows_of(table: pd.DataFrame) -> Iterator[Row]:
+    """Yield the rows of a table; each column is an attribute."""
+    return iter(table.itertuples(index=False))
+
+
+def groups_of(table: pd.DataFrame, *columns: str) -> Iterator[tuple[Any, pd.DataFrame]]:
+    """Yield the rows that are equal in some columns, in order of appearance.
+
+    Yields:
+        What they have in common (a tuple if that is several columns), and the rows.
+    """
+    yield from table.groupby(list(columns) if len(columns) > 1 else columns[0], sort=False)
+
+
+def table_of(rows: Iterable[Mapping[str, object]], columns: Columns) -> pd.DataFrame:
+    """Return records as a table with the given columns; what a record lacks is missing."""
+    import pandas as pd
+
+    # Missing texts stay None, which pandas would turn into NaN.
+    whole = [{name: row.get(name) for name in columns} for row in rows]
+    frame = pd.DataFrame(whole, columns=list(columns), dtype=object)
+    return frame.astype({name: kind for name, (kind, _) in columns.items()})
+
+
+def _row(
+    policy: str,
+    table: str,
+    arm: Arm,
+    plan: Plan,
+    outcomes: Mapping[str, Outcome],
+    reference: Reference | None,
+) -> dict[str, object]:
+    found = [outcomes.get(arm.condition.run(plan.code, seed).key) for seed in plan.seeds]
+    succeeded = [outcome for outcome in found if outcome is not None and outcome.error is None]
+    p = np.array([outcome.delivered for outcome in succeeded], dtype=np.float64)
+    mean = spi.mean_interval(p) if p.size else _UNKNOWN
+    one_run = spi.prediction_interval(p) if p.size else _UNKNOWN
+    published = reference.performance.get(arm.setting) if reference else None
+    inside = None
+    if published is not None and one_run.low is not None and one_run.high is not None:
+        inside = one_run.low <= published <= one_run.high
+    return {
+        "policy": policy,
+        "table": table,
+        "cell": str(arm.setting),
+        "kind": arm.setting.kind,
+        "factor": arm.setting.name,
+        "value": arm.setting.value,
+        "onset": arm.setting.onset,
+        "n_robots": arm.condition.size,
+        "published": published,
+        "counted": reference is not None and arm.setting in reference.cells,
+        "n_seeds": p.size,
+        "mean": mean.value,
+        "low": mean.low,
+        "high": mean.high,
+        "prediction_low": one_run.low,
+        "prediction_high": one_run.high,
+        "published_inside": inside,
+        "saturated": any(outcome.all_delivered for outcome in succeeded),
+        "problem": _problem(found, paired=plan.paired),
+        "arm": arm,
+        "by_seed": p,
+        "digests": tuple(outcome.digest for outcome in succeeded),
+    }
+
+
+def _problem(found: list[Outcome | None], *, paired: bool) -> str | None:
+    missing = found.count(None)
+    failed = sum(outcome is not None and outcome.error is not None for outcome in found)
+    if not paired and missing < len(found):
+        missing = 0  # unpaired results need not be equally many everywhere
+    parts = [
+        f"{count} of {len(found)} runs {what}"
+        for count, what in ((failed, "failed"), (missing, "missing"))
+        if count
+    ]
+    return ", ".join(parts) or None
