@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from swarm_logistics_env.errors import ScenarioError
@@ -29,8 +29,7 @@ from swarm_logistics_env.warehouse.logistics import (
     open_grippers,
 )
 from swarm_logistics_env.warehouse.packing import unpacked_at
-from swarm_logistics_env.warehouse.radio import send_messages
-from swarm_logistics_env.warehouse.stepping import log_command, move, perceive
+from swarm_logistics_env.warehouse.stepping import begin, finish
 from swarm_logistics_env.warehouse.structs import (
     DELIVERED,
     NOBODY,
@@ -67,18 +66,13 @@ class ForagingScenario(Scenario):
 class Foraging(Warehouse):
     """A world in which every item counts that comes into the nest; P is how many did."""
 
-    def step(self, commands: ArrayLike) -> NDArray[np.float32]:
-        """Move the world by one control period; see `Warehouse.step`."""
-        self._world.commands.now[...] = self._checked(commands)
-        rows = self._blank_rows()
-        nest_radius = 0.5 * self.scenario.delivery_width
-        self.take(rows, forage(self._address, nest_radius, rows))
-        return rows
-
     @property
     def all_delivered(self) -> bool:
         """Whether every item was brought home and none comes back."""
         return bool((self.state.item_status == DELIVERED).all())
+
+    def _advance(self, rows: NDArray[np.float32]) -> bool:
+        return forage(self._address, 0.5 * self.scenario.delivery_width, rows)
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
         super()._lay_out(state, scenario, seed)
@@ -126,27 +120,18 @@ def free_place(
 def forage(address: int, nest_radius: float, rows: NDArray[np.float32]) -> bool:
     """Take a control step in the world at `address`, as `stepping.step` does in the warehouse."""
     world = unpacked_at(World, address)
-    commands, progress, outcome = world.commands, world.progress, world.outcome
-    outcome.refused[0] = refused_command(commands.now, world.robots, world.able)
-    if outcome.refused[0] != NOBODY:
+    world.outcome.refused[0] = refused_command(world.commands.now, world.robots, world.able)
+    if world.outcome.refused[0] != NOBODY:
         return True
-    log_command(commands)
-    progress.step[0] += 1
-    progress.time[0] = progress.step[0] * world.parameters.control_period
-    move(world, commands.now)
-    send_messages(commands.now, world.robots, world.able, progress.step[0])
-    handle_items(world, nest_radius, commands.now)
-    outcome.is_paused[0] = progress.step[0] == progress.pause_step[0]
-    if not outcome.is_paused[0]:
-        perceive(address, rows)
-    is_full = commands.n_logged[0] * len(commands.now) == len(commands.log)
-    return is_full or outcome.n_delivered[0] > 0 or outcome.is_paused[0] or not outcome.is_room[0]
+    begin(world)
+    n_delivered, is_room = handle_items(world, nest_radius)
+    return finish(address, world, rows, n_delivered, is_room)
 
 
 @inlined_kernel
-def handle_items(world: World, nest_radius: float, commands: Numbers) -> None:
-    """Carry along, let go, lift and bring home."""
-    robots, parameters = world.robots, world.parameters
+def handle_items(world: World, nest_radius: float) -> tuple[int, bool]:
+    """Carry along, let go, lift and bring home; returns how many, and whether there was room."""
+    robots, parameters, commands = world.robots, world.parameters, world.commands.now
     carry_along(world)
     for robot in range(len(robots.item)):
         dx = robots.position[robot, 0] - 0.5 * parameters.warehouse_width
@@ -155,15 +140,19 @@ def handle_items(world: World, nest_radius: float, commands: Numbers) -> None:
     n_events = open_grippers(world, commands)
     n_events = close_grippers(world, commands, n_events)
     mask_below_lifters(world, n_events)
-    n_events = bring_home(world, nest_radius, n_events)
+    n_events, n_delivered, is_room = bring_home(world, nest_radius, n_events)
     follow(world.engine, world.claims.events, n_events, world.items.position)
+    return n_delivered, is_room
 
 
 @inlined_kernel
-def bring_home(world: World, nest_radius: float, n_events: int) -> int:
-    """Take the items of all robots in the nest that can deliver; returns the events so far.
+def bring_home(world: World, nest_radius: float, n_events: int) -> tuple[int, int, bool]:
+    """Take the items of all robots in the nest that can deliver.
 
     With `restock` each comes back at a random place, which depends on how many came home before.
+
+    Returns:
+        The number of events so far, of deliveries, and whether all that came back found room.
     """
     robots, items, claims = world.robots, world.items, world.claims
     n_delivered, is_room = 0, True
@@ -187,6 +176,4 @@ def bring_home(world: World, nest_radius: float, n_events: int) -> int:
                 items.status[item] = STORED
                 items.covered[item] = 1
                 n_events = note_event(claims.events, n_events, CAME_BACK, robot, item)
-    world.outcome.n_delivered[0] = n_delivered
-    world.outcome.is_room[0] = is_room
-    return n_events
+    return n_events, n_delivered, is_room

@@ -64,13 +64,31 @@ def take_step(address: int, rows: NDArray[np.float32]) -> bool:
     an item, a full log, the end of the time or of the requests, or a change before the step.
     """
     world = unpacked_at(World, address)
-    commands, progress, outcome = world.commands, world.progress, world.outcome
+    begin(world)
+    n_delivered, is_room = handle_items(world, world.commands.now)
+    return finish(address, world, rows, n_delivered, is_room)
+
+
+@inlined_kernel
+def begin(world: World) -> None:
+    """Take the part of a step before anybody handles items: time, motion and messages."""
+    commands, progress = world.commands, world.progress
     log_command(commands)
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * world.parameters.control_period
     move(world, commands.now)
     send_messages(world, commands.now)
-    n_delivered, is_room = handle_items(world, commands.now)
+
+
+@inlined_kernel
+def finish(
+    address: int, world: World, rows: NDArray[np.float32], n_delivered: int, is_room: bool
+) -> bool:
+    """Take the part of a step after items were handled: let the robots sense, note what is to tell.
+
+    Returns whether there is something, see `take_step`.
+    """
+    commands, progress, outcome = world.commands, world.progress, world.outcome
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:
         perceive(address, rows)

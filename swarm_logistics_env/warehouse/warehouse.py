@@ -124,7 +124,7 @@ class Warehouse:
             commands = self._checked(commands)
         self._world.commands.now[...] = commands
         rows = self._blank_rows()
-        self.take(rows, stepping.step(self._address, rows))
+        self.take(rows, self._advance(rows))
         return rows
 
     def take(self, rows: NDArray[np.float32], is_eventful: bool) -> None:
@@ -235,6 +235,9 @@ class Warehouse:
     def is_over_time(self) -> bool:
         """Whether the scenario's duration has passed."""
         return self.state.step >= self.scenario.n_steps
+
+    def _advance(self, rows: NDArray[np.float32]) -> bool:
+        return stepping.step(self._address, rows)
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
         """Place everything, give it its random streams, and ask for the first item."""
