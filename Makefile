@@ -17,6 +17,8 @@ BENCHMARL := .venvs/benchmarl
 SKRL      := .venvs/skrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
+AGILERL   := .venvs/agilerl
+MINARI    := .venvs/minari
 
 INSTALLED := .venvs/lowest .venvs/newest
 
@@ -32,7 +34,7 @@ help:
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
-	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
+	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, AgileRL, SuperSuit, Minari and two plain loops on the environment; see interop/"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them"
 	@echo "make format          sort imports and format"
@@ -77,14 +79,17 @@ benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 benchmark-learning: $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
 
-interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPERSUIT))
+interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPERSUIT) $(AGILERL) $(MINARI))
 	$(TORCHRL)/bin/python -m interop.torchrl_specs
 	$(TORCHRL)/bin/python -m interop.torchrl_collector
 	$(TORCHRL)/bin/python -m interop.plain_ppo
+	$(TORCHRL)/bin/python -m interop.discrete_loop
 	$(BENCHMARL)/bin/python -m interop.benchmarl_mappo
 	$(SKRL)/bin/python -m interop.skrl_ippo
 	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
 	$(RLLIB)/bin/python -m interop.rllib_ppo
+	$(AGILERL)/bin/python -m interop.agilerl_ippo
+	$(MINARI)/bin/python -m interop.minari_dataset
 
 # study: autodoc reads the package. -W: a warning is an error.
 docs: $(DOCS)/installed
@@ -113,6 +118,8 @@ $(TORCHRL)/installed: OTHERS := torch torchrl
 $(BENCHMARL)/installed: OTHERS := torch benchmarl
 $(SKRL)/installed: OTHERS := torch skrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
+$(AGILERL)/installed: OTHERS := torch agilerl peft
+$(MINARI)/installed: OTHERS := "minari[create,hdf5]"
 $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit
 
