@@ -18,6 +18,8 @@ SKRL      := .venvs/skrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
 TASKS     := .venvs/tasks
+AGILERL   := .venvs/agilerl
+MINARI    := .venvs/minari
 
 INSTALLED := .venvs/lowest .venvs/newest
 
@@ -33,7 +35,7 @@ help:
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
-	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, SuperSuit and a plain PPO loop on the environment; see interop/"
+	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, AgileRL, SuperSuit, Minari and two plain loops on the environment; see interop/"
 	@echo "make tasks           studies of RWARE, simple_spread and VMAS, with their tests; checks the numbers of their pages"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them"
@@ -79,14 +81,17 @@ benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 benchmark-learning: $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
 
-interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPERSUIT))
+interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPERSUIT) $(AGILERL) $(MINARI))
 	$(TORCHRL)/bin/python -m interop.torchrl_specs
 	$(TORCHRL)/bin/python -m interop.torchrl_collector
 	$(TORCHRL)/bin/python -m interop.plain_ppo
+	$(TORCHRL)/bin/python -m interop.discrete_loop
 	$(BENCHMARL)/bin/python -m interop.benchmarl_mappo
 	$(SKRL)/bin/python -m interop.skrl_ippo
 	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
 	$(RLLIB)/bin/python -m interop.rllib_ppo
+	$(AGILERL)/bin/python -m interop.agilerl_ippo
+	$(MINARI)/bin/python -m interop.minari_dataset
 
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks
@@ -121,6 +126,8 @@ $(SKRL)/installed: OTHERS := torch skrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
 $(TASKS)/installed: EXTRAS := study,tasks
 $(TASKS)/installed: OTHERS := hypothesis pytest
+$(AGILERL)/installed: OTHERS := torch agilerl peft
+$(MINARI)/installed: OTHERS := "minari[create,hdf5]"
 $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit
 

@@ -35,23 +35,30 @@ class Noted(Wrapper):
         self.failed.add(int(state.failed.sum()))
 
 
-def with_faults() -> Wrapper:
-    """Return an environment in which 2 of 5 robots have failed from the start."""
-    return Noted(FaultInjection(plain(), "FM1", robots=2, onset=0.0))
+Wrap = Callable[[SwarmLogisticsEnv], Any]
 
 
-def with_sizes() -> Wrapper:
+def with_faults(inner: Wrap = lambda env: env) -> Wrapper:
+    """Return an environment in which 2 of 5 robots have failed from the start.
+
+    Args:
+        inner: what is put around the plain environment first, inside of everything else.
+    """
+    return Noted(FaultInjection(inner(plain()), "FM1", robots=2, onset=0.0))
+
+
+def with_sizes(inner: Wrap = lambda env: env) -> Wrapper:
     """Return one of 3 or 5 robots, by the episode, of whom 1 leaves at 1 s."""
-    return FixedAgents(Noted(SwarmSize(plain(), [3, N_ROBOTS], leave=[(1, 1.0)])))
+    return FixedAgents(Noted(SwarmSize(inner(plain()), [3, N_ROBOTS], leave=[(1, 1.0)])))
 
 
-def with_both() -> Wrapper:
+def with_both(inner: Wrap = lambda env: env) -> Wrapper:
     """Return one with both."""
-    sizes = SwarmSize(plain(), [3, N_ROBOTS], leave=[(1, 1.0)])
+    sizes = SwarmSize(inner(plain()), [3, N_ROBOTS], leave=[(1, 1.0)])
     return FixedAgents(Noted(FaultInjection(sizes, "FM1", robots=2, onset=0.0)))
 
 
-CONDITIONS: dict[str, Callable[[], Any]] = {
+CONDITIONS: dict[str, Callable[..., Any]] = {
     "2 of 5 robots fail at 0 s": with_faults,
     "FixedAgents, 3 or 5 robots, 1 leaves": with_sizes,
     "FixedAgents, 3 or 5 robots, 1 leaves, 2 fail at 0 s": with_both,

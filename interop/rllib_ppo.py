@@ -1,4 +1,4 @@
-"""RLlib: two iterations of PPO, one policy for all robots, through `ParallelPettingZooEnv`."""
+"""RLlib: PPO, one policy for all robots by `ParallelPettingZooEnv`, and one for the whole swarm."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from ray.tune.registry import register_env
 
 from interop.conditions import CONDITIONS, MAX_CYCLES, plain
 from interop.versions import versions
+from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.wrappers import SwarmSize
 
 ITERATIONS = 2
+CENTRAL = "swarm_logistics_central"
 LEAVING = "2 of 5 robots leave at 1 s"
 
 
@@ -23,32 +25,42 @@ def make(config: Any) -> ParallelPettingZooEnv:
     return ParallelPettingZooEnv(makers[config["condition"]]())
 
 
+def make_central(config: Any) -> CentralEnv:
+    """Return the swarm as one agent, with vectors, in the same conditions."""
+    env = CONDITIONS[config["condition"]]()
+    return CentralEnv(env, flat=True)
+
+
 def main() -> None:
-    """Train in every condition, and with agents that leave."""
+    """Train in every condition, with agents that leave, and as one agent."""
     print(versions("ray", "torch", "pettingzoo", "gymnasium"))
     ray.init(num_cpus=1, include_dashboard=False)
     register_env("swarm_logistics_v0", make)
+    register_env(CENTRAL, make_central)
     for name in (LEAVING, *CONDITIONS):
-        train(name)
+        train(name, "swarm_logistics_v0")
+    for name in CONDITIONS:
+        train(name, CENTRAL)
     ray.shutdown()
 
 
-def train(name: str) -> None:
+def train(name: str, env: str) -> None:
     """Train for two iterations and say how long the episodes were."""
     config = (
         PPOConfig()
-        .environment("swarm_logistics_v0", env_config={"condition": name})
+        .environment(env, env_config={"condition": name})
         .env_runners(num_env_runners=0)
-        .multi_agent(policies={"robot"}, policy_mapping_fn=lambda *_, **__: "robot")
         .training(train_batch_size_per_learner=200, minibatch_size=100, num_epochs=2)
     )
+    if env != CENTRAL:
+        config = config.multi_agent(policies={"robot"}, policy_mapping_fn=lambda *_, **__: "robot")
     algorithm = config.build_algo()
     for iteration in range(1, ITERATIONS + 1):
         runners = algorithm.train()["env_runners"]
         length = runners["episode_len_mean"]
         assert length == MAX_CYCLES, length
         taken = runners["num_env_steps_sampled_lifetime"]
-        print(f"{name}, iteration {iteration}: {taken:.0f} steps, episodes of {length:.0f}")
+        print(f"{env}, {name}, iteration {iteration}: {taken:.0f} steps, episodes of {length:.0f}")
     algorithm.stop()
 
 
