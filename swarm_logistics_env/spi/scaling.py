@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -91,19 +91,15 @@ def fit_scaling(
     between_0_and_1("confidence", confidence)
     if law not in CURVES:
         raise IndicatorError(f"law = {law!r}: should be one of {', '.join(CURVES)}")
-    n, observed = _checked(sizes, p, weighting)
-    weights = 1.0 / np.sqrt(observed) if weighting == "1/P" else np.ones_like(observed)
-
-    start = (usl_start if law == "usl" else power_exponential_start)(n, observed)
-    fitted, residual_sum = _least_squares(CURVES[law], start, n, observed, weights)
+    points = _checked(sizes, p, weighting)
+    start = (usl_start if law == "usl" else power_exponential_start)(points.n, points.p)
+    fitted, residual_sum = _least_squares(CURVES[law], start, points)
     peak = peak_of(law, fitted)
     low, high = None, None
     if peak is not None:
         # The search starts below the sharpness of the fit, which may be nearly flat.
         bluntest = min(-_SHARPNESS, sharpness_of(law, fitted, peak) - 5.0)
-        low, high = _peak_limits(
-            law, peak, bluntest, residual_sum, n, observed, weights, confidence
-        )
+        low, high = _peak_limits(law, peak, bluntest, residual_sum, points, confidence)
     names = ("g", "a", "b") if law == "usl" else ("k", "p", "q")
     return ScalingFit(
         law=law,
@@ -114,7 +110,7 @@ def fit_scaling(
         confidence=confidence,
         weighting=weighting,
         residual_sum=residual_sum,
-        aicc=_aicc(residual_sum, n.size),
+        aicc=_aicc(residual_sum, points.n.size),
     )
 
 
@@ -133,9 +129,15 @@ def compare_scaling(
     return tuple(sorted(fits, key=lambda fit: fit.residual_sum))
 
 
-def _checked(
-    sizes: ArrayLike, p: ArrayLike, weighting: Weighting
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+class _Points(NamedTuple):
+    """Swarm sizes, performances there, and the square roots of their weights, shapes (k,)."""
+
+    n: NDArray[np.float64]
+    p: NDArray[np.float64]
+    root_weights: NDArray[np.float64]
+
+
+def _checked(sizes: ArrayLike, p: ArrayLike, weighting: Weighting) -> _Points:
     n, observed = performance("sizes", sizes), performance("p", p)
     if n.size != observed.size:
         raise IndicatorError(f"{n.size} sizes, {observed.size} performances: should be as many")
@@ -149,29 +151,27 @@ def _checked(
         raise IndicatorError('p holds 0 under weighting "1/P": its weight is infinite; use "none"')
     if not observed.any():
         raise IndicatorError("p = 0 at every size: should hold some delivery")
-    return n, observed
+    weighted = weighting == "1/P"
+    return _Points(n, observed, 1.0 / np.sqrt(observed) if weighted else np.ones_like(observed))
 
 
 def _least_squares(
-    curve: Curve,
-    start: NDArray[np.float64],
-    n: NDArray[np.float64],
-    observed: NDArray[np.float64],
-    weights: NDArray[np.float64],
+    curve: Curve, start: NDArray[np.float64], points: _Points
 ) -> tuple[NDArray[np.float64], float]:
     from scipy.optimize import least_squares
 
     def residuals(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
         with np.errstate(all="ignore"):  # the search may step where the law has no value
-            predicted = curve(parameters, n)
-        return np.where(np.isfinite(predicted), (observed - predicted) * weights, 1e6)
+            predicted = curve(parameters, points.n)
+        misses = (points.p - predicted) * points.root_weights
+        return np.where(np.isfinite(predicted), misses, 1e6)
 
     tight = 1e-12
     found = least_squares(
         residuals, start, x_scale="jac", xtol=tight, ftol=tight, gtol=tight, max_nfev=5_000
     )
     if not found.success:
-        raise IndicatorError(f"no law fits sizes {n.tolist()}, p {observed.tolist()}")
+        raise IndicatorError(f"no law fits sizes {points.n.tolist()}, p {points.p.tolist()}")
     return np.asarray(found.x), 2.0 * float(found.cost)
 
 
@@ -180,22 +180,21 @@ def _peak_limits(
     peak: float,
     bluntest: float,
     residual_sum: float,
-    n: NDArray[np.float64],
-    observed: NDArray[np.float64],
-    weights: NDArray[np.float64],
+    points: _Points,
     confidence: float,
 ) -> tuple[float, float]:
     """Every N* whose best fit is not worse than the best of all by an F-test at `confidence`."""
     from scipy.optimize import brentq
     from scipy.special import stdtrit
 
-    if residual_sum <= 1e-12 * float(np.square(observed * weights).sum()):  # the law fits exactly
+    total = float(np.square(points.p * points.root_weights).sum())
+    if residual_sum <= 1e-12 * total:  # the law fits exactly
         return peak, peak
-    df = n.size - 3
+    df = points.n.size - 3
     allowed = residual_sum * (1.0 + float(stdtrit(df, 0.5 + confidence / 2)) ** 2 / df)
 
     def excess(log_peak: float) -> float:
-        return _residual_sum_at(law, math.exp(log_peak), bluntest, n, observed, weights) - allowed
+        return _residual_sum_at(law, math.exp(log_peak), bluntest, points) - allowed
 
     def limit(side: int, farthest: float) -> float | None:
         inner, step = math.log(peak), 0.05
@@ -213,21 +212,14 @@ def _peak_limits(
     return 0.0 if low is None else low, math.inf if high is None else high
 
 
-def _residual_sum_at(
-    law: Law,
-    peak: float,
-    bluntest: float,
-    n: NDArray[np.float64],
-    observed: NDArray[np.float64],
-    weights: NDArray[np.float64],
-) -> float:
+def _residual_sum_at(law: Law, peak: float, bluntest: float, points: _Points) -> float:
     """Least weighted sum of squares with N* held: the factor in closed form, the rest searched."""
     low, high = bluntest, _SHARPNESS
+    weighted = points.p * points.root_weights
     for _ in range(4):  # each grid spans two steps of the one before
         sharpness = np.linspace(low, high, 121)
-        shapes = shapes_with_peak_at(law, peak, sharpness, n) * weights
-        overlap = shapes @ (observed * weights)
-        sums = np.square(observed * weights).sum() - overlap**2 / np.square(shapes).sum(axis=1)
+        shapes = shapes_with_peak_at(law, peak, sharpness, points.n) * points.root_weights
+        sums = np.square(weighted).sum() - (shapes @ weighted) ** 2 / np.square(shapes).sum(axis=1)
         best = int(np.argmin(sums))
         low, high = sharpness[max(best - 1, 0)], sharpness[min(best + 1, 120)]
     return float(sums[best])

@@ -84,18 +84,9 @@ def self_repair(
     """
     between_0_and_1("confidence", confidence)
     followed, bin_seconds = _followed(onset, end)
-    counts = [
-        _counts(name, runs, onset, end)
-        for name, runs in (
-            ("faulty", faulty),
-            ("reference", reference),
-            ("null_pair[0]", null_pair[0]),
-            ("null_pair[1]", null_pair[1]),
-        )
-    ]
-    lead, other, null_lead, null_other = counts
-    _check_pair(("faulty", "reference"), lead, other)
-    _check_pair(("null_pair[0]", "null_pair[1]"), null_lead, null_other)
+    lead, other = _paired_counts(("faulty", "reference"), (faulty, reference), onset, end)
+    null_names = ("null_pair[0]", "null_pair[1]")
+    null_lead, null_other = _paired_counts(null_names, null_pair, onset, end)
     curve = _log_likelihood(lead.sum(axis=0), other.sum(axis=0))
     best = int(curve.argmax())
     p_value = _swapped_p(lead, other, float(curve[best]), generator)
@@ -143,9 +134,7 @@ def repair_times(
         IndicatorError: As for `self_repair`.
     """
     followed, bin_seconds = _followed(onset, end)
-    lead = _counts("faulty", faulty, onset, end)
-    other = _counts("reference", reference, onset, end)
-    _check_pair(("faulty", "reference"), lead, other)
+    lead, other = _paired_counts(("faulty", "reference"), (faulty, reference), onset, end)
     curves = _log_likelihood(lead, other)
     back = curves[:, -1] < curves.max(axis=1) - _ONE_DELIVERY
     back |= curves.max(axis=1) == 0.0
@@ -175,9 +164,13 @@ def _counts(name: str, runs: Sequence[ArrayLike], onset: float, end: float) -> N
     return np.array(rows, dtype=np.float64)
 
 
-def _check_pair(
-    names: tuple[str, str], lead: NDArray[np.float64], other: NDArray[np.float64]
-) -> None:
+def _paired_counts(
+    names: tuple[str, str],
+    pair: tuple[Sequence[ArrayLike], Sequence[ArrayLike]],
+    onset: float,
+    end: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    lead, other = (_counts(name, runs, onset, end) for name, runs in zip(names, pair, strict=True))
     if len(lead) != len(other):
         raise IndicatorError(
             f"unequal seed sets ({names[0]} has {len(lead)}, {names[1]} has {len(other)}): should "
@@ -185,6 +178,7 @@ def _check_pair(
         )
     if not other.any():
         raise IndicatorError(f"{names[1]}: should deliver something after the onset")
+    return lead, other
 
 
 def _log_likelihood(lead: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
