@@ -231,7 +231,7 @@ def rates(canvas: Canvas, panels: Mapping[str, pd.DataFrame], onset: float, y_la
 
     Args:
         canvas: to draw on.
-        panels: the rates (`mid_run_faults.rate_curves`) by the title of their panel.
+        panels: the rates (`fault_measures.rate_curves`) by the title of their panel.
         onset: when the fault begins [s].
         y_label: label of the axis of the rates.
     """

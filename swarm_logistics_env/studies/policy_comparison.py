@@ -85,7 +85,7 @@ def _cell_against_baseline(results: StudyResults, cell: Row, baseline: Row) -> C
     return CellAgainstBaseline(
         cell,
         *summaries,
-        difference_interval(baseline.by_seed, p),
+        t_interval(p - baseline.by_seed),
         _ratio(baseline.by_seed, p),
         spi.probability_of_improvement(baseline.by_seed, p),
     )
@@ -132,11 +132,6 @@ def _difference(results: StudyResults, baseline: Row, test: Row) -> Interval | N
         )
     except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
         return None
-
-
-def difference_interval(before: NDArray[np.float64], after: NDArray[np.float64]) -> Interval:
-    """Return mean(after - before) with its 95 % t-interval, paired by seed; shapes (n,)."""
-    return t_interval(after - before)
 
 
 def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], float]) -> Interval:

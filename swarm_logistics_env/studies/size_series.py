@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.scaling import ScalingFit, Weighting
-from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
-from swarm_logistics_env.studies.policy_comparison import difference_interval
 from swarm_logistics_env.studies.results import StudyResults
 
 if TYPE_CHECKING:
@@ -114,7 +113,7 @@ def steps(results: StudyResults, series: SizeSeries) -> Iterator[Step]:
 def _gain(small: Row, large: Row, *, paired: bool) -> Interval:
     before, after = large.value / small.value * small.by_seed, large.by_seed
     if paired:
-        return difference_interval(before, after)
+        return t_interval(after - before)
     return Interval(float(after.mean() - before.mean()), None, None)
 
 

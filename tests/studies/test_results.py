@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -10,12 +11,14 @@ import pytest
 
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.result_tables import warnings
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.agreement import agreement, agreements
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Setting
 from swarm_logistics_env.studies.fault_measures import fault_budgets
+from swarm_logistics_env.studies.indicator_table import INDICATORS
 from swarm_logistics_env.studies.paper import PAPER
-from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.performance_table import PERFORMANCE, rows_of
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -221,3 +224,26 @@ def test_a_study_at_its_cap_everywhere_decides_nothing() -> None:
     found = judge(plan, outcomes)
     assert set(found.indicators["verdict"]) == {"inconclusive"}
     assert set(found.indicators["verdict_holm"]) == {"inconclusive"}
+
+
+def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
+    found = judge(Study.preset("paper", seeds=2).plan(), {})
+    performance, tests = found.performance, found.indicators
+    assert set(performance["problem"]) == {"2 of 2 runs missing"}
+    assert [p.tolist() for p in performance["by_seed"]] == [[]] * len(performance)
+    for table, columns in ((performance, PERFORMANCE), (tests, INDICATORS)):
+        assert {name: table[name].dtype for name in columns} == {
+            name: np.dtype(kind) for name, (kind, _) in columns.items()
+        }
+    assert performance["mean"].isna().all()
+    assert tests["value"].isna().all()
+    assert tests["published"].notna().any()
+    assert set(tests["verdict"]) == {None}
+
+
+@pytest.mark.parametrize("seeds", [1, 2, 5])
+def test_warnings_are_sentences(seeds: int) -> None:
+    told = warnings(results(as_published, seeds=seeds, same=frozenset({"FM2"})))
+    assert len(told) > 1
+    assert all(re.match(r"[A-Z]\w+ \w+ \w+ ", line) for line in told)
+    assert all(line.endswith(".") for line in told)
