@@ -110,8 +110,8 @@ def _chapters(
     )
     yield Chapter(
         "Results",
-        "P is the number of items delivered. Square brackets hold intervals at the level that the "
-        'heading gives; "one run" is where a single further run falls.',
+        f"P is {results.plan.specification.played.performance}. Square brackets hold intervals at "
+        'the level that the heading gives; "one run" is where a single further run falls.',
         result_tables,
     )
     yield Chapter(
