@@ -16,7 +16,6 @@ from swarm_logistics_env.environment.dict_view import ArrayStep, DictView, agent
 from swarm_logistics_env.environment.reset_options import (
     OPTIONS,
     check_somebody_is_there,
-    checked_count,
     checked_faults,
     checked_options,
     checked_seed,
@@ -95,7 +94,12 @@ class SwarmLogisticsEnv(DictView):
     ) -> None:
         self.scenario = _scenario_of(scenario, fields)
         self.faults = checked_faults("faults", faults)
-        self.max_cycles = None if max_cycles is None else checked_count("max_cycles", max_cycles)
+        is_count = isinstance(max_cycles, int | np.integer) and max_cycles >= 1
+        if max_cycles is not None and not is_count:
+            raise SetupError(
+                f"max_cycles = {max_cycles!r}: should be None or a whole number of at least 1"
+            )
+        self.max_cycles = max_cycles
         modes = self.metadata["render_modes"]
         if render_mode is not None and render_mode not in modes:
             raise SetupError(f"render_mode = {render_mode!r}: should be None or one of {modes}")
@@ -111,8 +115,13 @@ class SwarmLogisticsEnv(DictView):
         self.next_seed = int(np.random.default_rng().integers(2**63))
         self.max_robots = max_robots
         if max_robots is not None:
-            max_robots = checked_count("max_robots", max_robots, least=self.scenario.n_robots)
-            self.declare_spaces(self.scenario.replace(n_robots=max_robots))
+            is_number = isinstance(max_robots, int | np.integer)
+            if not is_number or max_robots < self.scenario.n_robots:
+                raise SetupError(
+                    f"max_robots = {max_robots!r}: should be None or a whole number of at least "
+                    f"n_robots = {self.scenario.n_robots}"
+                )
+            self.declare_spaces(self.scenario.replace(n_robots=int(max_robots)))
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""

@@ -57,12 +57,13 @@ def open_grippers(world: World, commands: Numbers) -> int:
     The requested item is let go of anywhere, another one only outside the delivery area.
     """
     robots, able, items, n_events = world.robots, world.able, world.items, 0
+    requested = world.progress.requested[0]
     for robot in range(len(commands)):
         item = robots.item[robot]
         is_able = robots.present[robot] and able.obeys[robot]
         if item == NOBODY or not is_able or commands[robot, GRIPPER] >= _OPEN:
             continue
-        if robots.in_delivery[robot] and item != world.progress.requested[0]:
+        if robots.in_delivery[robot] and item != requested:
             continue
         if robots.in_delivery[robot] and not able.releases_inside[robot]:
             continue

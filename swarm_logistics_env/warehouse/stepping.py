@@ -106,6 +106,8 @@ def finish(
 def log_command(commands: Commands) -> None:
     """Append the commands of this step to those that a pickle replays."""
     first = commands.n_logged[0] * len(commands.now)
+    if first == len(commands.log):
+        return  # the log was full before, and whoever takes this step over is told so again
     for robot in range(len(commands.now)):
         for column in range(commands.now.shape[1]):
             commands.log[first + robot, column] = commands.now[robot, column]

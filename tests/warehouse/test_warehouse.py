@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.observations import bounds, n_columns, unflatten
-from swarm_logistics_env.warehouse import WarehouseState
+from swarm_logistics_env.warehouse import WarehouseState, stepping
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 N_SCENARIOS = 100
@@ -407,3 +407,17 @@ def test_what_is_assigned_to_the_state_is_what_the_next_step_works_on() -> None:
     columns = unflatten(world.step(np.zeros((1, 4))), world.scenario)
     np.testing.assert_allclose(columns["item_present"][0, :2], 1.0)
     assert not columns["item_present"][0, 2:].any()
+
+
+def test_a_full_log_that_nobody_took_over_is_told_again_and_grows_no_further() -> None:
+    world = Warehouse(Scenario(n_robots=2, n_items=4))
+    world.reset(0)
+    commands, rows = world._world.commands, world.observe().copy()
+    longest = len(commands.log) // 2
+    told = [stepping.step(world.address, rows) for _ in range(longest + 2)]
+    assert told[1 : longest - 1] == [False] * (longest - 2)
+    assert told[longest - 1 :] == [True] * 3
+    assert commands.n_logged[0] == longest
+    world.step(np.zeros((2, 4)))
+    copied = copy.deepcopy(world)
+    np.testing.assert_array_equal(copied.step(np.ones((2, 4))), world.step(np.ones((2, 4))))
