@@ -9,16 +9,16 @@ from pathlib import Path
 from record_tables import fields, summary
 
 from swarm_logistics_env.policies.card import Network
-from swarm_logistics_env.train.preset_files import load_training, preset_names
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
+    Imitation,
     Indicators,
     PPOSettings,
     Scores,
     WorldKind,
 )
-from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.train.training import Training, load_training, preset_names
 
 PAGE = Path(__file__).parent / "training_files.md"
 TABLES = {
@@ -26,6 +26,7 @@ TABLES = {
     "[[worlds]]": WorldKind,
     "[[conditions]]": Conditions,
     "[indicators]": Indicators,
+    "[imitation]": Imitation,
     "[ppo]": PPOSettings,
     "[evaluation]": Evaluation,
     "[scores]": Scores,
