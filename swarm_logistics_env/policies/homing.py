@@ -76,12 +76,22 @@ class Homing:
                 f"observations of {len(observations)} robots: reset was told "
                 f"{len(self._frame.keys)}"
             )
-        frame = self._frame
-        frame.read(observations)
-        numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
-        commands = np.zeros((len(observations), 4))
-        decide_homing(observations, frame.memory, frame.keys, numbers, self._period, commands)
-        return frame.command(frame.outputs_for(commands))
+        self._frame.read(observations)
+        commands = homing_commands(self._frame, observations, self._period)
+        return self._frame.command(self._frame.outputs_for(commands))
+
+
+def homing_commands(
+    frame: MotionFrame, observations: NDArray[np.float32], period: float
+) -> NDArray[np.float64]:
+    """Return the policy's commands (N, 4) for the rows that `frame` read last; period in s.
+
+    Imitation asks this of the frame of the network that plays.
+    """
+    numbers = ((frame.counts - 1) * period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+    commands = np.zeros((len(observations), 4))
+    decide_homing(observations, frame.memory, frame.keys, numbers, period, commands)
+    return commands
 
 
 @kernel

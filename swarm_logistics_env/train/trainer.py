@@ -20,8 +20,10 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.checkpoint import (
     read_checkpoint,
     restore,
+    save_checkpoint,
     view_of,
 )
+from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import (
     device_of,
     make_learner,
@@ -74,6 +76,11 @@ def train(
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
         restore(learner, state)
+    elif training.imitation is not None:
+        imitate(learner.policy, training, training.imitation)
+        # Seeded anew, so that PPO does not depend on how long the imitation took.
+        learner.set_random_seed(training.seed)
+        save_checkpoint(out, learner, view, log)
     elif first is not None:
         take_tensors(learner.policy, first.tensors)
     if learner.num_timesteps < training.agent_steps:

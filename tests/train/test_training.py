@@ -68,6 +68,8 @@ def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
         ("[[worlds]]\nscenario = { n_robots = 5 }", "the swarm size is a field of its own"),
         ("[[worlds]]\nscenario = { message_size = 2 }", "the network sends no messages"),
         ("[ppo]\nleast_deviation = [0.0, 0.1]", "should be greater than 0"),
+        ("[imitation]\nseconds = 0.01", "imitation.seconds = 0.01: .* the control period, 0.1 s"),
+        ("start = 'ppo-delivery'\n[imitation]", "should be left out beside `imitation`"),
         ("[[conditions]]\nonset = [9, 1]", "should be the earliest time, then the latest"),
         ("seed = -1", "Training.seed = -1: should be greater than or equal to 0"),
         ("[network]\nhidden = [0]", "hidden"),
