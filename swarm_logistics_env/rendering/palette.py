@@ -30,6 +30,15 @@ ITEM: RGB = (214, 214, 214)
 ITEM_EDGE: RGB = (120, 120, 120)
 TRAIL: RGB = (150, 150, 150)
 
+# All of them by name, for films and for the page in the browser.
+COLOURS: dict[str, RGB] = {
+    "INK": INK, "SURROUNDINGS": SURROUNDINGS, "FLOOR": FLOOR, "FLOOR_LINE": FLOOR_LINE,
+    "DELIVERY_AREA": DELIVERY_AREA, "DELIVERY_HATCH": DELIVERY_HATCH,
+    "DELIVERY_WORD": DELIVERY_WORD, "OBSTACLE": OBSTACLE, "SEARCHING": SEARCHING,
+    "SHUFFLING": SHUFFLING, "DELIVERING": DELIVERING, "TIMER": TIMER, "REQUESTED": REQUESTED,
+    "LINK": LINK, "BEAM": BEAM, "ITEM": ITEM, "ITEM_EDGE": ITEM_EDGE, "TRAIL": TRAIL,
+}  # fmt: skip
+
 # Curves of runs side by side, and how thick they are [px].
 RUNS: tuple[tuple[RGB, float], ...] = (
     (REQUESTED, 3.0),
@@ -52,17 +61,12 @@ _EDGES = (
 
 def film_colours() -> list[RGB]:
     """Return the colours of pictures that may have only a few: under 128, each once."""
-    plain = [
-        INK, SURROUNDINGS, FLOOR, FLOOR_LINE, DELIVERY_AREA, DELIVERY_HATCH, DELIVERY_WORD,
-        OBSTACLE, SEARCHING, SHUFFLING, DELIVERING, TIMER, REQUESTED, LINK, BEAM, ITEM,
-        ITEM_EDGE, TRAIL,
-    ]  # fmt: skip
     smooth = [
         mixed(one, other, (step + 1) / (steps + 1))
         for one, other, steps in _EDGES
         for step in range(steps)
     ]
-    return list(dict.fromkeys([*plain, *smooth]))
+    return list(dict.fromkeys([*COLOURS.values(), *smooth]))
 
 
 def mark(modes: tuple[str, ...]) -> str:

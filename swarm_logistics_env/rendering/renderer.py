@@ -73,14 +73,10 @@ class Renderer:
         from swarm_logistics_env.rendering.picture import Picture
 
         self.mode = mode
-        self._arguments: dict[str, Any] = {
-            "scenario": scenario,
-            "mode": mode,
-            "size": size,
-            "show_beams_of": show_beams_of,
-            "trails": trails,
-            "all_links": all_links,
-        }
+        self._make_copy = functools.partial(
+            Renderer, scenario, mode, size,
+            show_beams_of=show_beams_of, trails=trails, all_links=all_links,
+        )  # fmt: skip
         self._picture = Picture(scenario, size, show_beams_of, trails, all_links)
         self._window: _Window | None = None
         self._was_closed_by_user = False
@@ -116,7 +112,7 @@ class Renderer:
             self._window = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return functools.partial(Renderer, **self._arguments), ()
+        return self._make_copy, ()
 
 
 def load_pygame() -> None:

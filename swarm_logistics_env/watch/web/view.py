@@ -18,11 +18,6 @@ from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 from swarm_logistics_env.watch.session import WIDTH_STEP, Session
 from swarm_logistics_env.watch.web.keys import HELP, KEYS, LINKS, MOUSE, TRAILS
 
-_COLOURS = (
-    "INK", "SURROUNDINGS", "FLOOR", "FLOOR_LINE", "DELIVERY_AREA", "DELIVERY_HATCH",
-    "DELIVERY_WORD", "OBSTACLE", "SEARCHING", "SHUFFLING", "DELIVERING", "TIMER", "REQUESTED",
-    "LINK", "BEAM", "ITEM", "ITEM_EDGE", "TRAIL",
-)  # fmt: skip
 _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius", "control_period",
@@ -35,7 +30,7 @@ def fixed_view(title: str) -> dict[str, Any]:
     """Return what does not change: colours, failure modes, keys."""
     return {
         "title": title,
-        "colours": {name: _css(getattr(palette, name)) for name in _COLOURS},
+        "colours": {name: _css(colour) for name, colour in palette.COLOURS.items()},
         "curves": [[_css(colour), thickness] for colour, thickness in palette.RUNS],
         "modes": [
             {"name": name, "mark": palette.MARKS.get(name, ""), "meaning": mode.description}
