@@ -135,7 +135,7 @@ def test_a_study_plays_it(tmp_path: Path) -> None:
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "two of ten home" in report
     file.write_text('policies = ["swarm-dt=8,my_module:Class=2"]\nseeds = 2\n', encoding="utf-8")
-    with pytest.raises(StudyError, match="to load it runs code"):
+    with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(file)
 
 
