@@ -20,12 +20,9 @@ from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.studies.run_progress import Progress
 from swarm_logistics_env.studies.shards import Shard
-from swarm_logistics_env.studies.specification import (
-    Specification,
-    read_stored,
-    read_study_file,
-)
+from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.studies.study_files import read_stored, read_study_file
 from swarm_logistics_env.tasks.task import Task
 
 if TYPE_CHECKING:
