@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import metadata
+from swarm_logistics_env.studies import metadata, study_files
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import imported_plan
 from swarm_logistics_env.studies.metadata import Declaration
@@ -20,11 +20,7 @@ from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.studies.run_progress import Progress
 from swarm_logistics_env.studies.shards import Shard
-from swarm_logistics_env.studies.specification import (
-    Specification,
-    read_stored,
-    read_study_file,
-)
+from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
@@ -101,7 +97,7 @@ class Study:
         Raises:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
         """
-        found = read_study_file(Path(path), trust_code=trust_code)
+        found = study_files.read_study_file(Path(path), trust_code=trust_code)
         return cls._of(found.replace(**fields), out)
 
     @classmethod
@@ -122,7 +118,7 @@ class Study:
         with Store.existing(out) as store:
             noted = metadata.planned(store, out)
             imported = store.note(metadata.IMPORTED)
-        specification = read_stored(
+        specification = study_files.read_stored(
             noted[metadata.SPECIFICATION], out, task=task, trust_code=trust_code
         )
         study = cls._of(specification, out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from swarm_logistics_env import streams
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.errors import PolicyError, StudyError
 from swarm_logistics_env.policies.sb3_policy import read_model
 
 Env: TypeAlias = ParallelEnv[Any, Any, Any]
@@ -66,6 +66,25 @@ class StableBaselinesModel:
         """Return an action for each row of observations (N, D)."""
         actions, _ = self._model.predict(observations, deterministic=True)
         return np.asarray(actions)
+
+
+def agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str | None]:
+    """Return the name of the agent that each row is, None where the robot is absent.
+
+    Raises:
+        StudyError: the environment has another number of agents.
+    """
+    present = [row for row in range(n_robots) if row not in absent]
+    names = list(env.possible_agents)
+    if len(names) != len(present):
+        raise StudyError(
+            f"the environment of {len(present)} robots has {len(names)} agents: should have as "
+            "many, see the task's `size`"
+        )
+    agents: list[str | None] = [None] * n_robots
+    for row, name in zip(present, names):
+        agents[row] = name
+    return agents
 
 
 def observation_rows(

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from importlib.metadata import packages_distributions, version
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -16,8 +14,8 @@ from pettingzoo.utils.wrappers import BaseParallelWrapper
 from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
 from swarm_logistics_env.errors import FaultError, StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.policies.code_identity import function_digest, without_prose
 from swarm_logistics_env.records import Record
+from swarm_logistics_env.tasks.code_version import environment_version
 from swarm_logistics_env.tasks.failing_robots import (
     FAILURE_MODES,
     REMOVED,
@@ -29,6 +27,7 @@ from swarm_logistics_env.tasks.parallel_policies import (
     Env,
     RandomActions,
     agent_actions,
+    agents_by_row,
     observation_rows,
 )
 from swarm_logistics_env.tasks.performance import (
@@ -41,14 +40,6 @@ from swarm_logistics_env.tasks.performance import (
 from swarm_logistics_env.tasks.policy_choice import policy_of
 from swarm_logistics_env.tasks.task import Outcome, Playable
 
-# The files of the package that decide what a run in a parallel environment gives.
-SOURCES = (
-    "streams.py",
-    "tasks/failing_robots.py",
-    "tasks/parallel_policies.py",
-    "tasks/parallel_task.py",
-    "tasks/performance.py",
-)
 NEEDS = {
     "silent": "the action that counts as none",
     "noisy": "a standard deviation above 0, in the observations' own units",
@@ -96,9 +87,9 @@ class ParallelTask:
         period: length of a step [s].
         policies: what makes the task's own policies, by name; "random" is always one.
 
-    A policy has `reset(n_robots, seed)` and `act(observations) -> actions`: observations (N, D) are
-    flattened, actions are rows too. One with `configure(env, agents)` is told before `reset` which
-    agent each row is, None where a robot was removed.
+    A policy has `act(observations) -> actions`: observations (N, D) are flattened, actions are rows
+    too. One with `reset(n_robots, seed)` is told that a run begins, one with `configure(env,
+    agents)` before that which agent each row is, None where a robot was removed.
 
     Raises:
         StudyError: an argument cannot be.
@@ -150,7 +141,13 @@ class ParallelTask:
         The code is the modules of the factory, of the performance and of their own package as far
         as they import it; the libraries are those that the environment's classes come from.
         """
-        return _code(self, repr([name_of(self._make_env), *self._settings]))
+        settings = (
+            name_of(self._make_env), self._size, name_of(self._gain), self._references,
+            self._failures, self._period, self.default,
+        )  # fmt: skip
+        return environment_version(
+            repr(settings), (self._make_env, self._gain), lambda: self._made(self.default, ())
+        )
 
     def size(self, scenario: ParallelScenario) -> int:
         """Return the number N of robots."""
@@ -170,12 +167,8 @@ class ParallelTask:
         for name, value in fields.items():
             if name not in given:
                 raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, given)}")
-            if self._numeric(name) and isinstance(self._parameters[name], int):
-                if value != int(value):
-                    raise StudyError(
-                        f"task {self.name}: {name} = {value}: should be a whole number"
-                    )
-                value = int(value)
+            if self._numeric(name):
+                value = self._number(name, value)
             given[name] = value
         return ParallelScenario(**given)
 
@@ -209,7 +202,7 @@ class ParallelTask:
         player: Any = policy_of(policy, self.policies)
         env = self._made(scenario, tuple(sorted(absent)))
         try:
-            agents = _agents_by_row(env, n_robots, absent)
+            agents = agents_by_row(env, n_robots, absent)
             recorded = _Recorded(env)
             failing = FailingRobots(
                 recorded,
@@ -220,7 +213,8 @@ class ParallelTask:
             )
             if hasattr(player, "configure"):
                 player.configure(env, agents)
-            player.reset(n_robots, policy_seed)
+            if hasattr(player, "reset"):
+                player.reset(n_robots, policy_seed)
             observations, _ = failing.reset(seed=seed)
             gains: list[float] = []
             for _ in range(max(1, round(scenario.duration / self._period))):
@@ -262,12 +256,14 @@ class ParallelTask:
         value = self._parameters.get(name)
         return isinstance(value, int | float) and not isinstance(value, bool)
 
-    @property
-    def _settings(self) -> tuple[object, ...]:
-        return (
-            self._size, name_of(self._gain), self._references, self._failures, self._period,
-            self.default,
-        )  # fmt: skip
+    def _number(self, name: str, value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise StudyError(f"task {self.name}: {name} = {value!r}: should be a number")
+        if not isinstance(self._parameters[name], int):
+            return value
+        if not float(value).is_integer():
+            raise StudyError(f"task {self.name}: {name} = {value}: should be a whole number")
+        return int(value)
 
     def _refuse(self) -> None:
         needed: dict[str, Callable[[Any], bool]] = {
@@ -316,46 +312,6 @@ class _Recorded(BaseParallelWrapper):  # type: ignore[misc]
         self._hash.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
 
 
-def _agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str | None]:
-    present = [row for row in range(n_robots) if row not in absent]
-    names = list(env.possible_agents)
-    if len(names) != len(present):
-        raise StudyError(
-            f"the environment of {len(present)} robots has {len(names)} agents: should have as "
-            "many, see the task's `size`"
-        )
-    agents: list[str | None] = [None] * n_robots
-    for row, name in zip(present, names):
-        agents[row] = name
-    return agents
-
-
 def _failed(seed: int, n_robots: int, faults: tuple[RobotFault, ...]) -> tuple[int, ...]:
     most = max((fault.robots for fault in faults), default=0)
     return failing_rows(seed, n_robots, most)
-
-
-_codes: dict[str, str] = {}
-
-
-def _code(task: ParallelTask, settings: str) -> str:
-    """Return the digest of a task, made once in a process: an environment is made for it."""
-    if settings not in _codes:
-        package = Path(__file__).parents[1]
-        digest = hashlib.sha256(settings.encode())
-        for name in SOURCES:
-            digest.update(without_prose((package / name).read_text(encoding="utf-8")).encode())
-        for function in (task._make_env, task._gain):
-            digest.update(function_digest(function).encode())
-        env = task._made(task.default, ())
-        try:
-            tops = {kind.__module__.partition(".")[0] for kind in type(env.unwrapped).__mro__}
-            tops -= {package.name}  # its own code is known by its sources
-        finally:
-            env.close()
-        installed = packages_distributions()
-        names = {name for top in tops for name in installed.get(top, ())}
-        versions = [f"{name} {version(name)}" for name in sorted(names)]
-        digest.update("; ".join(versions).encode())
-        _codes[settings] = f"{digest.hexdigest()[:16]} ({', '.join(versions)})"
-    return _codes[settings]

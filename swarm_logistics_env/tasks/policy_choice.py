@@ -86,6 +86,8 @@ def policy_of(source: object, known: Known = NONE) -> Policy:
         if known and name in policies.NAMES:
             raise PolicyError(f"the task has no policy {name!r}{suggest(name, known)}")
         return copy.deepcopy(_loaded(name, _canonical(parameters)))
+    if not (known or isinstance(source, Policy)):
+        raise PolicyError(f"policy {source!r}: should have the methods reset and act")
     policy: Any = copy.deepcopy(source)
     made: Policy = policy
     return made
@@ -105,11 +107,10 @@ def _chosen(value: object) -> object:
         value = PolicyChoice(**value)
     if isinstance(value, PolicyChoice) and not (value.parameters or value.label):
         return value.name
-    if isinstance(value, str | PolicyChoice) or (hasattr(value, "reset") and hasattr(value, "act")):
+    if isinstance(value, str | PolicyChoice) or hasattr(value, "act"):
         return value
     raise ValueError(
-        "should be a policy's name, its path, a table of name and parameters, or an object with "
-        "reset and act"
+        "should be a policy's name, its path, a table of name and parameters, or an object with act"
     )
 
 

@@ -102,7 +102,7 @@ def test_policy_parameters_make_another_condition() -> None:
         ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
         ({"parameters": [{"name": "n_items", "values": [60.5, 70]}]}, "60.5"),
         ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
-        ({"policies": [3]}, "an object with reset and act"),
+        ({"policies": [3]}, "an object with act"),
         ({}, "compares nothing"),
     ],
 )

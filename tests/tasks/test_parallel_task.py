@@ -177,6 +177,17 @@ def test_a_model_of_stable_baselines3_plays(tmp_path: Path) -> None:
         study_of("quick", None, None, [str(path)])
 
 
+class Blunt:
+    def act(self, observations: Any) -> Any:
+        return np.ones(len(observations), dtype=int)
+
+
+def test_a_policy_needs_nothing_but_act_here_and_reset_in_the_warehouse() -> None:
+    assert execute(only_run(LANE, policies=[Blunt()])).delivered > 0
+    with pytest.raises(SwarmLogisticsError, match="should have the methods reset and act"):
+        only_run("warehouse", policies=[Blunt()], faults=[{"modes": ["FM1"], "robots": [1]}])
+
+
 class Crash(Walker):
     def act(self, observations: Any) -> Any:
         raise ZeroDivisionError("on purpose")
@@ -246,6 +257,7 @@ def test_a_measure_without_a_true_zero_is_refused_with_a_remedy() -> None:
         (lambda: task_of(period=0.0), "should be above 0 s"),
         (lambda: Study(task=LANE, scenario={"lenght": 3}), "did you mean 'length'?"),
         (lambda: Study(task=LANE, scenario={"length": 6.5}), "6.5: should be a whole number"),
+        (lambda: Study(task=LANE, scenario={"length": "x"}), "length = 'x': should be a number"),
         (lambda: only_run(LANE, policies=["walkr"]), "no policy 'walkr'"),
         (lambda: only_run(LANE, policies=["swarm-dt"]), "the task has no policy 'swarm-dt'"),
         (
