@@ -41,6 +41,7 @@ def test_a_loop_of_ones_own_learns_on_the_frame_of_motion(
     assert "Swarm D-T's" in capsys.readouterr().out
 
 
+@pytest.mark.filterwarnings("default")  # theirs
 def test_torchrl_learns_on_the_frame_of_motion() -> None:
     pytest.importorskip("torchrl", reason="needs torchrl")
     assert len(main("torchrl_from_nothing", total_frames=2_000, duration=50.0)) == 4
@@ -70,4 +71,4 @@ def test_study_file_can_be_planned(study: Path) -> None:
 
 def test_examples_are_short() -> None:
     for example in EXAMPLES.glob("*.py"):
-        assert len(example.read_text("utf-8").splitlines()) < 90, example.name
+        assert len(example.read_text("utf-8").splitlines()) < 100, example.name
