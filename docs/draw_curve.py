@@ -1,7 +1,7 @@
 """Draws what a training reached on its way, beside scripted policies in the same worlds.
 
-swarm-logistics train from-scratch
-python docs/draw_curve.py results/train/ppo-from-scratch docs/media/from_scratch.png
+swarm-logistics train delivery
+python docs/draw_curve.py results/train/ppo-delivery docs/media/training_curve.png
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
 from swarm_logistics_env.train.evaluation import evaluate
 from swarm_logistics_env.train.training import Training
 
-SCRIPTED = ("swarm-dt-follow", "swarm-dt", "random-walk")
+SCRIPTED = ("homing", "swarm-dt", "random-walk")
 MILLION = 1e6
 
 

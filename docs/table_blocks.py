@@ -154,17 +154,17 @@ def policies_block(results: StudyResults, skewed: StudyResults) -> str:
             f"\nThe sign{_EXACT} marks what is {wording.UNAFFECTED}: equal runs, an exact value, "
             "and no evidence."
         )
-    return "\n".join([table(head, body), "", text, *_shortfall(results)])
+    return "\n".join([table(head, body), "", text, *_beside_homing(results)])
 
 
-def _shortfall(results: StudyResults) -> list[str]:
-    """Return a sentence: by how much the networks fall short of `homing`, which they imitate."""
+def _beside_homing(results: StudyResults) -> list[str]:
+    """Return a sentence: how much less or more than the script `homing` the networks deliver."""
     p = results.performance
     unbroken = {cell.policy: cell for cell in rows_of(p[p["factor"] == "none"])}
     networks = [name for name in unbroken if name.startswith("ppo-")]
     if "homing" not in unbroken or not networks:
         return []
-    told, short = [], True
+    told = []
     for name in networks:
         change = spi.relative_change(unbroken["homing"].by_seed, unbroken[name].by_seed)
         sign, word = (-1.0, "less") if change.value < 0.0 else (1.0, "more")
@@ -172,12 +172,11 @@ def _shortfall(results: StudyResults) -> list[str]:
         if change.low is not None and change.high is not None:
             low, high = sorted((100 * sign * change.low, 100 * sign * change.high))
             limits = f" [{low:.1f}, {high:.1f}]"
-            short = short and change.high < 0.0
         told.append(f"`{name}` {100 * abs(change.value):.1f} %{limits} {word}")
     robots = unbroken["homing"].n_robots
     text = (
-        f"The networks imitate `homing`{' and fall short of it' if short else ''}: at N = {robots} "
-        f"without faults, paired by seed, {', '.join(told)}."
+        f"Than the script `homing`, at N = {robots} without faults and paired by seed, the "
+        f"networks deliver: {', '.join(told)}."
     )
     return ["", text]
 

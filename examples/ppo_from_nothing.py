@@ -1,4 +1,4 @@
-"""PPO from nothing in the style of CleanRL: torch, one network for all robots, no other library.
+"""PPO from nothing in one file, in the style of CleanRL: one network for all robots.
 
 They read and command in the frame of their motion (`wrappers.MotionFrame`). After 1,000,000
 agent-steps, 39 s of one core, the last twelve episodes deliver 40 items on average; Swarm D-T
