@@ -1,7 +1,8 @@
 """TorchRL learns from nothing on the frame of motion: its collector, its PPO, one shared network.
 
-Needs `pip install torchrl`. The 10th to 18th episode, up to 360,000 agent-steps and 77 s of one core,
-delivered 22 to 29 items, 25.2 on average, about what Swarm D-T delivers there: 25.6 over 20 seeds.
+Needs `pip install torchrl`. The 10th to 18th episode, up to 360,000 agent-steps and 77 s of one
+core, delivered 22 to 29 items, 25.2 on average, about what Swarm D-T delivers there:
+25.6 over 20 seeds.
 """
 
 from typing import Any
