@@ -29,13 +29,13 @@ class Network(_Part):
     """The inputs, layers and outputs of a trained policy.
 
     Args:
-        inputs: what it reads, in this order: `motion.INPUTS`.
-        outputs: what it says, in this order: `motion.OUTPUTS`.
+        inputs: the names of its inputs in order, see `motion.INPUTS`.
+        outputs: the names of its outputs in order, see `motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
-        activation: between layers.
-        exploration: so many standard deviations of the training's noise are added to the outputs,
-            from each robot's own stream; 0: none.
+        activation: the activation function between layers.
+        exploration: the training's noise, times this factor, is added to the outputs, from each
+            robot's own stream; 0 means none.
 
     Raises:
         PolicyError: the inputs or outputs are not those that this version knows.
@@ -86,18 +86,18 @@ class PolicyCard(_Part):
     """Everything in a policy file beside the weights.
 
     Args:
-        format: of the file.
-        name: of the policy.
-        about: what it is, in a sentence or two.
-        network: how it decides.
-        command: the command line that made it.
-        versions: of the packages that trained it, and as "simulation" the digest of the world's
-            code (`tasks.code_version`) that it was trained in.
-        scored_with: the version of this package and the digest that its scores are of.
+        format: the version of the file's format.
+        name: the policy's name.
+        about: a sentence or two about the policy.
+        network: the network that decides.
+        command: the command line that trained it.
+        versions: the versions of the packages that trained it; "simulation" is the digest of the
+            world's code (`tasks.code_version`) at that time.
+        scored_with: the version of this package, and the digest, with which it was scored.
         scenario: what it was trained in, fields that differ from the defaults, and always
             `heading_drift`: cards from before there was one read it as 0.
         training: the specification of the training.
-        seed: of the training.
+        seed: the training's seed.
         agent_steps: decisions of single robots that it learned from.
         scores: measured after the training, on seeds held out.
     """

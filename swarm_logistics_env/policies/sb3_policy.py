@@ -23,8 +23,8 @@ class StableBaselinesPolicy:
     `adapters.SwarmVecEnv`; what normalised its observations is not in the file.
 
     Args:
-        path: of the .zip file.
-        trust_code: whether to read it, which executes whatever code is in it.
+        path: the path of the .zip file.
+        trust_code: whether to read the file, which executes the code in it.
 
     Raises:
         PolicyError: it is not trusted, cannot be read, has other spaces, or stable-baselines3 is

@@ -61,10 +61,11 @@ class StepConstants(NamedTuple):
     """The parameters for one control period, as compiled code reads them.
 
     Attributes:
-        widest_turn: of the stored heading by diffusion [rad].
-        drop_probability: of an item that is not requested.
-        avoidance_gain, avoidance_range, wall_distance, taxis_gain, heading_follows: as given.
-        widest_step: how far a differential robot turns its body [rad]; 0 for a holonomic one.
+        widest_turn: the largest turn of the stored heading by diffusion [rad].
+        drop_probability: the probability to drop an item that is not requested.
+        avoidance_gain, avoidance_range, wall_distance, taxis_gain, heading_follows: the parameters
+            of these names.
+        widest_step: the largest turn of a differential robot's body [rad]; 0 if it is holonomic.
     """
 
     widest_turn: float

@@ -18,13 +18,13 @@ class TunedPolicy(Record):
     """A scripted policy with the parameters that a search found.
 
     Args:
-        format: of the file.
+        format: the version of the file's format.
         policy: name of the scripted policy.
-        parameters: of it, those that were searched.
-        command: the command line that found them.
-        versions: of the packages that found them.
-        search: what was asked of the search.
-        scores: measured afterwards, on other seeds than the search's.
+        parameters: the parameters that were searched.
+        command: the command line of the search.
+        versions: the versions of the packages that searched.
+        search: the settings of the search.
+        scores: its scores, measured afterwards on other seeds than the search's.
     """
 
     error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError

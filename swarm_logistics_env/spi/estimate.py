@@ -50,8 +50,8 @@ class Estimate:
             FT); None where unpaired, below three seeds, or where one of them is constant.
         difference_sd: Standard deviation of D over seeds, in items; where unpaired se(D) sqrt(n).
         mean_denominator: mean(den), in items.
-        degrees_of_freedom: Of the t-test: n - 1, or Welch's where unpaired.
-        flags: Of "single_seed", "too_few_seeds" (two: counts agree by chance, so p = 1),
+        degrees_of_freedom: Degrees of freedom of the t-test: n - 1, or Welch's if unpaired.
+        flags: Some of "single_seed", "too_few_seeds" (two: counts agree by chance, so p = 1),
             "degenerate" (se(D) = 0: no limits, p = 1), "identical" (the runs compared are the same
             runs: the value is exact, and no evidence), "capped" (a capped P blocks the verdict on
             the side that it leans to: p = 1), "unbounded" (the mean denominator is not

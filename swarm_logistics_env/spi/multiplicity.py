@@ -24,7 +24,7 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     below alpha, whatever the dependence.
 
     Raises:
-        IndicatorError: Not one-dimensional, or a p outside [0, 1].
+        IndicatorError: The input is not one-dimensional, or a p is outside [0, 1].
     """
     p = numbers("p_values", p_values)
     if p.ndim != 1:

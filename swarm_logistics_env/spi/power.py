@@ -48,9 +48,9 @@ def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> in
     """Seeds that a verdict needs if the indicator truly is `effect`.
 
     The spread is the 60 % upper confidence limit of the estimate's, so that the power is `power` on
-    average over pilots; `lower_decile_of_power` says what a pilot that is unlucky leaves of it. The
-    effect is to be named from elsewhere (the paper's value, or the least one that matters), never
-    the one just observed. Where unpaired: seeds per sample.
+    average over pilots; `lower_decile_of_power` is the power that nine pilots of ten keep. Take the
+    effect from elsewhere (the paper's value, or the least one that matters), never the one just
+    observed. If samples are not paired, the result is the number of seeds per sample.
 
     Args:
         estimate: The pilot, from at least two seeds.

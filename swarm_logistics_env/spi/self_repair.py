@@ -30,7 +30,7 @@ class SelfRepair:
         low: Lower limit of its interval [s].
         high: Upper limit [s]; inf where a loss that lasts to the end is not excluded.
         followed: How long the runs were followed after the onset [s].
-        p_value: Of "nothing is lost", one-sided: pairs swapped at random lose as much.
+        p_value: One-sided p of "nothing is lost": how often pairs swapped at random lose as much.
         null_seconds: The likeliest time of the pair without faults [s]: noise.
         distinguishable: Whether p_value < 1 - confidence; where not, the time measures noise.
     """

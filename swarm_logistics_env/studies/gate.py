@@ -9,8 +9,8 @@ fails where R lies below 0 beyond chance, "possibly R < 0" wherever that is not 
 of seeds as well.
 `at` keeps the comparisons and conditions whose name holds the text, e.g. "R < 0 at FM4, m = 1".
 Verdicts are Holm-adjusted over what is kept. What cannot be judged fails: a policy without a match
-in the other study, failed runs, studies that share no seed. Where the runs of both studies are the
-same the change is exactly 0, and the gate fails where "0 < number" (or ">") is true.
+in the other study, failed runs, studies that share no seed. If both studies have the same runs, the
+change is exactly 0, and the gate fails if "0 < number" (or ">") is true.
 """
 
 from __future__ import annotations

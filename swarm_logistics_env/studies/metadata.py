@@ -27,7 +27,7 @@ IDENTITIES = "identities"  # of policies, JSON
 DECLARED_SEEDS = "declared_seeds"  # how many, at the first run
 DECLARED_FIRST_SEED = "declared_first_seed"  # at the first run; absent: 0
 DECLARED_LOOKS = "declared_looks"  # JSON, at the first run
-IMPORTED = "imported"  # where the runs came from; absent: they were run
+IMPORTED = "imported"  # the source of imported results; absent if the runs were played
 
 _NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
 

@@ -37,10 +37,10 @@ class Plan:
     """The runs and the comparisons of a study.
 
     Attributes:
-        specification: what it was made from.
-        comparisons: in the order of the report.
-        code: version of the code that decides what a run gives.
-        identities: of the policies, by the part that each plays in the specification.
+        specification: the specification that it was made from.
+        comparisons: all comparisons, in the order of the report.
+        code: the version of the code that decides the result of a run.
+        identities: the identities of the policies, by their names in the specification.
         null_pairs: pairs without fault, one for each policy whose faults begin during the run.
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.

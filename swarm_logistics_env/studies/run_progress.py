@@ -24,8 +24,8 @@ class Progress:
 
     Args:
         runs: the runs that are going to be played.
-        label: name of the study.
-        console: where to write; None: standard error.
+        label: the study's name.
+        console: the console to write to; None means standard error.
     """
 
     def __init__(self, runs: Iterable[Run], label: str, console: Console | None = None) -> None:

@@ -40,7 +40,7 @@ def demands(
     matters, or the published value; never the one that the pilot itself happened to show.
 
     Args:
-        results: of the pilot, from at least two seeds.
+        results: the results of the pilot, from at least two seeds.
         effect: assumed true value of every indicator, in its units; None: the published one.
         power: wanted probability of a verdict, in (0, 1).
 

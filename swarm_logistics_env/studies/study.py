@@ -155,12 +155,12 @@ class Study:
         """Play the runs that are missing, and those that failed before; each is kept at once.
 
         Args:
-            engine: what plays them: "local" (this process), "process" or "ray", or an engine of
-                one's own; None: this process, or `processes` of them.
-            processes: how many worker processes; they need the caller to stand under
-                `if __name__ == "__main__":`.
-            address: of the Ray cluster; None: one on this machine.
-            shard: which part to play, the others being left to other machines; None: all.
+            engine: the engine that plays them: "local" (this process), "process", "ray", or an
+                engine of your own; None means this process, or `processes` of them.
+            processes: the number of worker processes; a script has to call this below
+                `if __name__ == "__main__":` then.
+            address: the address of the Ray cluster; None starts one on this machine.
+            shard: the part to play, if other machines play the others; None means all.
 
         Raises:
             StudyError: the store or the engine cannot be used, or the store is another study's.

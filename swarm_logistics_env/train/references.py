@@ -16,8 +16,8 @@ def performances_of_study(directory: str | Path, own: Scenario) -> dict[Conditio
     """Return the mean P [items] of every condition that the study in `directory` ran.
 
     Args:
-        directory: of the study, which should be of one policy, the one to be improved upon.
-        own: the scenario of the training, which conditions are told apart by.
+        directory: the directory of a study of one policy, the policy to improve on.
+        own: the scenario of the training; conditions are relative to it.
 
     Raises:
         TrainingError: there is no such study, or it is of several policies.

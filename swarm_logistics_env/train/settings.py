@@ -66,7 +66,7 @@ class Conditions(Part):
     """Episodes of one kind, among those that a training mixes.
 
     Args:
-        weight: how often, relative to the others.
+        weight: the frequency of this kind, relative to the others.
         modes: failure modes, one of them drawn for each episode; "removed" is the reference P_S.
         robots: numbers m of faulty robots, one of them drawn.
         onset: (earliest, latest) time at which they fail [s], drawn evenly.
@@ -104,9 +104,9 @@ class Indicators(Part):
         weights: "R", "FT", "S", "A" and "P" with their weights.
         references: "running": means of the episodes played under each condition; P_o [items]; or
             the directory of a study that holds the performances.
-        window: over how many episodes the means run.
-        initial: P_o before any was measured [items].
-        credit: who is paid for a delivery.
+        window: the number of last episodes that the means are over.
+        initial: the P_o that counts before any was measured [items].
+        credit: the robots that are paid for a delivery: "team", "deliverer" or "carriers".
         constant: whether to pay an indicator's constant.
     """
 
@@ -150,20 +150,21 @@ class PPOSettings(Part):
 
     Args:
         n_steps: control steps between updates; times the rows of all worlds they make a batch.
-        n_minibatches: the batch is cut into.
-        epochs: over a batch.
-        learning_rate: at the start; it falls linearly to `final_learning_rate`.
-        final_learning_rate: at the end.
-        gamma: discount of a control step.
-        gae_lambda: of generalised advantage estimation (Schulman et al. 2016).
-        clip: how far from 1 the ratio of an action's probabilities pays.
-        entropy, value_weight: weights of these losses beside the policy's.
-        max_grad_norm: gradients longer than that are shortened to it.
-        target_kl: an update stops early beyond 1.5 times that divergence; None: never.
-        deviations: of the outputs' exploration noise at the start, one for each; they are learned.
-        least_deviation: what no deviation falls below, at the start and at the end; geometric in
-            between. Without it the noise dies out long before the policy is good.
-        least_until: the share of the training after which the end of it holds.
+        n_minibatches: the number of parts that a batch is divided into.
+        epochs: the number of passes over a batch.
+        learning_rate: the rate at the start; it falls linearly to `final_learning_rate`.
+        final_learning_rate: the rate at the end.
+        gamma: the discount of a control step.
+        gae_lambda: lambda of generalised advantage estimation (Schulman et al. 2016).
+        clip: the largest distance from 1 at which the ratio of an action's probabilities pays.
+        entropy, value_weight: the weight of this loss relative to the policy's.
+        max_grad_norm: longer gradients are shortened to this length.
+        target_kl: an update stops early beyond 1.5 times this divergence; without it, never.
+        deviations: standard deviations of the outputs' exploration noise at the start, one for each
+            output; they are learned.
+        least_deviation: the lower limit of deviations at the start and at the end; it changes
+            geometrically in between. Without it the noise vanishes long before the policy is good.
+        least_until: the share of the training after which the limit stays at its end.
         value_warmup: updates at the start in which the value network alone learns, so that what a
             training goes on from is not spoilt by values that mean nothing yet.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot
@@ -224,10 +225,11 @@ class Scores(Part):
     """What is measured at the end and written on the card: a study, on seeds 0, 1, ...
 
     Args:
-        seeds: how many; 0: nothing is measured.
-        sizes: swarm sizes N of which P is measured.
-        modes, robots: failure modes and numbers m of which R and FT are measured, at `n_robots`.
-        n_robots: of the faults.
+        seeds: the number of seeds; with 0 nothing is measured.
+        sizes: the swarm sizes N at which P is measured.
+        modes, robots: the failure modes, and the numbers m of faulty robots, for which R and FT are
+            measured at `n_robots`.
+        n_robots: the swarm size with faults.
     """
 
     seeds: NonNegativeInt = 30

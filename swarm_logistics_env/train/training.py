@@ -52,14 +52,14 @@ class Training(Part):
     """Everything that decides the result of a training.
 
     Args:
-        name: of the policy.
-        about: what it is, for its card.
+        name: the policy's name.
+        about: a sentence about the policy, for its card.
         scenario: the conditions; a table of fields makes one.
         start: name or path of a trained policy that this one goes on from; none: from nothing.
         worlds: those that run side by side, kind by kind: easy ones beside hard ones are what lets
             a training from nothing begin.
         threads: in which worlds step, and processes that measure scores; no result depends on it.
-        seed: of everything random.
+        seed: decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
             added to them.
@@ -70,7 +70,7 @@ class Training(Part):
         ppo, evaluation, scores: see there.
 
     Raises:
-        TrainingError: a field is unknown or cannot be.
+        TrainingError: a field is unknown, or its value is not allowed.
     """
 
     name: str = "policy"

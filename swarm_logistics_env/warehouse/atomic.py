@@ -42,7 +42,7 @@ def _changed_by(operation: str) -> Callable[..., int]:
     return _generated(typed)
 
 
-# Of an address and an integer, which is put there or added; both return what was there before.
+# Both take an address and an integer, which is stored or added there; they return the old value.
 exchange, add = _changed_by("xchg"), _changed_by("add")
 
 

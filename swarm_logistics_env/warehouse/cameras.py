@@ -24,7 +24,7 @@ _ITEMS, _NEIGHBOURS, _MESSAGES = row.ITEMS, row.NEIGHBOURS, row.MESSAGES
 def rank_nearest(nearby: Nearby, count: int, wanted: int) -> int:
     """List in `nearby.nearest` the `wanted` nearest of `count` chosen things, nearest first.
 
-    Of two that are equally near the one that was chosen first is.
+    If two are equally near, the one that comes first is chosen.
 
     Returns how many there are, at most `wanted`.
     """

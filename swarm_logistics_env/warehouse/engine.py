@@ -14,7 +14,7 @@ from swarm_logistics_env.warehouse.structs import Batch, Engine, Integers, Numbe
 _ROBOT, _SOLID, _ITEM = 1, 2, 4  # categories of shapes
 _MASK = 32  # bits of the categories in a filter's second word, below those of its mask
 
-# Whom a shape collides with: its own categories, and the mask of those that it meets.
+# A filter says what a shape collides with: its own categories, and a mask of the others'.
 NO_ONE = 0
 EMPTY_ROBOT = _ROBOT | (_ROBOT | _SOLID) << _MASK
 LADEN_ROBOT = _ROBOT | (_ROBOT | _SOLID | _ITEM) << _MASK
@@ -24,7 +24,7 @@ SOLID_THING = _SOLID | _ROBOT << _MASK
 # Kinds of events: what happened to (robot, item) that changes whom they collide with.
 LIFTED, PUT_DOWN, DELIVERED_IT, CAME_BACK = 0, 1, 2, 3
 
-# Of the contact solver: the more robots touch, the more. With 16 a jam of 150 in a corner stands
+# The contact solver iterates more if more touch. With 16 a jam of 150 in a corner stands
 # 10 mm inside itself, with 50 now and then 7 mm, with 80 always 1 mm; always 80 costs a swarm of
 # 25 an eighth of its step.
 _FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 16, 80, 2

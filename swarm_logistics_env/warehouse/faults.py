@@ -213,7 +213,7 @@ class Occurrence:
 
     Args:
         fault: which.
-        seed: of the episode.
+        seed: the episode's seed.
         n_robots: how many there are.
 
     Attributes:
@@ -226,7 +226,7 @@ class Occurrence:
     def __init__(self, fault: Fault, seed: int, n_robots: int) -> None:
         self.fault, self._seed = fault, seed
         self.robots = failed_robots(fault, seed, n_robots)
-        # Of an intermittent fault, by robot, the times at which it begins, ends, begins, ...
+        # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
         if fault.intermittent is not None:
             self._switches = {robot: [fault.onset] for robot in self.robots.tolist()}

@@ -29,7 +29,7 @@ def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:
     )
 
 
-# Of so few points all are looked at: one run is faster than several.
+# If there are so few points, all are looked at, because one run is faster than several.
 _FEW = 80
 
 

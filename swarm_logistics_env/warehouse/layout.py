@@ -1,4 +1,4 @@
-"""Where everything starts and where items come back to, from keyed random streams.
+"""The places where everything starts and items come back to, from keyed random streams.
 
 Robot i's place, item j's place and their order depend on the seed and on i or j, not on how many
 there are, as far as the places of those before them leave room.
@@ -56,7 +56,7 @@ def draw_order(keys: Keys, cycle: int, order: Integers) -> None:
 def place_restocked(world: World, item: int) -> bool:
     """Put an item that comes back into the storage, clear of free items and of robots.
 
-    Where depends on the episode's key and on how many items were delivered before.
+    The place depends on the episode's key and on the number of items delivered before.
 
     Returns whether there was room.
     """

@@ -119,7 +119,7 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
 def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
     """Lift what empty robots hold on to; returns the number of events so far.
 
-    Where several want the same item the nearest able one gets it, and the others choose again.
+    If several want the same item, the nearest able one gets it, and the others choose again.
     """
     robots, able, items, claims = world.robots, world.able, world.items, world.claims
     while True:

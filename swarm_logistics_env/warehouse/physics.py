@@ -59,7 +59,7 @@ class Physics:
     def begin(self, world: NDArray[np.int64]) -> None:
         """Make the bodies of a world, given by its words, as its arrays have them now."""
         build(world.ctypes.data)
-        # Not at the end of the process, which frees everything anyway.
+        # This is left out at the end of the process, which frees everything anyway.
         finalize(self, _free, packed(self.engine), self.engine, self._kept).atexit = False
 
     def release(self, robot: int, item: int, x: float, y: float) -> None:
@@ -113,7 +113,7 @@ def _function_addresses() -> Functions:
         names = [kind.__metadata__[0] for kind in hints(Functions).values()]
         return Functions(*(_address(ffi.addressof(lib, name)) for name in names))
     except AttributeError as error:
-        # Not pymunk.version, which pymunk 7.0 gives as that of something else.
+        # pymunk.version is not used, because in pymunk 7.0 it is the version of something else.
         raise SetupError(f"pymunk {version('pymunk')} lacks a function: {error}") from None
 
 

@@ -45,7 +45,7 @@ def run_timers(world: World) -> None:
     """Advance every robot's timer and what it tells (NaN: silent) [s].
 
     Counted in steps, so that rounding never adds up. With gossip a robot tells the lowest of its
-    own timer and of what it heard one period ago, aged. Where the radio is delayed, what is told
+    own timer and of what it heard one period ago, aged. If the radio is delayed, the broadcast
     comes late. One that is not honest tells 0.
     """
     robots, able, step = world.robots, world.able, world.progress.step[0]
@@ -91,7 +91,7 @@ def listen(me: int, world: World, n_found: int) -> None:
 def lowest_timer_heard(world: World, n_found: int) -> tuple[int, float]:
     """Return who tells the lowest timer of those nearby that are heard, or NOBODY, and it [s].
 
-    Of several that tell the same it is the nearest.
+    If several broadcast the same timer, it is the nearest of them.
     """
     robots, grid, nearby = world.robots, world.robot_grid, world.nearby
     lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf

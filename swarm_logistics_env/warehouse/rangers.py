@@ -23,7 +23,7 @@ _ONE_BEAM = 1.001 / math.sin(math.pi / _N_BEAMS) ** 2
 
 
 class Pose(NamedTuple):
-    """Where a robot is and which way it looks."""
+    """The position and the direction of a robot."""
 
     x: float  # [m]
     y: float  # [m]
@@ -46,7 +46,7 @@ def scan_disc(
 
     Args:
         forward, left: its centre in the robot's frame [m]; `square` is their squares' sum [m^2].
-        radius: of the disc [m].
+        radius: the disc's radius [m].
         scan: is changed.
     """
     clearance = square - radius * radius

@@ -74,7 +74,7 @@ class WorldThreadPool:
         jobs[:, FIRST_ROW], jobs[:, IS_DONE] = self._firsts, 1
         jobs[:, IS_WATCHED], self.is_watched = self.is_watched, jobs[:, IS_WATCHED]
         self._address: int = queue.ctypes.data
-        # Not a semaphore, whose lock another thread may hold at a fork or when a finalizer comes.
+        # No semaphore: another thread may hold its lock at a fork or when a finalizer comes.
         self._wake: SimpleQueue[None] = SimpleQueue()
         # Compiled before helpers are many and in the way of the caller, and so that no Ctrl-C
         # finds them half compiled.

@@ -217,7 +217,7 @@ class Warehouse:
 
     @property
     def address(self) -> int:
-        """Where compiled code finds the world, from the first reset on.
+        """The address at which compiled code finds the world, from the first reset on.
 
         Raises:
             SetupError: the world was never reset.
@@ -279,7 +279,8 @@ class Warehouse:
         width, height = scenario.warehouse_width, scenario.warehouse_height
         sees = max(scenario.ranger_range + scenario.robot_radius, scenario.view_range)
         hears = max(sees, scenario.radio_range)
-        # Of half the side that robots look around in: few rows of cells, and few in vain.
+        # Cells have half the side of the square that robots search, so that few rows are searched
+        # and few of them in vain.
         self._robot_grid = blank_grid(width, height, hears / 2, n)
         self._item_grid = blank_grid(width, height, sees / 2, n_items)
         self._command_shape = (n, len(COMMAND_COLUMNS) + scenario.message_size)

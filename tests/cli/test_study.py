@@ -146,7 +146,7 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
         assert "xploratory" not in capsys.readouterr().out
     assert app.run([*run, "--seeds", "4"]) == 0
     printed = capsys.readouterr().out
-    # Before it plays: whoever reads it can still stop.
+    # It warns before it plays, so that one can still stop it.
     warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
     assert warning < printed.index("## ")
     assert "4 seeds (0 to 3) every verdict is exploratory." in printed

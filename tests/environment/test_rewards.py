@@ -68,7 +68,7 @@ def test_own_delivery_is_the_deliverers(world: Warehouse) -> None:
 
 def test_lift_requested_pays_for_taking_up_and_fines_letting_go(world: Warehouse) -> None:
     terms = started(world, lift_requested=1.0)
-    give(world, 0, 5)  # not the requested one
+    give(world, 0, 5)  # this item is not the requested one
     assert terms.pay(world).tolist() == [0.0] * 4
     give(world, 1, 2)
     assert terms.pay(world).tolist() == [0.0, 1.0, 0.0, 0.0]

@@ -119,7 +119,7 @@ def test_where_items_are_few_the_others_line_up_at_the_wall() -> None:
     world = Warehouse(scenario)
     world.reset(0)
     places, has_item = WaitingPlaces(12).places(world.state, 4, scenario)
-    assert has_item.sum() == 2  # not the requested one
+    assert has_item.sum() == 2  # the requested item is left out
     assert not has_item[4]
     assert (places[~has_item, 0] < 0.6).all()
     apart = np.linalg.norm(places[:, None] - places, axis=2)[~np.eye(12, dtype=bool)]

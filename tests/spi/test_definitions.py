@@ -1,4 +1,4 @@
-"""The table of indicators: whoever adds a row finds it in plan, tables, figures and sentences."""
+"""The table of indicators: a new row appears in plan, tables, figures and sentences."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ def test_other_seeds_and_another_policy_are_compared_where_they_can_be() -> None
 )
 def test_the_same_runs_answer_a_gate_exactly(text: str, failing: bool) -> None:
     plan = results(WELL).plan
-    # Where nothing is delivered no change could be estimated.
+    # If nothing is delivered, no change can be estimated.
     nothing = judge(plan, {run.key: Outcome(run.key, digest=run.key) for run in plan.runs()})
     for same in (results(WELL), results(WORSE, seeds=2), nothing):
         said = answers(Gate.parse(text), same, same)
@@ -157,7 +157,7 @@ def test_runs_are_the_same_where_their_digests_are() -> None:
     assert same_runs(["a", "b"], ["a", "b"])
     assert not same_runs(["a", "b"], ["a", "c"])
     assert not same_runs(["a"], ["a", "b"])
-    # Of results that come from elsewhere nothing tells it, however equal they are.
+    # Imported results have no digests, so that equal numbers do not show that runs are the same.
     assert not same_runs(["a", None], ["a", None])
 
 
@@ -216,7 +216,7 @@ def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
             f"policy 'random-walk' of the {study} study has no match: the {other} study judges "
             "'swarm-dt'"
         )
-        # Whoever asks about the other policy alone gets an answer.
+        # A gate on the other policy alone is answered.
         assert not fails("change < 0 at swarm-dt", old, new)
         assert fails("change < 0 at random-walk", old, new)
         assert fails("change < 0 at FM1", old, new)

@@ -200,7 +200,7 @@ def stored(directory: Path) -> int:
     database = sqlite3.connect(path)
     try:
         return int(database.execute("SELECT count(*) FROM runs").fetchone()[0])
-    except sqlite3.OperationalError:  # not yet made
+    except sqlite3.OperationalError:  # the table does not exist yet
         return 0
     finally:
         database.close()

@@ -14,7 +14,7 @@ PACKAGE = Path(swarm_logistics_env.__file__).parent
 
 def test_the_script_finds_the_clone_it_stands_in(tmp_path: Path) -> None:
     script = [sys.executable, str(PACKAGE / "train" / "ppo.py"), "--preset"]
-    # Not installed: what it needs it finds by its own place.
+    # The package is not installed: the script finds it by its own place.
     environment = {**os.environ, "PYTHONSAFEPATH": ""}
     done = subprocess.run(
         [*script, "deliver"],

@@ -185,7 +185,7 @@ def check_laws(world: Warehouse, observations: NDArray[np.float32]) -> None:
         assert (running < scenario.timer_limit).all()
     assert (state.robot_timer[state.robot_in_delivery] == 0.0).all()
 
-    # Who is not there.
+    # Robots that are absent.
     assert not observations[~here].any()
     for row in (state.robot_position, state.robot_velocity, state.robot_heading):
         assert not row[~here].any()

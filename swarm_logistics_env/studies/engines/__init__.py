@@ -29,8 +29,9 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
 
     Args:
         name: "local": this process; "process": worker processes on this machine; "ray": a cluster.
-        processes: how many worker processes, or cores of a local cluster; None: one a core.
-        address: of the Ray cluster; None: one on this machine.
+        processes: the number of worker processes, or of cores of a local cluster; None means one
+            for each core.
+        address: the address of the Ray cluster; None starts one on this machine.
 
     Raises:
         StudyError: there is no such engine, or it has no use for one of the arguments.

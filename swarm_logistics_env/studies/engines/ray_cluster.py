@@ -26,9 +26,9 @@ class Cluster:
     all with this version of the package.
 
     Args:
-        address: of the cluster; "auto": the one that this machine belongs to; None: one on this
-            machine, for as long as the study runs.
-        cores: of the one that is started here; None: all.
+        address: the cluster's address; "auto" means the one that this machine belongs to; None
+            starts one on this machine while the study runs.
+        cores: the number of cores of a cluster that is started here; None means all.
 
     Raises:
         StudyError: ray is not installed, or there is no cluster at that address.
