@@ -39,7 +39,7 @@ TAKEN, GIVEN, ASLEEP, IS_CLOSED, N_JOBS, ROWS, ROW_COLUMNS, FIRST_JOB = range(8)
 # Words of a job, one per world, behind them.
 WORLD, FIRST_ROW, IS_DONE, IS_EVENTFUL, IS_WATCHED, JOB_LENGTH = range(6)
 # How often a thread looks for work before it goes to sleep: 0.3 ms, what ten wakings take.
-_PATIENCE = 400_000
+_PATIENCE = 100_000
 _NOT_YET = -1
 
 
