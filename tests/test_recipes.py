@@ -125,13 +125,12 @@ def kept(p_o, p_f, **asked):
 DEFINITION = """\
         Definition(
             symbol="K",
-            name="performance kept",
+            heading="performance kept K",
             compares="fault",
             performances={"p_o": "P_o", "p_f": "P_F"},
             function=kept,
             arguments=lambda _: {},
             adjectives={0.0: "alive"},
-            axis="performance kept K",
         ),"""
 
 STUDY = """

@@ -99,7 +99,7 @@ def test_the_blocks_quote_what_was_played(tables: Any, small: Path, tmp_path: Pa
     sizes = next(line for line in paper.splitlines() if line.startswith("| N = 5, 10 (60 items)"))
     assert "| 9, 18 |" in sizes.replace("**", "")
     for mean in first.performance["mean"][:2]:
-        assert f"{mean:.1f} [" in sizes
+        assert f"{wording.fixed(mean, wording.digits_of(mean))} [" in sizes
     counted = [c for part in (first, second) for c in rows_of(part.performance) if c.counted]
     inside = sum(c.low <= c.published <= c.high for c in counted)
     assert f"{inside} of {len(counted)} lie inside the 95 % interval of our mean" in paper
@@ -177,7 +177,7 @@ def test_foraging_stands_beside_the_warehouse(
         results = study.findings()
         five = next(c for c in rows_of(results.performance) if c.cell == "N = 5")
         (row,) = [line for line in text.splitlines() if line.startswith("| P, N = 5 |")]
-        assert row.split("|")[column].strip().startswith(f"{five.mean:.1f} [")
+        assert row.split("|")[column].strip().startswith(wording.mean_p(five))
         (robustness,) = [test for test in rows_of(results.indicators) if test.indicator == "R"]
         (row,) = [line for line in text.splitlines() if line.startswith("| R, FM4, m = 2 |")]
         assert wording.ratio(robustness) in row.split("|")[column]

@@ -127,7 +127,7 @@ class Worlds:
                 f"actions of shape {given.shape} and type {given.dtype}: should be {wanted} numbers"
             )
         self._commands[:] = given
-        row = first_not_finite(self._commands)
+        row = first_not_finite(self._commands.reshape(self.n_rows, -1))
         if row != NOBODY:
             world = int(self.world_of[row])
             raise CommandError(
