@@ -222,7 +222,7 @@ def scaling(canvas: Canvas, cells: pd.DataFrame, fits: Sequence[ScalingFit], lab
         axes.annotate("N*", (0.0, -0.08 * highest), (4, -3), textcoords="offset points", fontsize=8)
     axes.set(xlim=(0.0, right), ylim=(-0.2 * highest if fits else 0.0, 1.08 * highest))
     axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= 1.08 * highest])
-    axes.set(xlabel="swarm size N [robots]", ylabel="P [items]")
+    axes.set(xlabel="swarm size N [robots]", ylabel="performance P")
     _legend(canvas, axes, lines=True)
 
 

@@ -144,7 +144,7 @@ def _difference_figure(
     panels = [
         Panel(
             "",
-            f"difference of {what}" + (" [items]" if what == "P" else ""),
+            f"difference of {what}",
             here,
             (0.0,),
             _x_label(setting, stepwise=what != "P"),

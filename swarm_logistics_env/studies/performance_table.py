@@ -28,10 +28,10 @@ PERFORMANCE: Columns = {
     "value": (float, "swarm size N, faulty robots m, or the parameter's value in its unit"),
     "onset": (float, "when the fault begins [s]"),
     "n_robots": (int, "swarm size N"),
-    "published": (float, "P of the reference [items]"),
+    "published": (float, "P of the reference"),
     "counted": (bool, "whether it is one of the cells of the reference's tables"),
     "n_seeds": (int, "number of runs that succeeded"),
-    "mean": (float, "mean P [items]"),
+    "mean": (float, "mean P, in the unit of the task: items in the warehouse"),
     "low": (float, "lower limit of the 95 % interval of the mean; missing at one seed"),
     "high": (float, "upper limit of it"),
     "prediction_low": (float, "lower limit of the 95 % interval of one further run"),
@@ -40,7 +40,7 @@ PERFORMANCE: Columns = {
     "saturated": (bool, "whether a run delivered every item, so that P is capped"),
     "problem": (object, "why runs are missing; None: they are complete"),
     "arm": (object, "the setting and the condition"),
-    "by_seed": (object, "P seed by seed [items], shape (n_seeds,)"),
+    "by_seed": (object, "P seed by seed, shape (n_seeds,)"),
     "digests": (object, "digest of each run; equal digests: the same run"),
 }
 _UNKNOWN = Interval(np.nan, None, None)
