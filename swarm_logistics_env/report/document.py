@@ -57,7 +57,9 @@ class Document:
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
-    seeds = "1 seed" if len(plan.seeds) == 1 else f"{len(plan.seeds)} seeds"
+    what = "seed" if plan.paired else "trial"
+    seeds = f"1 {what}" if len(plan.seeds) == 1 else f"{len(plan.seeds)} {what}s"
+    seeds = seeds if plan.paired else f"at most {seeds}"
     about = (
         f"{plan.specification.name}: {len(plan.conditions)} conditions, {seeds} of each; every "
         "verdict holds for the conditions of the set-up sheet below and for no others."
