@@ -52,7 +52,7 @@ def failing_rows(seed: int, n_robots: int, n_failing: int) -> tuple[int, ...]:
     return tuple(sorted(int(row) for row in order[:n_failing]))
 
 
-class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]
+class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
     """Lets robots fail: replaces their actions, or changes what they observe.
 
     Args:

@@ -282,7 +282,7 @@ class ParallelTask:
             raise StudyError(f"period = {self._period}: should be above 0 s")
 
 
-class _Recorded(BaseParallelWrapper):  # type: ignore[misc]
+class _Recorded(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
     """Digests what the environment itself gives, before any failure changes it."""
 
     def __init__(self, env: Env) -> None:

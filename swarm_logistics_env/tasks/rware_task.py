@@ -32,7 +32,7 @@ ROBOT, SHELF, REQUESTED = 0, 5, 6
 SIDESTEP = 0.3  # probability of a step aside where another robot is in the way
 
 
-class StartsWithout(Warehouse):  # type: ignore[misc]
+class StartsWithout(Warehouse):  # type: ignore[misc]  # RWARE is not typed
     """A warehouse that some robots leave before the first step; the others start where they were.
 
     Args:

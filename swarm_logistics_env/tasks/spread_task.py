@@ -25,7 +25,7 @@ FORESIGHT = 0.4  # s
 NEAR_ENOUGH = 0.05  # half the distance at which a landmark counts as covered
 
 
-class FixedLandmarks(Scenario):  # type: ignore[misc]
+class FixedLandmarks(Scenario):  # type: ignore[misc]  # MPE2 is not typed
     """The scenario with a number of landmarks of its own, in which robots may be absent.
 
     Args:

@@ -10,7 +10,7 @@ from pettingzoo import ParallelEnv
 from swarm_logistics_env.errors import SetupError
 
 
-class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
+class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo's is untyped
     """The parallel form of a Gymnasium environment with a tuple entry for each agent.
 
     All agents are there from the first step to the last. A reward that is one number is given to

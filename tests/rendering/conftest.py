@@ -28,6 +28,7 @@ def situation() -> Callable[..., Situation]:
         state.robot_position, state.item_position = places, item_places
         state.ranger_range[:] = scenario.ranger_range
         state.view_range[:] = scenario.view_range
+        state.sends[:], state.hears[:] = True, True
         return state, scenario
 
     return make
