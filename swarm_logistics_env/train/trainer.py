@@ -16,6 +16,7 @@ from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.card import Network, PolicyCard
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
+from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.checkpoint import (
     read_checkpoint,
@@ -31,7 +32,6 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
 )
 from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, simulation, versions
 from swarm_logistics_env.train.scoring import score
 from swarm_logistics_env.train.training import Training
@@ -85,7 +85,9 @@ def train(
         take_tensors(learner.policy, first.tensors)
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
-        with ProgressBar(training.name, training.agent_steps, learner.num_timesteps) as bar:
+        with ProgressBar(
+            training.name, training.agent_steps, "agent-steps", done=learner.num_timesteps
+        ) as bar:
             callback = TrainingCallback(training, view, log, out, bar)
             learner.learn(
                 training.agent_steps - learner.num_timesteps, callback, reset_num_timesteps=False

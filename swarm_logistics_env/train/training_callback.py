@@ -14,11 +14,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_logistics_env.policies.card import PolicyCard
 from swarm_logistics_env.policies.learned import LearnedPolicy
+from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.train.checkpoint import save_checkpoint
 from swarm_logistics_env.train.evaluation import evaluate
 from swarm_logistics_env.train.learner import linears, tensors_of
 from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.training import Training
 
 CHECKPOINT_EVERY = 20.0  # seconds
