@@ -59,7 +59,7 @@ def plan_command(
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.studies.pilot import expected_seconds
+    from swarm_logistics_env.studies.effort import expected_seconds
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     seconds = expected_seconds(plan)
@@ -139,8 +139,7 @@ def export_command(
     to: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""
-    from swarm_logistics_env.studies.export import export
-    from swarm_logistics_env.studies.store import Store
+    from swarm_logistics_env.studies.store import Store, export
 
     with Store.existing(directory) as store:
         count, digest = export(store, to)

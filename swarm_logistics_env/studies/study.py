@@ -13,7 +13,7 @@ from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.studies import metadata, study_files
+from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import imported_plan
 from swarm_logistics_env.studies.metadata import Declaration
@@ -21,7 +21,7 @@ from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.studies.shards import Shard
-from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
@@ -98,7 +98,7 @@ class Study:
         Raises:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
         """
-        found = study_files.read_study_file(Path(path), trust_code=trust_code)
+        found = read_study_file(Path(path), trust_code=trust_code)
         return cls._of(found.replace(**fields), out)
 
     @classmethod
@@ -119,7 +119,7 @@ class Study:
         with Store.existing(out) as store:
             noted = metadata.planned(store, out)
             imported = store.note(metadata.IMPORTED)
-        specification = study_files.read_stored(
+        specification = metadata.read_stored(
             noted[metadata.SPECIFICATION], out, task=task, trust_code=trust_code
         )
         study = cls._of(specification, out)

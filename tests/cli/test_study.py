@@ -19,7 +19,7 @@ SHORT_PAPER = """
 import signal
 import sys
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.studies import paper
+from swarm_logistics_env.studies import presets
 from swarm_logistics_env.cli import app
 
 def shorter(factor):
@@ -28,8 +28,8 @@ def shorter(factor):
 if __name__ == "__main__":
     # Also where the gate itself was started to ignore it, as by nohup.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    old = paper.SPECIFICATION
-    paper.SPECIFICATION = old.replace(
+    old = presets.PRESETS["paper"]
+    presets.PRESETS["paper"] = old.replace(
         scenario=Scenario(duration=DURATION),
         **{k: tuple(map(shorter, getattr(old, k))) for k in ("sizes", "ablations")},
     )
