@@ -20,7 +20,7 @@ from pydantic import (
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label
+from swarm_logistics_env.tasks.policy_choice import PolicySource, told_apart
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, task_of
 
@@ -242,8 +242,4 @@ class Specification(_Part):
     @field_validator("policies")
     @classmethod
     def _once(cls, policies: tuple[object, ...]) -> tuple[object, ...]:
-        labels = [policy_label(policy) for policy in policies]
-        for label in labels:
-            if labels.count(label) > 1:
-                raise ValueError(f"policy {label!r} is given twice")
-        return policies
+        return told_apart(policies)
