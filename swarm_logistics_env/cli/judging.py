@@ -206,8 +206,12 @@ def power_command(
 
 @study.command("compare")
 def compare_command(
-    old: Annotated[Path, typer.Argument(help="Directory of the study to compare with.")],
-    new: Annotated[Path, typer.Argument(help="Directory of the study that is judged.")],
+    old: Annotated[
+        Path, typer.Argument(metavar="OLD", help="Directory of the study to compare with.")
+    ],
+    new: Annotated[
+        Path, typer.Argument(metavar="NEW", help="Directory of the study that is judged.")
+    ],
     fail_if: Annotated[
         list[str] | None,
         typer.Option(

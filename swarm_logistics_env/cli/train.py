@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.train.training import preset_names
 
 if TYPE_CHECKING:
     from swarm_logistics_env.train.tuning import Trial, Tuning
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
 def train_command(
     preset: Annotated[
         str | None,
-        typer.Argument(metavar="[PRESET|FILE]", help="Training preset, or TOML file of one."),
+        typer.Argument(
+            metavar="PRESET|FILE",
+            help=f"Training preset ({', '.join(preset_names())}), or TOML file of one.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory; results/train/NAME if not given.")
@@ -39,7 +43,6 @@ def train_command(
 ) -> None:
     """Train a policy, or tune a scripted one; the same command goes on where it was stopped."""
     from swarm_logistics_env.train.request import train_as_asked, tune_as_asked
-    from swarm_logistics_env.train.training import preset_names
 
     if (preset is None) == (tune is None):
         raise TrainingError(
