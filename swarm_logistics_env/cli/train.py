@@ -46,8 +46,6 @@ def train_command(
     seeds: Annotated[int | None, typer.Option(help="With --tune: episodes a condition.")] = None,
 ) -> None:
     """Train a policy, or tune a scripted one; the same command goes on where it was stopped."""
-    from swarm_logistics_env.train.training import preset_names
-
     if (preset is None) == (tune is None):
         raise TrainingError(
             f"train: should be given a preset ({', '.join(preset_names())}), a TOML file, or --tune"

@@ -57,7 +57,7 @@ def records(path: Path) -> list[dict[str, str]]:
 def test_study_run_prints_and_writes_the_report(tmp_path: Path) -> None:
     script, out = short_paper(tmp_path, 0.5), tmp_path / "out"
     command = [sys.executable, str(script), "study"]
-    arguments = ["run", "paper", "--seeds", "2", "--processes", "1", "--out", str(out)]
+    arguments = ["run", "paper", "--seeds", "2", "--processes", "1", "--out", str(out), "--full"]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
     # Nobody delivers in half a second: every ratio is undefined, and that is said.
     assert done.returncode == 0, done.stderr
@@ -154,7 +154,7 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     printed = capsys.readouterr().out
     # It warns before it plays, so that one can still stop it.
     warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
-    assert warning < printed.index("## ")
+    assert warning < printed.index("questions, 4 paired seeds")
     assert "4 seeds (0 to 3) every verdict is exploratory." in printed
     assert "The verdicts are exploratory: seeds were added" in (out / "report.md").read_text()
     assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
