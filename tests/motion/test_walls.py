@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,7 +48,7 @@ def test_the_way_home_is_kept_though_the_body_turns_unnoticed(noise: float) -> N
     )
     env = SwarmLogisticsEnv(scenario)
     observations = env.reset_arrays(seed=3)
-    policy = policies.load("ppo-delivery")
+    policy: Any = policies.load("ppo-delivery")
     policy.reset(10, 3)
     while env.agents:
         observations, *_ = env.step_arrays(policy.act(observations))
