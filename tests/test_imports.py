@@ -51,7 +51,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 # A Study offers its report, so it stands above both; the other modules of studies stand below.
 MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report", "progress_bar"}
-MAY_IMPORT["train"] |= {"Study"}
+MAY_IMPORT["train"] |= {"Study", "report"}
 # The front doors import whatever they offer.
 MAY_IMPORT["cli"] = set(MAY_IMPORT)
 MAY_IMPORT["__init__"] = set(MAY_IMPORT)

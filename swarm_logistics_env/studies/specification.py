@@ -24,9 +24,9 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.policy_choice import (
     PolicySource,
-    policy_label,
     policy_name,
     runs_code,
+    told_apart,
 )
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, refuse_untrusted, task_of
@@ -249,11 +249,7 @@ class Specification(_Part):
     @field_validator("policies")
     @classmethod
     def _once(cls, policies: tuple[object, ...]) -> tuple[object, ...]:
-        labels = [policy_label(policy) for policy in policies]
-        for label in labels:
-            if labels.count(label) > 1:
-                raise ValueError(f"policy {label!r} is given twice")
-        return policies
+        return told_apart(policies)
 
 
 def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
