@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from swarm_logistics_env.studies.paper import PAPER
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.answer import DIGEST_LINES, answer, digest
 from swarm_logistics_env.report.verdict_matrix import text_lines, verdict_matrix
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.comparisons import Setting
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults
 from tests.report.test_report_files import results
 

@@ -48,5 +48,5 @@ def test_a_pipe_gets_one_plain_line_per_evaluation(
         table.measured({"P": 49.5, "R_FM4": 0.25})
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("tiny: 6 of 8 agent-steps, ")
-    assert line.endswith(": P = 49.5 (swarm-dt 36.75, homing 146), R_FM4 = 0.25")
+    assert line.endswith(", P = 49.5 (swarm-dt 36.75, homing 146), R_FM4 = 0.25")
     assert "\x1b" not in line
