@@ -173,7 +173,7 @@ def power_command(
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.report.result_tables import Section
-    from swarm_logistics_env.studies.effort import demands
+    from swarm_logistics_env.studies.results import demands
 
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
