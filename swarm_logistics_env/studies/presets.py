@@ -97,12 +97,8 @@ PAPER = Reference(
     claims=_claims(),
 )
 
-FOLDER = Path(__file__).parent / "preset_studies"
-
-
-def presets() -> dict[str, Specification]:
-    """Return the studies that come with the package, by name."""
-    return {path.stem: read_study_file(path) for path in sorted(FOLDER.glob("*.toml"))}
+_FOLDER = Path(__file__).parent / "preset_studies"
+PRESETS = {path.stem: read_study_file(path) for path in sorted(_FOLDER.glob("*.toml"))}
 
 
 def load_preset(name: str) -> Specification:
@@ -111,7 +107,6 @@ def load_preset(name: str) -> Specification:
     Raises:
         StudyError: there is none.
     """
-    known = presets()
-    if name not in known:
-        raise StudyError(f"no study preset {name!r}{suggest(name, known)}")
-    return known[name]
+    if name not in PRESETS:
+        raise StudyError(f"no study preset {name!r}{suggest(name, PRESETS)}")
+    return PRESETS[name]

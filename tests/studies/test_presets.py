@@ -4,10 +4,10 @@ import pytest
 
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import OTHER_BEHAVIOUR, Comparison
-from swarm_logistics_env.studies.presets import PAPER, presets
+from swarm_logistics_env.studies.presets import PAPER, PRESETS
 
 
-@pytest.mark.parametrize("name", list(presets()))
+@pytest.mark.parametrize("name", list(PRESETS))
 def test_every_preset_can_be_planned(name: str) -> None:
     assert Study.preset(name).plan().comparisons
 
