@@ -55,7 +55,7 @@ your own may start:
 
 {performance}
 
-`Study.indicators()` has one row a comparison, and `claims.csv` holds it but for the last two columns:
+`Study.indicators()` has one row a comparison, and `claims.csv` holds it but for the last three columns:
 
 {indicators}
 """
