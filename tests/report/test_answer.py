@@ -78,7 +78,9 @@ def test_digest_counts_claims_and_names_what_contradicts_the_paper(found: StudyR
     # The robots of a fleet that FM4 spares deliver all the same: the paper says they do not.
     tough = results(4, lambda _, setting: 39.0 if setting.name == "FM4" else 20.0)
     surprises = answer(tough).surprises
-    assert any("FM4, m=3" in one and "swarm-dt is tolerant, " in one for one in surprises), surprises
+    assert any("FM4, m=3" in one and "swarm-dt is tolerant, " in one for one in surprises), (
+        surprises
+    )
 
 
 def test_policies_stand_side_by_side_with_their_greatest_contrast(compared: StudyResults) -> None:
