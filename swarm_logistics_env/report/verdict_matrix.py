@@ -72,7 +72,7 @@ class MatrixRow:
     def label(self) -> str:
         """What is asked, e.g. "FT FM4", "S superlinear" or "A delivery_width"."""
         if self.asked.startswith("P falls"):  # the factor is the policy in its place
-            return f"{self.asked}: {self.factor} instead"
+            return f"{self.asked.replace('by more than', '>')}: {self.factor}"
         return " ".join(filter(None, (self.indicator, self.factor, self.asked)))
 
 
@@ -189,12 +189,19 @@ class Line:
     """A line of the matrix as it is shown: rows of one factor, which have equal steps.
 
     Attributes:
-        label: what is asked, and the steps where the line above has others.
+        label: what is asked.
+        axis: the steps in words; empty where the line above has the same.
         rows: their signs stand one after the other; empty for a heading.
     """
 
     label: str
+    axis: str
     rows: tuple[MatrixRow, ...]
+
+    @property
+    def text(self) -> str:
+        """Label and steps."""
+        return f"{self.label}{_GAP}{self.axis}".rstrip()
 
     def signs(self, policy: str) -> str:
         """Return the signs of a policy, e.g. "✓✓? ✓✓✗"."""
@@ -210,16 +217,16 @@ def matrix_lines(matrix: VerdictMatrix) -> Iterator[Line]:
     for place, block in enumerate(matrix.blocks):
         others = set().union(*(found for other, found in enumerate(labels) if other != place))
         if others & labels[place]:
-            yield Line(f"{block.title}:", ())
+            yield Line(f"{block.title}:", "", ())
         joined: dict[str, list[MatrixRow]] = {}
         for row in block.rows:
             joined.setdefault(row.label if row.asked else row.factor, []).append(row)
-        axis = f"{_GAP}{block.axis}"
+        axis = block.axis
         for rows in joined.values():
             label = rows[0].label
             if len(rows) > 1:
                 label = f"{', '.join(row.indicator for row in rows)} {rows[0].factor}".strip()
-            yield Line(label + axis, tuple(rows))
+            yield Line(label, axis, tuple(rows))
             axis = ""
 
 
@@ -232,7 +239,7 @@ def text_lines(matrix: VerdictMatrix, width: int, most: int | None = None) -> li
         most: lines at most, rows that do not fit are counted in the last one; None: all lines.
     """
     rows = list(matrix_lines(matrix))
-    left = max(len(text) for text in (matrix.legend, *(row.label for row in rows)))
+    left = max(len(text) for text in (matrix.legend, *(row.text for row in rows)))
     room = width - left
     names, key = list(matrix.policies), []
     signs = [max(len(row.signs(policy)) for row in rows) for policy in matrix.policies]
@@ -250,7 +257,7 @@ def text_lines(matrix: VerdictMatrix, width: int, most: int | None = None) -> li
         lines.append(_line(matrix.legend.ljust(left), [names[i].ljust(widths[i]) for i in part]))
         for row in rows:
             cells = [row.signs(matrix.policies[i]).ljust(widths[i]) for i in part]
-            lines.append(_line(row.label.ljust(left), cells))
+            lines.append(_line(row.text.ljust(left), cells))
     if most is not None and len(lines) > most:
         lines = [*lines[: most - 1], f"and {len(lines) - most + 1} lines more: --full"]
     return lines

@@ -12,10 +12,10 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_of, runs_code
 from swarm_logistics_env.tasks.task import Playable
-from swarm_logistics_env.warehouse.state import DELIVERED
+from swarm_logistics_env.warehouse.state import NOBODY, STORED
 
-FRAME_RATE = 5.0  # per second, at most
-NOWHERE = -1.0  # in both coordinates: a robot removed, an item delivered
+FRAME_RATE = 2.5  # per second, at most
+NOWHERE = -1.0  # in both coordinates: a robot removed, an item carried or delivered
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Recording:
         scenario: of the run.
         period: time between two frames [s].
         robots: (T, N, 2) [m]; `NOWHERE` where one is absent.
-        items: (T, I, 2) [m]; `NOWHERE` where one is delivered.
-        failed: (T, N) whether a robot fails in any mode.
+        items: (T, I, 2) [m]; `NOWHERE` where one is carried or delivered.
+        carrying, failed: (T, N) whether a robot has an item, and whether it fails in any mode.
         digest: of the whole run, as in `Episode`: it tells whether this is the run that was stored.
     """
 
@@ -35,6 +35,7 @@ class Recording:
     period: float
     robots: NDArray[np.float64]
     items: NDArray[np.float64]
+    carrying: NDArray[np.bool_]
     failed: NDArray[np.bool_]
     digest: str
 
@@ -63,14 +64,15 @@ def record_run(source: object, condition: Playable, seed: int, policy_seed: int)
     while True:
         if state.step % every == 0 or play.is_over:
             robots = np.where(state.robot_present[:, np.newaxis], state.robot_position, NOWHERE)
-            gone = state.item_status == DELIVERED
-            items = np.where(gone[:, np.newaxis], NOWHERE, state.item_position)
-            frames.append((robots, items, state.failed.copy()))
+            lies = state.item_status == STORED
+            items = np.where(lies[:, np.newaxis], state.item_position, NOWHERE)
+            frames.append((robots, items, state.robot_item != NOBODY, state.failed.copy()))
         if play.is_over:
             break
         play.step()
         digest.update(state.robot_position.tobytes())
     digest.update(np.array(state.delivery_times, dtype=np.float64).tobytes())
-    robots, items, failed = (np.array(part) for part in zip(*frames))
     period = every * scenario.control_period
-    return Recording(scenario, period, robots, items, failed, digest.hexdigest())
+    columns = (np.array(column) for column in zip(*frames))
+    robots, items, carrying, failed = columns
+    return Recording(scenario, period, robots, items, carrying, failed, digest.hexdigest())
