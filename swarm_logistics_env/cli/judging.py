@@ -171,7 +171,7 @@ def power_command(
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.report.result_tables import Section
-    from swarm_logistics_env.studies.seeds_needed import demands
+    from swarm_logistics_env.studies.effort import demands
 
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
@@ -209,8 +209,12 @@ def power_command(
 
 @study.command("compare")
 def compare_command(
-    old: Annotated[Path, typer.Argument(help="Directory of the study to compare with.")],
-    new: Annotated[Path, typer.Argument(help="Directory of the study that is judged.")],
+    old: Annotated[
+        Path, typer.Argument(metavar="OLD", help="Directory of the study to compare with.")
+    ],
+    new: Annotated[
+        Path, typer.Argument(metavar="NEW", help="Directory of the study that is judged.")
+    ],
     fail_if: Annotated[
         list[str] | None,
         typer.Option(

@@ -18,7 +18,12 @@ if TYPE_CHECKING:
     from swarm_logistics_env.studies.study import Tally
 
 StudyArgument = Annotated[
-    str, typer.Argument(metavar="FILE|PRESET", help="TOML file of a study, or a preset's name.")
+    str,
+    typer.Argument(
+        metavar="FILE|PRESET",
+        # Literal, as to import the presets would slow every command.
+        help="TOML file of a study, or a preset: paper, quick, resilience (`study list`).",
+    ),
 ]
 SeedsOption = Annotated[
     int | None,
@@ -29,7 +34,8 @@ FirstSeedOption = Annotated[
     typer.Option(min=0, help="Smallest seed, the others follow it; the study's if not given."),
 ]
 PolicyOption = Annotated[
-    list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
+    list[str] | None,
+    typer.Option("--policy", help="Policy to judge (`policies` lists them); may be repeated."),
 ]
 TrustCodeOption = Annotated[
     bool,
@@ -52,6 +58,24 @@ def group() -> None:
     """Judge a swarm by its indicators."""
 
 
+@study.command("list")
+def list_command() -> None:
+    """List the studies that come with the package."""
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.presets import PRESETS
+
+    rows = []
+    for name in PRESETS:
+        plan = Study.preset(name).plan()
+        asked = dict.fromkeys(table for _, table, _ in plan.cells)
+        n_runs = len(plan.conditions) * len(plan.seeds)
+        rows.append((name, str(len(plan.seeds)), str(n_runs), "; ".join(asked)))
+    line = "`study plan NAME` says how long one takes; `study run NAME` plays it."
+    show(Section("Studies", ("name", "seeds", "runs", "tables"), tuple(rows), (line,)))
+
+
 @study.command("plan")
 def plan_command(
     asked: StudyArgument,
@@ -62,7 +86,7 @@ def plan_command(
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.studies.pilot import expected_seconds
+    from swarm_logistics_env.studies.effort import expected_seconds
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     seconds = expected_seconds(plan)
@@ -74,7 +98,10 @@ def plan_command(
 @study.command("run")
 def run_command(
     asked: StudyArgument,
-    out: Annotated[Path, typer.Option(help="Directory of its store and report.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Directory of its store and report; results/NAME if not given."),
+    ] = None,
     seeds: SeedsOption = None,
     first_seed: FirstSeedOption = None,
     policies: PolicyOption = None,
@@ -101,8 +128,9 @@ def run_command(
     from swarm_logistics_env.studies.shards import Shard
 
     part = Shard.parse(shard) if shard else None
-    place = out / part.directory if part else out
-    chosen = study_of(asked, place, seeds, policies, trust_code, first_seed=first_seed)
+    chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed)
+    out = out or Path("results", chosen.specification.name)
+    chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
     typer.echo(f"{chosen.plan()}\n")
@@ -144,8 +172,7 @@ def export_command(
     to: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""
-    from swarm_logistics_env.studies.export import export
-    from swarm_logistics_env.studies.store import Store
+    from swarm_logistics_env.studies.store import Store, export
 
     with Store.existing(directory) as store:
         count, digest = export(store, to)

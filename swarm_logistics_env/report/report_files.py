@@ -20,8 +20,8 @@ from swarm_logistics_env.report.page_data import page_data
 from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.report.verdict_matrix import matrix_lines
 from swarm_logistics_env.spi.verdict_signs import SIGNS
-from swarm_logistics_env.studies.export import write_csv
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.store import write_csv
 
 WIDTH = 100  # of the answer [characters]
 

@@ -19,8 +19,8 @@ from swarm_logistics_env.report.report_files import write_report
 from swarm_logistics_env.report.wording import sentence
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Setting
-from swarm_logistics_env.studies.paper import PAPER
 from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
 
