@@ -54,7 +54,7 @@ error, which suggests the nearest known field. Each factor that the study varies
 
 {performance}
 
-`Study.indicators()` has one row a comparison, and `claims.csv` holds it but for the last two columns:
+`Study.indicators()` has one row a comparison, and `claims.csv` holds it but for the last three columns:
 
 {indicators}
 """

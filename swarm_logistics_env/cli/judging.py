@@ -188,6 +188,7 @@ def power_command(
                 demand.problem or str(demand.seeds),
                 "–" if demand.least_power is None else f"{demand.least_power:.0%}",
                 "–" if demand.detectable is None else f"{demand.detectable:.3f}",
+                "–" if demand.unchanged is None else str(demand.unchanged),
             )
         )
     if not rows:
@@ -203,6 +204,7 @@ def power_command(
         "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power on average",
         "power in nine pilots of ten at least",
         f"distance that {n_seeds} seeds find",
+        f"seeds for equivalent at {results.plan.specification.margin:.0%}",
     )  # fmt: skip
     show(Section(f"Seeds needed, from {n_seeds} seeds", columns, tuple(rows)))
 

@@ -41,7 +41,9 @@ def write_report(
     try:
         pictures.mkdir(parents=True, exist_ok=True)
         write_csv(paths[1], results.performance.drop(columns=["arm", "by_seed", "digests"]))
-        write_csv(paths[2], results.indicators.drop(columns=["compared", "estimate"]))
+        write_csv(
+            paths[2], results.indicators.drop(columns=["compared", "estimate", "equivalence_test"])
+        )
         for figure in whole.figures():
             write_csv(pictures / f"{figure.name}.csv", figure.data)
         if missing := missing_packages():

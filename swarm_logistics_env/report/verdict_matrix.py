@@ -38,8 +38,8 @@ class Cell:
 
     @property
     def verdict(self) -> str:
-        """The Holm-adjusted verdict on the property: a name in `SIGNS`."""
-        return self.test.answer_holm or "blocked"
+        """The conclusion on the property: a name in `SIGNS`."""
+        return self.test.conclusion or "blocked"
 
     @property
     def mark(self) -> str:

@@ -60,6 +60,8 @@ class Demand(NamedTuple):
         least_power: power that so many seeds reach in nine pilots of ten; None as `seeds`.
         detectable: distance from the threshold that the pilot's own seeds would find.
         problem: why there is no number of seeds.
+        unchanged: seeds for the verdict "equivalent" with the wanted power, if the change truly is
+            0; None: it is not asked, or the pilot shows no spread.
     """
 
     test: Row
@@ -68,6 +70,7 @@ class Demand(NamedTuple):
     least_power: float | None = None
     detectable: float | None = None
     problem: str | None = None
+    unchanged: int | None = None
 
 
 def demands(
@@ -96,9 +99,12 @@ def _demand(test: Row, effect: float | None, power: float) -> Demand:
     if estimate is None:
         return Demand(test, effect, problem=test.problem)
     detectable = spi.minimum_detectable_effect(estimate, power)
+    equivalence = test.equivalence_test
+    unchanged = spi.seeds_for_equivalence(equivalence, power) if equivalence else None
     if effect is None:
-        return Demand(test, None, detectable=detectable, problem="no effect is named")
+        no_effect = "no effect is named"
+        return Demand(test, None, detectable=detectable, problem=no_effect, unchanged=unchanged)
     seeds = spi.seeds_for_power(estimate, effect, power)
     least = None if seeds is None else spi.lower_decile_of_power(estimate, effect, seeds)
     problem = spi.no_plan_because(estimate, effect)
-    return Demand(test, effect, seeds, least, detectable, problem)
+    return Demand(test, effect, seeds, least, detectable, problem, unchanged)

@@ -10,9 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import spi
 from swarm_logistics_env.studies.comparisons import Arm, Reference, load_reference
-from swarm_logistics_env.studies.indicator_table import CONFIDENCE, CellKey, indicator_table
+from swarm_logistics_env.studies.indicator_table import indicator_table
+from swarm_logistics_env.studies.judged_comparisons import (
+    CONFIDENCE,
+    CellKey,
+    Level,
+    judge_all,
+    level_at,
+)
 from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.performance_table import Row, performance_table, rows_of
 from swarm_logistics_env.studies.plan import Plan
@@ -22,8 +28,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Times = tuple[NDArray[np.float64], ...]
-# A float cannot hold a confidence level much nearer to 1, and an early look may ask for one.
-_LEAST_ALPHA = 1e-12
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class StudyResults:
         confidence: confidence level of the indicators' intervals and verdicts; above 0.95 at a
             declared look, so that all looks together err in 5 %.
         looks: numbers of seeds at which the study was declared to be judged, before its first run.
+        late_margin: whether another margin of equivalence was declared before the first run, so
+            that the verdicts on it are exploratory.
     """
 
     plan: Plan
@@ -52,6 +58,7 @@ class StudyResults:
     outcomes: Mapping[str, Outcome]
     confidence: float = CONFIDENCE
     looks: tuple[int, ...] = ()
+    late_margin: bool = False
 
     @cached_property
     def by_arm(self) -> dict[CellKey, Row]:
@@ -87,25 +94,27 @@ def judge(
     Args:
         plan: of the study.
         outcomes: of its runs, by key.
-        declared: seeds and looks that were declared before the first run; None: those of the plan.
+        declared: what was declared before the first run; None: what the plan says.
     """
+    margin = plan.specification.margin
     reference = load_reference(plan.specification.reference)
     exploratory = declared is not None and not declared.covers(plan)
     looks = declared.looks if declared else ()
-    confidence = CONFIDENCE
+    level = Level()
     if looks and not exploratory:
-        alpha = spi.look_alphas(looks, 1 - CONFIDENCE)[looks.index(len(plan.seeds))]
-        confidence = 1 - max(alpha, _LEAST_ALPHA)
+        level = level_at(looks.index(len(plan.seeds)), looks)
     performance = performance_table(plan, outcomes, reference)
+    judged = judge_all(plan, _by_arm(performance), level)
     return StudyResults(
         plan,
         reference,
         performance,
-        indicator_table(plan, _by_arm(performance), reference, confidence),
+        indicator_table(judged, reference, margin),
         exploratory=exploratory,
         outcomes=outcomes,
-        confidence=confidence,
+        confidence=level.confidence,
         looks=looks,
+        late_margin=declared is not None and declared.margin != margin,
     )
 
 
