@@ -17,7 +17,7 @@ from swarm_logistics_env.report.further_measures import (
 from swarm_logistics_env.report.policies_compared import policy_sections
 from swarm_logistics_env.report.resilience_sections import resilience_sections
 from swarm_logistics_env.report.result_tables import Section, tables, warnings
-from swarm_logistics_env.report.setup_sheet import setup_sheet
+from swarm_logistics_env.report.setup_sheet import glossary, methods, setup_sheet
 from swarm_logistics_env.report.wording import sentence
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
@@ -140,6 +140,8 @@ def _chapters(
         (*size_sections(results, series), *faults),
     )
     yield Chapter("Set-up", "", setup_sheet(results.plan))
+    yield Chapter("Methods", "", (Section("", lines=(methods(results.plan),)),))
+    yield Chapter("Glossary", "", (glossary(results.plan),))
 
 
 def _verdicts(results: StudyResults) -> Iterator[Section]:
@@ -189,10 +191,9 @@ def with_simulation(whole: Document, real: StudyResults, simulated: StudyResults
         tuple(rows),
         (explained, *problems),
     )  # fmt: skip
-    *chapters, setup = whole.chapters
     return replace(
         whole,
-        chapters=(*chapters, Chapter("With simulation", "", (section,)), setup),
+        chapters=(*whole.chapters, Chapter("With simulation", "", (section,))),
         summary=(*whole.summary, section),
     )
 
