@@ -77,10 +77,8 @@ def judge_command(
     from tempfile import TemporaryDirectory
 
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.document import document
-    from swarm_logistics_env.report.latex import latex_tables
-    from swarm_logistics_env.report.report_files import write_text
-    from swarm_logistics_env.report.with_simulation import with_simulation
+    from swarm_logistics_env.report.document import document, with_simulation
+    from swarm_logistics_env.report.report_files import latex_tables, write_text
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.importing import import_results
 
