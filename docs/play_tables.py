@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import score_cards
 from table_blocks import costs_block, paper_block, policies_block
 
 from swarm_logistics_env.studies import Study
@@ -97,6 +98,7 @@ def main() -> None:
     if BENCHMARK.exists():
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
     README.write_text(rewritten(README.read_text(encoding="utf-8"), blocks), encoding="utf-8")
+    score_cards.main()
 
 
 if __name__ == "__main__":

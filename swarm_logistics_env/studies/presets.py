@@ -39,11 +39,24 @@ RESILIENCE = Specification(
     faults=(Faults(title="Faults in mid-run", modes=("FM1", "FM4", "dead"), onsets=(666.7,)),),
 )
 
+# What `judge module:Class` asks of every policy: the same conditions and seeds, so that its answers
+# stand beside those of the shipped policies. Restock: nobody is capped. Seeds: nothing was fitted,
+# trained or chosen on them.
+SCORECARD = Specification(
+    name="scorecard",
+    seeds=10,
+    first_seed=30_000,
+    scenario={"restock": True},
+    sizes=(Sizes(values=(10, 25, 50)),),
+    faults=(Faults(modes=("FM1", "FM2", "FM3", "FM4"), robots=(1, 2, 3)),),
+    parameters=(Parameter(name="delivery_width", values=(2.0, 1.0)),),
+)
+
 
 def presets() -> dict[str, Specification]:
     """Return the studies that come with the package, by name."""
     # Asked for anew each time, as a module attribute: a test may shorten it.
-    return {study.name: study for study in (paper.SPECIFICATION, QUICK, RESILIENCE)}
+    return {study.name: study for study in (paper.SPECIFICATION, QUICK, RESILIENCE, SCORECARD)}
 
 
 def load_preset(name: str) -> Specification:
