@@ -20,7 +20,9 @@ def names_policy(asked: str) -> bool:
     return ":" in asked or not suffix
 
 
-def judge_policy(asked: str, out: Path | None, processes: int | None, trust_code: bool) -> int:
+def judge_policy(
+    asked: str, out: Path | None, processes: int | None, trust_code: bool, *, full: bool
+) -> int:
     """Play the study `scorecard` with a policy; print its score card and write it with the report.
 
     Every run is kept at once, so that the same command goes on after an interruption.
@@ -30,6 +32,7 @@ def judge_policy(asked: str, out: Path | None, processes: int | None, trust_code
         out: directory; None: results/scorecards/ and the policy's name.
         processes: number of worker processes; None: all cores.
         trust_code: whether to read a model of stable-baselines3, which executes code in it.
+        full: whether to print the report of the study as well.
 
     Returns:
         The number of runs that failed.
@@ -37,9 +40,15 @@ def judge_policy(asked: str, out: Path | None, processes: int | None, trust_code
     Raises:
         PolicyError, StudyError: the policy cannot be loaded, or the store cannot be used.
     """
-    from swarm_logistics_env.cli.study_commands import in_one_line, run_study, study_of
+    from swarm_logistics_env.cli.study_commands import (
+        in_one_line,
+        run_study,
+        show_report,
+        study_of,
+    )
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies import called, load
+    from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.figures import slug
     from swarm_logistics_env.report.report_files import write_report
     from swarm_logistics_env.report.score_card import STUDY, card_section, score_card
@@ -55,7 +64,11 @@ def judge_policy(asked: str, out: Path | None, processes: int | None, trust_code
     results = study.findings()
     card = score_card(results)
     show(card_section(card))
-    written = (*write_card(card, out), *write_report(results, out))
+    written = write_card(card, out)
+    if full:
+        show_report(results, document(results), out, full=True)
+    else:
+        written += write_report(results, out)
     typer.echo(f"Written: {', '.join(map(str, written))}")
     typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}"))
     return tally.failed

@@ -10,6 +10,7 @@ import typer
 from swarm_logistics_env.cli.judge_policy import judge_policy, names_policy
 from swarm_logistics_env.cli.options import TrustPolicyOption
 from swarm_logistics_env.cli.study_commands import (
+    FullOption,
     PolicyOption,
     ProcessesOption,
     TrustCodeOption,
@@ -79,6 +80,7 @@ def judge_command(
         ),
     ] = None,
     processes: ProcessesOption = None,
+    full: FullOption = False,
     trust_code: TrustPolicyOption = False,
 ) -> None:
     """Judge trials of real robots or of another simulator; or a policy, by a score card.
@@ -87,6 +89,16 @@ def judge_command(
     onset, and any parameter; or time, one delivery a row. Without seeds the study is unpaired.
     A policy is played in the fixed study `scorecard`, in a minute or a few.
     """
+    from tempfile import TemporaryDirectory
+
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.document import document
+    from swarm_logistics_env.report.latex import latex_tables
+    from swarm_logistics_env.report.report_files import write_text
+    from swarm_logistics_env.report.with_simulation import with_simulation
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.importing import import_results
+
     if names_policy(asked):
         of_trials = {
             "--column": columns, "--ignore": ignore, "--duration": duration,
@@ -95,17 +107,7 @@ def judge_command(
         for option, given in of_trials.items():
             if given:
                 raise StudyError(f"{option} is for a file of trials, and {asked!r} is a policy")
-        raise typer.Exit(1 if judge_policy(asked, out, processes, trust_code) else 0)
-    file = Path(asked)
-    from tempfile import TemporaryDirectory
-
-    from swarm_logistics_env.report.document import document
-    from swarm_logistics_env.report.latex import latex_tables
-    from swarm_logistics_env.report.report_files import write_text
-    from swarm_logistics_env.report.with_simulation import with_simulation
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.importing import import_results
-
+        raise typer.Exit(1 if judge_policy(asked, out, processes, trust_code, full=full) else 0)
     with TemporaryDirectory() as elsewhere:
 
         def results_of(trials: Path, directory: Path) -> StudyResults:
@@ -120,7 +122,7 @@ def judge_command(
             typer.echo(f"{count} runs in {trials}\n")
             return Study.stored(directory).findings()
 
-        results = results_of(file, out or Path(elsewhere) / "study")
+        results = results_of(Path(asked), out or Path(elsewhere) / "study")
         whole = document(results)
         if simulated is not None:
             if simulated.is_dir():
@@ -128,7 +130,9 @@ def judge_command(
             else:
                 model = results_of(simulated, Path(elsewhere) / "simulated")
             whole = with_simulation(whole, results, model)
-        show_report(results, whole, out)
+            if not full:
+                show(whole.summary[-1])  # what was asked for
+        show_report(results, whole, out, full=full)
     if out is not None:
         write_text(out / "tables.tex", latex_tables(whole.summary))
         typer.echo(f"Written: {out / 'tables.tex'}")
@@ -188,7 +192,7 @@ def power_command(
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.result_tables import Section
-    from swarm_logistics_env.studies.seeds_needed import demands
+    from swarm_logistics_env.studies.effort import demands
 
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []

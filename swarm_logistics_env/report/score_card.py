@@ -13,6 +13,7 @@ from typing import Any
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.fault_measures import fault_budgets
 from swarm_logistics_env.studies.performance_table import Row, rows_of
 from swarm_logistics_env.studies.results import StudyResults
@@ -32,7 +33,7 @@ class Line:
         condition: where it was found, e.g. "FM4, the worst of four".
         value: NaN: no run, or undefined.
         low, high: limits of the 95 % interval; None: it has none.
-        verdict: on the property, adjusted after Holm; empty: nothing is asked.
+        verdict: on the property, adjusted after Holm, a name in `SIGNS`; empty: nothing is asked.
     """
 
     name: str
@@ -49,6 +50,11 @@ class Line:
             return f"{self.value:.0f}" if wording.is_known(self.value) else wording.NOTHING
         digits = wording.digits_of(self.value) if self.name == "P" else 3
         return wording.bracketed(Interval(self.value, self.low, self.high), digits)
+
+    @property
+    def said(self) -> str:
+        """The verdict with its sign."""
+        return f"{SIGNS[self.verdict].mark} {SIGNS[self.verdict].word}" if self.verdict else ""
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -137,7 +143,7 @@ def _lines(results: StudyResults) -> Iterator[Line]:
 
 def _line(name: str, condition: str, test: Row) -> Line:
     low, high = (limit if wording.is_known(limit) else None for limit in (test.low, test.high))
-    return Line(name, condition, test.value, low, high, wording.said(test.answer_holm))
+    return Line(name, condition, test.value, low, high, test.answer_holm or "blocked")
 
 
 @cache
@@ -178,7 +184,7 @@ def rank(card: ScoreCard, line: Line) -> Rank:
 def card_section(card: ScoreCard) -> Section:
     """Return the card as a table for the terminal."""
     rows = tuple(
-        (line.name, line.condition, line.text, line.verdict, str(rank(card, line)))
+        (line.name, line.condition, line.text, line.said, str(rank(card, line)))
         for line in card.lines
     )
     columns = ("", "where", "value [95 %]", "verdict", "rank (within the intervals)")

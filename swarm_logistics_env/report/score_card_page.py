@@ -10,14 +10,14 @@ from pathlib import Path
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.report.report_files import write_text
 from swarm_logistics_env.report.score_card import Line, ScoreCard, explanation, others, rank
+from swarm_logistics_env.spi.verdict_signs import SIGNS
 
-_SIGNS = {"supported": "✓", "refuted": "✗", "equivalent": "≈"}
-_COLOURS = {"supported": "#006b4c", "refuted": "#a84300"}
-_WIDTH, _HEIGHT, _MARGIN = 340, 30, 8  # of the strip of a line [px]
+_WEAKEST_FIRST = ("refuted", "blocked", "inconclusive", "equivalent", "unaffected", "supported")
+_WIDTH, _HEIGHT, _MARGIN = 340, 34, 8  # of the strip of a line [px]
 _STYLE = Path(__file__).with_name("score_card.css")
 
 
-def write_card(card: ScoreCard, directory: Path) -> tuple[Path, Path]:
+def write_card(card: ScoreCard, directory: Path) -> tuple[Path, ...]:
     """Write card.html and badge.svg into a directory; return their paths.
 
     Raises:
@@ -45,10 +45,9 @@ def card_page(card: ScoreCard) -> str:
 
 
 def _row(card: ScoreCard, line: Line) -> str:
-    verdict = f"{_sign(line.verdict)} {line.verdict}" if line.verdict else ""
     return (
         f"<tr><td><b>{escape(line.name)}</b><small>{escape(line.condition)}</small></td>"
-        f'<td class="value">{escape(line.text)}</td><td>{escape(verdict)}</td>'
+        f'<td class="value">{escape(line.text)}</td><td class="value">{escape(line.said)}</td>'
         f'<td class="value">{rank(card, line)}</td><td>{_strip(card, line)}</td></tr>\n'
     )
 
@@ -65,16 +64,20 @@ def _strip(card: ScoreCard, line: Line) -> str:
     def place(value: float) -> str:
         return f"{_MARGIN + (value - least) / span * (_WIDTH - 2 * _MARGIN):.1f}"
 
-    middle = _HEIGHT / 2
+    middle = 10
     dots = "".join(
         f'<circle cx="{place(value)}" cy="{middle}" r="5"><title>{escape(name)}: {value:.3g}'
         "</title></circle>"
         for name, (value, _, _) in beside.items()
     )
+    numbers = "".join(
+        f'<text x="{place(end)}" y="{_HEIGHT - 1}" text-anchor="{anchor}">{end:.3g}</text>'
+        for end, anchor in ((min(ends), "start"), (max(ends), "end"))
+    )
     return (
         f'<svg class="strip" role="img" aria-label="{escape(line.name)} among the shipped policies"'
         f' width="{_WIDTH}" height="{_HEIGHT}">'
-        f'<line x1="0" x2="{_WIDTH}" y1="{middle}" y2="{middle}"/>{dots}'
+        f'<line x1="0" x2="{_WIDTH}" y1="{middle}" y2="{middle}"/>{numbers}{dots}'
         f'<line class="limits" x1="{place(low)}" x2="{place(high)}" y1="{middle}" y2="{middle}"/>'
         f'<circle class="own" cx="{place(line.value)}" cy="{middle}" r="6">'
         f"<title>{escape(card.policy)}: {escape(line.text)}</title></circle></svg>"
@@ -111,14 +114,7 @@ def _parts(card: ScoreCard) -> Iterator[tuple[str, str]]:
     for symbol in ("S", "R", "FT", "A"):
         said = {line.verdict for line in by_symbol[symbol]}
         # The weakest of several answers is the one that a reader may rely on.
-        weakest = next(
-            (answer for answer in ("refuted", "blocked", "inconclusive") if answer in said),
-            by_symbol[symbol][0].verdict,
-        )
-        yield f"{symbol} {_sign(weakest)}", _COLOURS.get(weakest, "#5b6068")
+        weakest = SIGNS[next(answer for answer in _WEAKEST_FIRST if answer in said)]
+        yield f"{symbol} {weakest.mark}", weakest.light
     (budget,) = by_symbol["fault budget"]
     yield f"fault budget {budget.text}", "#3a3f46"
-
-
-def _sign(verdict: str) -> str:
-    return _SIGNS.get(verdict, "=" if verdict == wording.UNAFFECTED else "?")

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.studies import Study, presets
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.presets import PRESETS
 
 OWN = """
 import numpy as np
@@ -62,8 +63,8 @@ def test_what_cannot_be_judged_is_told_before_anything_is_written(
 def test_a_policy_gets_a_card_and_the_same_command_plays_nothing_twice(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short = presets.SCORECARD.replace(seeds=3, scenario={"duration": 20.0, "restock": True})
-    monkeypatch.setattr(presets, "SCORECARD", short)
+    short = PRESETS["scorecard"].replace(seeds=3, scenario={"duration": 20.0, "restock": True})
+    monkeypatch.setitem(PRESETS, "scorecard", short)
     # The table as people at a terminal do not see it: Markdown.
     assert app.run(["judge", "homing", "--processes", "1"]) == 0
     printed = capsys.readouterr().out
@@ -88,11 +89,11 @@ def test_a_policy_gets_a_card_and_the_same_command_plays_nothing_twice(
 def test_a_policy_of_ones_own_is_judged_where_it_lies(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short = presets.SCORECARD.replace(seeds=2, scenario={"duration": 1.0, "restock": True})
-    monkeypatch.setattr(presets, "SCORECARD", short)
+    short = PRESETS["scorecard"].replace(seeds=2, scenario={"duration": 1.0, "restock": True})
+    monkeypatch.setitem(PRESETS, "scorecard", short)
     assert app.run(["judge", "judged_policy:Mine", "--processes", "1", "--out", "card"]) == 0
     printed = capsys.readouterr().out
     # Nobody delivers in a second: there is no ratio, and no rank by one.
     assert "| P | N = 25, no fault | 0.0" in printed
-    assert "| A | delivery_width 2 -> 1 m | – | blocked | – |" in printed
+    assert "| A | delivery_width 2 -> 1 m | – | ! blocked | – |" in printed
     assert {"card.html", "badge.svg", "report.md"} <= {path.name for path in Path("card").iterdir()}

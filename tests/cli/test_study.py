@@ -18,14 +18,14 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.policies.loading import WEIGHTS
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.presets import presets
+from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 SHORT_PAPER = """
 import signal
 import sys
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.studies import paper
+from swarm_logistics_env.studies import presets
 from swarm_logistics_env.cli import app
 
 def shorter(factor):
@@ -34,8 +34,8 @@ def shorter(factor):
 if __name__ == "__main__":
     # Also where the gate itself was started to ignore it, as by nohup.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    old = paper.SPECIFICATION
-    paper.SPECIFICATION = old.replace(
+    old = presets.PRESETS["paper"]
+    presets.PRESETS["paper"] = old.replace(
         scenario=Scenario(duration=DURATION),
         **{k: tuple(map(shorter, getattr(old, k))) for k in ("sizes", "ablations")},
     )
@@ -57,7 +57,7 @@ def records(path: Path) -> list[dict[str, str]]:
 def test_study_run_prints_and_writes_the_report(tmp_path: Path) -> None:
     script, out = short_paper(tmp_path, 0.5), tmp_path / "out"
     command = [sys.executable, str(script), "study"]
-    arguments = ["run", "paper", "--seeds", "2", "--processes", "1", "--out", str(out)]
+    arguments = ["run", "paper", "--seeds", "2", "--processes", "1", "--out", str(out), "--full"]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
     # Nobody delivers in half a second: every ratio is undefined, and that is said.
     assert done.returncode == 0, done.stderr
@@ -154,7 +154,7 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     printed = capsys.readouterr().out
     # It warns before it plays, so that one can still stop it.
     warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
-    assert warning < printed.index("## ")
+    assert warning < printed.index("questions, 4 paired seeds")
     assert "4 seeds (0 to 3) every verdict is exploratory." in printed
     assert "The verdicts are exploratory: seeds were added" in (out / "report.md").read_text()
     assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
@@ -298,7 +298,7 @@ def test_a_study_is_kept_under_its_name_where_no_directory_is_given(
 def test_study_list_names_every_preset(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["study", "list"]) == 0
     printed = capsys.readouterr().out
-    for name in presets():
+    for name in PRESETS:
         assert f"| {name} | " in printed
     assert "| paper | 20 | 680 | Table I: scalability; " in printed
 

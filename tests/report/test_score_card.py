@@ -15,7 +15,8 @@ from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.report import score_card
 from swarm_logistics_env.report.score_card import Line, ScoreCard, rank, recorded
 from swarm_logistics_env.report.score_card_page import badge, card_page
-from swarm_logistics_env.studies import Study, presets
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.presets import PRESETS
 
 CARD = ScoreCard(
     "mine<b>",
@@ -58,7 +59,7 @@ def test_page_and_badge_are_well_formed_and_load_nothing() -> None:
     page, image = card_page(CARD), badge(CARD)
     said = ET.fromstring(image).attrib["aria-label"]
     # The weakest of the two answers on S is shown.
-    assert said == "swarm P 50 S ? R ✗ FT ? A ✓ fault budget 1"
+    assert said == "swarm P 50 S ? R ✗ FT ! A ✓ fault budget 1"
     assert "mine<b>" not in page
     assert "50.0 [45.0, 55.0]" in page
     for drawing in re.findall(r'<svg class="strip".*?</svg>', page):
@@ -93,8 +94,8 @@ def test_they_are_recorded_by_the_command_that_they_name(
     assert (program, root / file) == ("python", root / "docs" / "score_cards.py")
     script = importlib.import_module("score_cards")
     assert set(script.shipped()) >= set(recorded()["policies"])
-    short = presets.SCORECARD.replace(seeds=2, scenario={"duration": 20.0, "restock": True})
-    monkeypatch.setattr(presets, "SCORECARD", short)
+    short = PRESETS["scorecard"].replace(seeds=2, scenario={"duration": 20.0, "restock": True})
+    monkeypatch.setitem(PRESETS, "scorecard", short)
     monkeypatch.setattr(script, "OUT", tmp_path)
     monkeypatch.setattr(script, "RECORDED", tmp_path / "cards.json")
     monkeypatch.setattr("os.cpu_count", lambda: 1)
