@@ -81,17 +81,9 @@ benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 benchmark-learning: $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
 
-interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPERSUIT) $(AGILERL) $(MINARI))
-	$(TORCHRL)/bin/python -m interop.torchrl_specs
-	$(TORCHRL)/bin/python -m interop.torchrl_collector
-	$(TORCHRL)/bin/python -m interop.plain_ppo
-	$(TORCHRL)/bin/python -m interop.discrete_loop
-	$(BENCHMARL)/bin/python -m interop.benchmarl_mappo
-	$(SKRL)/bin/python -m interop.skrl_ippo
-	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
-	$(RLLIB)/bin/python -m interop.rllib_ppo
-	$(AGILERL)/bin/python -m interop.agilerl_ippo
-	$(MINARI)/bin/python -m interop.minari_dataset
+# Makes the environment of each library by the rule below, and runs its scripts there.
+interop:
+	$(PYTHON) -m interop
 
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks
@@ -120,16 +112,16 @@ clean:
 $(DEV)/installed: EXTRAS := dev,docs,study,render,train
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
-$(TORCHRL)/installed: OTHERS := torch torchrl
+$(TORCHRL)/installed: OTHERS := torch torchrl mpe2
 $(BENCHMARL)/installed: OTHERS := torch benchmarl
 $(SKRL)/installed: OTHERS := torch skrl
-$(RLLIB)/installed: OTHERS := torch "ray[rllib]"
+$(RLLIB)/installed: OTHERS := torch "ray[rllib]" mpe2
 $(TASKS)/installed: EXTRAS := study,tasks
 $(TASKS)/installed: OTHERS := hypothesis pytest
 $(AGILERL)/installed: OTHERS := torch agilerl peft
 $(MINARI)/installed: OTHERS := "minari[create,hdf5]"
 $(SUPERSUIT)/installed: EXTRAS := train
-$(SUPERSUIT)/installed: OTHERS := supersuit
+$(SUPERSUIT)/installed: OTHERS := supersuit mpe2
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
 .venvs/lowest.txt: pyproject.toml verification/lowest.py

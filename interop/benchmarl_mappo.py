@@ -13,21 +13,23 @@ from benchmarl.models.mlp import MlpConfig
 from torchrl.envs import PettingZooWrapper
 
 from interop.conditions import CONDITIONS, MAX_CYCLES, played
-from interop.versions import versions
+from interop.results import passes, runs_with
 
 FRAMES = 200
 ITERATIONS = 2
 
 
 class SwarmTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in the gate
-    """The environment as a task of BenchMARL's, with `state` for the critic."""
+    """Any environment of ours as a task of BenchMARL's, with `state` for central critics.
+
+    Its `config` is {"make": what returns the environment, "max_steps": the length of an episode}.
+    """
 
     def get_env_fun(self, num_envs: int, continuous_actions: bool, seed: Any, device: Any) -> Any:
-        """Return a maker of the environment that `config` names."""
+        """Return a maker of the environment."""
 
         def make() -> PettingZooWrapper:
-            env = CONDITIONS[self.config["condition"]]()
-            self.config["made"].append(env)
+            env = self.config["make"]()
             groups = {"robots": list(env.possible_agents)}
             return PettingZooWrapper(
                 env, return_state=True, group_map=groups, seed=seed, device=device
@@ -53,7 +55,7 @@ class SwarmTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in t
 
     def max_steps(self, env: Any) -> int:
         """Return the length of an episode."""
-        return MAX_CYCLES
+        return int(self.config["max_steps"])
 
     @staticmethod
     def env_name() -> str:
@@ -63,7 +65,7 @@ class SwarmTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in t
 
 def main() -> None:
     """Train in every condition for two iterations, each with an evaluation."""
-    print(versions("benchmarl", "torchrl", "tensordict", "torch", "pettingzoo", "gymnasium"))
+    runs_with("benchmarl", "torchrl", "tensordict", "torch", "pettingzoo", "gymnasium")
     for name in CONDITIONS:
         with tempfile.TemporaryDirectory() as folder:
             train(name, folder)
@@ -79,8 +81,13 @@ def train(name: str, folder: str) -> None:
     config.on_policy_n_minibatch_iters, config.on_policy_minibatch_size = 2, 100
     config.render = False
     made: list[Any] = []
+
+    def make() -> Any:
+        made.append(CONDITIONS[name]())
+        return made[-1]
+
     experiment = Experiment(
-        task=SwarmTask("swarm_logistics", {"condition": name, "made": made}),
+        task=SwarmTask("swarm_logistics", {"make": make, "max_steps": MAX_CYCLES}),
         algorithm_config=MappoConfig.get_from_yaml(),
         model_config=MlpConfig.get_from_yaml(),
         critic_model_config=MlpConfig.get_from_yaml(),
@@ -93,7 +100,7 @@ def train(name: str, folder: str) -> None:
     assert torch.isfinite(after).all()
     assert not torch.equal(after, before)
     assert experiment.total_frames == ITERATIONS * FRAMES, experiment.total_frames
-    print(f"MAPPO, {ITERATIONS * FRAMES} frames, {ITERATIONS} updates, {played(name, *made)}")
+    passes(f"MAPPO, {ITERATIONS * FRAMES} frames, {ITERATIONS} updates, {played(name, *made)}")
 
 
 def parameters(policy: Any) -> torch.Tensor:
