@@ -115,6 +115,8 @@ def prepared(folder: str) -> Experiment:
         seed=0,
         config=config,
     )
+    for loss in experiment.losses.values():
+        loss.normalize_advantage = True
     # Untrained it drives ahead: a robot that trembles on the spot meets nothing to learn from.
     last = [layer for layer in experiment.policy.modules() if isinstance(layer, torch.nn.Linear)]
     with torch.no_grad():
