@@ -48,6 +48,10 @@ class WorldsTask(SwarmTask):
         """Return False."""
         return False
 
+    def max_steps(self, env: Any) -> int:
+        """Return the length of an episode."""
+        return SCENARIO.n_steps
+
     def observation_spec(self, env: TorchRLWorlds) -> Any:
         """Return the observations of one world."""
         return env.full_observation_spec_unbatched
@@ -108,7 +112,7 @@ def prepared(folder: str) -> Experiment:
     algorithm.use_tanh_normal = False
     model.num_cells = [64, 64]
     experiment = Experiment(
-        task=WorldsTask("swarm_logistics", {"max_steps": SCENARIO.n_steps}),
+        task=WorldsTask("swarm_logistics", {}),
         algorithm_config=algorithm,
         model_config=model,
         critic_model_config=model,

@@ -20,16 +20,17 @@ ITERATIONS = 2
 
 
 class SwarmTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in the gate
-    """Any environment of ours as a task of BenchMARL's, with `state` for central critics.
+    """The environment in a condition as a task of BenchMARL's, with `state` for the critic.
 
-    Its `config` is {"make": what returns the environment, "max_steps": the length of an episode}.
+    Its `config` is {"condition": a name, "made": a list that gets the environments}.
     """
 
     def get_env_fun(self, num_envs: int, continuous_actions: bool, seed: Any, device: Any) -> Any:
         """Return a maker of the environment."""
 
         def make() -> PettingZooWrapper:
-            env = self.config["make"]()
+            env = CONDITIONS[self.config["condition"]]()
+            self.config["made"].append(env)
             groups = {"robots": list(env.possible_agents)}
             return PettingZooWrapper(
                 env, return_state=True, group_map=groups, seed=seed, device=device
@@ -55,7 +56,7 @@ class SwarmTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in t
 
     def max_steps(self, env: Any) -> int:
         """Return the length of an episode."""
-        return int(self.config["max_steps"])
+        return MAX_CYCLES
 
     @staticmethod
     def env_name() -> str:
@@ -81,13 +82,8 @@ def train(name: str, folder: str) -> None:
     config.on_policy_n_minibatch_iters, config.on_policy_minibatch_size = 2, 100
     config.render = False
     made: list[Any] = []
-
-    def make() -> Any:
-        made.append(CONDITIONS[name]())
-        return made[-1]
-
     experiment = Experiment(
-        task=SwarmTask("swarm_logistics", {"make": make, "max_steps": MAX_CYCLES}),
+        task=SwarmTask("swarm_logistics", {"condition": name, "made": made}),
         algorithm_config=MappoConfig.get_from_yaml(),
         model_config=MlpConfig.get_from_yaml(),
         critic_model_config=MlpConfig.get_from_yaml(),

@@ -27,10 +27,10 @@ class FewerAgents(ParallelEnv):  # type: ignore[misc]  # PettingZoo ships no typ
 
     def reset(self, seed: int | None = None, options: Any = None) -> tuple[Any, Any]:
         """Begin an episode."""
-        observations, infos = self.env.reset(seed=seed, options=options)
+        observations, _ = self.env.reset(seed=seed, options=options)
         self.agents = self.possible_agents[: self._n_agents]
         self._n_agents = self._then
-        return self._of_those_there(observations), self._of_those_there(infos)
+        return self._of_those_there(observations), self._infos()
 
     def step(self, actions: dict[str, Any]) -> Any:
         """Take a step."""
@@ -38,7 +38,8 @@ class FewerAgents(ParallelEnv):  # type: ignore[misc]  # PettingZoo ships no typ
             agent: actions.get(agent, np.zeros(space.shape, np.float32))
             for agent, space in self.action_spaces.items()
         }
-        outcome = [self._of_those_there(part) for part in self.env.step(full)]
+        outcome = [self._of_those_there(part) for part in self.env.step(full)[:4]]
+        outcome.append(self._infos())
         if not self.env.agents:
             self.agents = []
         return tuple(outcome)
@@ -54,6 +55,10 @@ class FewerAgents(ParallelEnv):  # type: ignore[misc]  # PettingZoo ships no typ
     def close(self) -> None:
         """Close the environment."""
         self.env.close()
+
+    def _infos(self) -> dict[str, Any]:
+        # Not empty, as MPE2's are, since TorchRL reads infos before observations.
+        return {agent: {"active": 1} for agent in self.agents}
 
     def _of_those_there(self, part: dict[str, Any]) -> dict[str, Any]:
         return {agent: part[agent] for agent in self.agents}

@@ -79,7 +79,12 @@ def test_wheel_and_sdist_hold_every_file_of_the_package(built: Built) -> None:
 
 def test_sdist_is_enough_to_run_the_gate(built: Built) -> None:
     assert {"Makefile", "constraints.txt", "pyproject.toml", "LICENSE"} <= built.sdist
-    assert {"SECURITY.md", "CITATION.cff", "CHANGELOG.md", ".github/workflows/test.yml"} <= built.sdist
+    assert {
+        "SECURITY.md",
+        "CITATION.cff",
+        "CHANGELOG.md",
+        ".github/workflows/test.yml",
+    } <= built.sdist
     tests = {path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("*.py")}
     assert tests <= built.sdist
 
