@@ -27,7 +27,7 @@ WORLDS, STEPS, EPOCHS, BATCH, DISCOUNT, TRACE, CLIP = 12, 128, 4, 480, 0.99, 0.9
 
 
 def network(n_outputs):
-    hidden = [nn.Linear(84, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
+    hidden = [nn.Linear(88, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
     return nn.Sequential(*hidden, nn.Linear(64, n_outputs))
 
 

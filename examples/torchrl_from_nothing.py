@@ -29,7 +29,7 @@ N_ROBOTS, STEPS, EPOCHS, BATCH = 10, 1000, 4, 125
 
 
 def network(n_outputs):
-    hidden = [nn.Linear(84, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
+    hidden = [nn.Linear(88, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
     return nn.Sequential(*hidden, nn.Linear(64, n_outputs))
 
 
