@@ -6,7 +6,7 @@ import pytest
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions
+from swarm_logistics_env.train.settings import Conditions, PPOSettings
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -44,9 +44,9 @@ def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
 
 
 def test_potentials_are_discounted_as_the_learner_discounts() -> None:
-    training = Training(rewards={"carrying": 0.5}, ppo={"gamma": 0.9})
+    training = Training(rewards={"carrying": 0.5}, ppo=PPOSettings(gamma=0.9))
     assert training.reward_weights == {"carrying": 0.5, "discount": 0.9}
-    assert Training(ppo={"gamma": 0.9}).reward_weights == {"delivery": 1.0}
+    assert Training(ppo=PPOSettings(gamma=0.9)).reward_weights == {"delivery": 1.0}
 
 
 @pytest.mark.parametrize(
