@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.train.training import preset_names
 
 if TYPE_CHECKING:
     from swarm_logistics_env.train.tuning import Trial, Tuning
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 def train_command(
     preset: Annotated[
         str | None,
-        typer.Argument(metavar="[PRESET|FILE]", help="Training preset, or TOML file of one."),
+        typer.Argument(
+            metavar="PRESET|FILE",
+            help=f"Training preset ({', '.join(preset_names())}), or TOML file of one.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory; results/train/NAME if not given.")
@@ -42,8 +46,6 @@ def train_command(
     seeds: Annotated[int | None, typer.Option(help="With --tune: episodes a condition.")] = None,
 ) -> None:
     """Train a policy, or tune a scripted one; the same command goes on where it was stopped."""
-    from swarm_logistics_env.train.training import preset_names
-
     if (preset is None) == (tune is None):
         raise TrainingError(
             f"train: should be given a preset ({', '.join(preset_names())}), a TOML file, or --tune"

@@ -118,7 +118,7 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
     if not study.get_trials():
         study.enqueue_trial(_own_parameters(asked.policy))
     done = len(_completed(study))
-    with LiveTable(f"tuning {asked.policy}", asked.trials, done, unit="trials") as table:
+    with LiveTable(f"tuning {asked.policy}", asked.trials, "trials", done=done) as table:
         while done < asked.trials:
             values = _try(study, asked, done)
             done = len(_completed(study))
