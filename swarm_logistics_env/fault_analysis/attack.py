@@ -53,7 +53,7 @@ class Attack:
     seed: int = 0
 
     def faults(self) -> list[Fault]:
-        """Return all faults that are searched: every mode, role, onset and duration.
+        """Return all faults that are searched: every mode, role (None: by the seed), onset and duration.
 
         Raises:
             SetupError: a mode is unknown, or there are fewer robots.
@@ -74,9 +74,11 @@ class Attack:
                 duration=None if lasts is None else round(lasts * end, 1),
                 role=role,
             )
-            for mode, role, onset, lasts in product(self.modes, ROLES, _ONSETS, _DURATIONS)
+            for mode, role, onset, lasts in product(
+                self.modes, (None, *ROLES), _ONSETS, _DURATIONS
+            )
             # At the start nobody carries anything, and nobody stands in the delivery area.
-            if onset > 0.0 or role == "searching"
+            if onset > 0.0 or role in (None, "searching")
         ]
 
 
