@@ -11,7 +11,7 @@ from record_tables import fields, summary, table
 from swarm_logistics_env.scenario import SCENARIO_PRESETS
 from swarm_logistics_env.studies.indicator_table import INDICATORS
 from swarm_logistics_env.studies.performance_table import PERFORMANCE, Columns
-from swarm_logistics_env.studies.presets import presets
+from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Faults,
@@ -72,7 +72,7 @@ def page() -> str:
         presets="\n".join(
             f"* `{name}`: {study.seeds} seeds, N = {study.scenario.n_robots}, "
             f"{study.scenario.duration:g} s; {varied(study)}"
-            for name, study in presets().items()
+            for name, study in PRESETS.items()
         ),
         performance=columns(PERFORMANCE),
         indicators=columns(INDICATORS),

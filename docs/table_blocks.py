@@ -11,10 +11,9 @@ from record_tables import table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording
-from swarm_logistics_env.studies.agreement import agreement
 from swarm_logistics_env.studies.comparisons import Setting
 from swarm_logistics_env.studies.performance_table import Row, rows_of
-from swarm_logistics_env.studies.policy_comparison import judged_policies
+from swarm_logistics_env.studies.policy_comparison import agreement, judged_policies
 from swarm_logistics_env.studies.results import StudyResults
 
 _EXACT = " ="

@@ -48,8 +48,14 @@ class StudyError(SwarmLogisticsError):
 def suggest(name: str, known: Iterable[str]) -> str:
     """Return the end of an error message about an unknown `name`.
 
-    Either "; did you mean 'x'?" where one of `known` is close, or the list of what is known.
+    "; did you mean 'x'?" where one of `known` is close to it; "; did you mean 'x' or 'y'?" where
+    one to four of them contain it, whatever its case; else the list of what is known.
     """
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1)
-    return f"; did you mean {close[0]!r}?" if close else f"; known: {', '.join(names)}"
+    meant = difflib.get_close_matches(name, names, n=1)
+    if not meant and name:
+        meant = [known for known in names if name.casefold() in known.casefold()]
+    if 1 <= len(meant) <= 4:
+        *others, last = map(repr, meant)
+        return f"; did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
+    return f"; known: {', '.join(names)}"

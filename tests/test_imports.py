@@ -25,6 +25,7 @@ ENVIRONMENT = WORLD | {"environment", "rendering", "swarm_logistics_v0"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "streams": {"errors"},
+    "progress_bar": set(),
     "kernels": {"errors"},
     "records": {"errors"},
     "scenario": {"errors", "records", "streams"},
@@ -43,12 +44,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     "tasks": RUNS,
     "studies": {"errors", "records", "streams", "spi", "tasks"},
     "report": {"errors", "spi", "tasks", "studies"},
-    "train": RUNS | ENVIRONMENT | {"wrappers", "adapters", "spi", "tasks", "studies"},
+    "train": RUNS
+    | ENVIRONMENT
+    | {"progress_bar", "wrappers", "adapters", "spi", "tasks", "studies"},
     "testing": RUNS | ENVIRONMENT | {"wrappers", "adapters"},
 }
 # A Study offers its report, so it stands above both; the other modules of studies stand below.
-MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report"}
-MAY_IMPORT["train"] |= {"Study"}
+MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report", "progress_bar"}
+MAY_IMPORT["train"] |= {"Study", "report"}
 # The front doors import whatever they offer.
 MAY_IMPORT["cli"] = set(MAY_IMPORT)
 MAY_IMPORT["__init__"] = set(MAY_IMPORT)

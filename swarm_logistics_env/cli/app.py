@@ -13,6 +13,7 @@ from swarm_logistics_env.cli.options import (
     FaultOption,
     PolicyOption,
     PresetOption,
+    ScenarioOption,
     SeedOption,
     SetOption,
     TrustPolicyOption,
@@ -60,25 +61,46 @@ def options(
 @app.command("scenario")
 def scenario_command(
     preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON, which can be read back.")
     ] = False,
 ) -> None:
     """Print every condition of a run: value, unit, and whether the default is sourced or fitted."""
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.scenario import SOURCES
 
-    chosen = scenario_of(preset, changes)
+    chosen = scenario_of(preset, scenario_file, changes)
     if as_json:
         typer.echo(chosen.to_json())
         return
-    typer.echo(chosen.sheet())
-    typer.echo(
+    marks = (
         "fitted: chosen to bring the paper's tables closest. chosen: without a source. "
         "off: added here, left out."
     )
-    for name, address in SOURCES.items():
-        typer.echo(f"{name}: {address}")
+    sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
+    columns = ("condition", "value", "unit, meaning; source")
+    show(
+        Section(
+            f"Scenario, from the preset {preset}",
+            columns,
+            tuple(chosen.conditions()),
+            (marks, sources),
+        )
+    )
+
+
+@app.command("policies")
+def policies_command() -> None:
+    """List the policies that can be called by name."""
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.policies import known_policies
+    from swarm_logistics_env.report.result_tables import Section
+
+    line = "A policy of your own is package.module:Class, or the path of a file that `train` wrote."
+    show(Section("Policies", ("name", "kind", "about"), tuple(known_policies()), (line,)))
 
 
 @app.command("run")
@@ -86,6 +108,7 @@ def run_command(
     policy: PolicyOption = "swarm-dt",
     seed: SeedOption = 0,
     preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     faults: FaultOption = None,
     trust_code: TrustPolicyOption = False,
@@ -96,7 +119,7 @@ def run_command(
     from swarm_logistics_env import policies
     from swarm_logistics_env.episode import run_episode
 
-    scenario, scheduled = scenario_of(preset, changes), faults_of(faults)
+    scenario, scheduled = scenario_of(preset, scenario_file, changes), faults_of(faults)
     player = policies.load(policy, trust_code=trust_code)
     # This compiles the kernels, so that the time below is that of the episode alone.
     run_episode(scenario.replace(duration=scenario.control_period), player, seed)
@@ -106,7 +129,7 @@ def run_command(
     times = episode.delivery_times
     typer.echo(
         f"P = {episode.delivered} items delivered of {scenario.n_items} in {episode.ended_at:g} s "
-        f"by {scenario.n_robots} robots with {policy}, seed {seed}"
+        f"by {scenario.n_robots} robots with {policies.called(policy)}, seed {seed}"
     )
     if len(times):
         gaps = [after - before for before, after in zip([0.0, *times], times)]

@@ -10,6 +10,7 @@ import typer
 from swarm_logistics_env.cli.options import (
     FaultOption,
     PresetOption,
+    ScenarioOption,
     SeedOption,
     SetOption,
     TrustPolicyOption,
@@ -32,11 +33,13 @@ def film_command(
         list[str] | None,
         typer.Option(
             "--policy",
-            help="Name, path of a policy file, or package.module:Class; may be repeated.",
+            help="Name (`policies` lists them), path of a policy file, or package.module:Class; "
+            "may be repeated.",
         ),
     ] = None,
     seed: SeedOption = 0,
     preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     faults: FaultOption = None,
     twin: Annotated[
@@ -67,7 +70,7 @@ def film_command(
     from swarm_logistics_env.rendering.renderer import load_pygame
     from swarm_logistics_env.rendering.video import check_film, write_film
 
-    scenario, scheduled = scenario_of(preset, changes), faults_of(faults)
+    scenario, scheduled = scenario_of(preset, scenario_file, changes), faults_of(faults)
     if twin and not scheduled:
         raise SetupError("--twin: shows the run without its faults, so --fault should be given")
     check_film(out)
@@ -93,6 +96,9 @@ def film_command(
 
 
 def _short(policy: str) -> str:
+    from swarm_logistics_env.policies import called
+
+    policy = called(policy)
     # A long path of a user's own policy is cut at its beginning.
     return policy if len(policy) <= 24 else f"…{policy[-23:]}"
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_logistics_env.cli.study_commands import (
+    FullOption,
     PolicyOption,
     ProcessesOption,
     TrustCodeOption,
@@ -66,6 +67,7 @@ def judge_command(
             help="A condition for the report to state, or a TOML file of some; may be repeated.",
         ),
     ] = None,
+    full: FullOption = False,
 ) -> None:
     """Judge trials of real robots or of another simulator, or a paper's tables.
 
@@ -74,6 +76,7 @@ def judge_command(
     """
     from tempfile import TemporaryDirectory
 
+    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.latex import latex_tables
     from swarm_logistics_env.report.report_files import write_text
@@ -103,7 +106,9 @@ def judge_command(
             else:
                 model = results_of(simulated, Path(elsewhere) / "simulated")
             whole = with_simulation(whole, results, model)
-        show_report(results, whole, out)
+            if not full:
+                show(whole.summary[-1])  # what was asked for
+        show_report(results, whole, out, full=full)
     if out is not None:
         write_text(out / "tables.tex", latex_tables(whole.summary))
         typer.echo(f"Written: {out / 'tables.tex'}")
@@ -168,7 +173,7 @@ def power_command(
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.report.result_tables import Section
-    from swarm_logistics_env.studies.seeds_needed import demands
+    from swarm_logistics_env.studies.effort import demands
 
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
@@ -206,8 +211,12 @@ def power_command(
 
 @study.command("compare")
 def compare_command(
-    old: Annotated[Path, typer.Argument(help="Directory of the study to compare with.")],
-    new: Annotated[Path, typer.Argument(help="Directory of the study that is judged.")],
+    old: Annotated[
+        Path, typer.Argument(metavar="OLD", help="Directory of the study to compare with.")
+    ],
+    new: Annotated[
+        Path, typer.Argument(metavar="NEW", help="Directory of the study that is judged.")
+    ],
     fail_if: Annotated[
         list[str] | None,
         typer.Option(

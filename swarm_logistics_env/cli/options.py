@@ -4,17 +4,29 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swarm_logistics_env.errors import FaultError, ScenarioError
+from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.scenario import Scenario
     from swarm_logistics_env.warehouse.faults import Fault
 
-PresetOption = Annotated[str, typer.Option(help="Scenario to start from.")]
+PresetOption = Annotated[
+    str, typer.Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
+]
+ScenarioOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--scenario",
+        metavar="FILE",
+        help="TOML or JSON file of fields to change, as `scenario --json` writes it.",
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
@@ -24,7 +36,10 @@ FaultOption = Annotated[
     typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
 ]
 PolicyOption = Annotated[
-    str, typer.Option(help="Name, path of a policy file, or package.module:Class.")
+    str,
+    typer.Option(
+        help="Name (`policies` lists them), path of a policy file, or package.module:Class."
+    ),
 ]
 SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[
@@ -34,15 +49,14 @@ TrustPolicyOption = Annotated[
 _FAULT = re.compile(r"(?P<mode>\w+)(:(?P<robots>\d+))?(@(?P<onset>\d+\.?\d*|\.\d+))?")
 
 
-def scenario_of(preset: str, changes: list[str] | None) -> Scenario:
-    """Return the scenario that `--preset` and `--set` describe.
+def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
+    """Return the scenario that `--preset`, `--scenario` and `--set` describe, the last one wins.
 
     Raises:
-        ScenarioError: no such preset or field, or a value that cannot be.
+        ScenarioError: no such preset, file or field, or a value that cannot be.
     """
-    from swarm_logistics_env.scenario import Scenario
-
-    fields: dict[str, Any] = {}
+    fields = {} if file is None else _fields_of(file)
+    preset = str(fields.pop("preset", preset))
     for change in changes or []:
         name, equals, value = change.partition("=")
         if not equals:
@@ -52,6 +66,21 @@ def scenario_of(preset: str, changes: list[str] | None) -> Scenario:
         except (json.JSONDecodeError, RecursionError):
             fields[name] = value
     return Scenario.preset(preset).replace(**fields)
+
+
+def _fields_of(file: Path) -> dict[str, Any]:
+    """Return the fields in a file of `--scenario`; "preset" may be one of them."""
+    try:
+        text = file.read_text(encoding="utf-8")
+        fields = json.loads(text) if file.suffix == ".json" else tomllib.loads(text)
+    except OSError as error:
+        raise ScenarioError(f"--scenario {file}: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:  # of Unicode, JSON and TOML
+        kind = "JSON" if file.suffix == ".json" else "TOML"
+        raise ScenarioError(f"--scenario {file}: is not {kind}: {error}") from None
+    if not isinstance(fields, dict):
+        raise ScenarioError(f"--scenario {file}: should be a table of fields")
+    return fields
 
 
 def faults_of(texts: list[str] | None) -> list[Fault]:

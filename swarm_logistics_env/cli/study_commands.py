@@ -18,7 +18,12 @@ if TYPE_CHECKING:
     from swarm_logistics_env.studies.study import Tally
 
 StudyArgument = Annotated[
-    str, typer.Argument(metavar="FILE|PRESET", help="TOML file of a study, or a preset's name.")
+    str,
+    typer.Argument(
+        metavar="FILE|PRESET",
+        # Literal, as to import the presets would slow every command.
+        help="TOML file of a study, or a preset: paper, quick, resilience (`study list`).",
+    ),
 ]
 SeedsOption = Annotated[
     int | None,
@@ -29,7 +34,8 @@ FirstSeedOption = Annotated[
     typer.Option(min=0, help="Smallest seed, the others follow it; the study's if not given."),
 ]
 PolicyOption = Annotated[
-    list[str] | None, typer.Option("--policy", help="Policy to judge; may be repeated.")
+    list[str] | None,
+    typer.Option("--policy", help="Policy to judge (`policies` lists them); may be repeated."),
 ]
 TrustCodeOption = Annotated[
     bool,
@@ -40,6 +46,9 @@ TrustCodeOption = Annotated[
 ProcessesOption = Annotated[
     int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
 ]
+FullOption = Annotated[
+    bool, typer.Option("--full", help="Print every table, not the answer alone.")
+]
 
 study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
 
@@ -47,6 +56,24 @@ study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_ar
 @study.callback()
 def group() -> None:
     """Judge a swarm by its indicators."""
+
+
+@study.command("list")
+def list_command() -> None:
+    """List the studies that come with the package."""
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.presets import presets
+
+    rows = []
+    for name in presets():
+        plan = Study.preset(name).plan()
+        asked = dict.fromkeys(table for _, table, _ in plan.cells)
+        n_runs = len(plan.conditions) * len(plan.seeds)
+        rows.append((name, str(len(plan.seeds)), str(n_runs), "; ".join(asked)))
+    line = "`study plan NAME` says how long one takes; `study run NAME` plays it."
+    show(Section("Studies", ("name", "seeds", "runs", "tables"), tuple(rows), (line,)))
 
 
 @study.command("plan")
@@ -59,7 +86,7 @@ def plan_command(
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.studies.pilot import expected_seconds
+    from swarm_logistics_env.studies.effort import expected_seconds
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     seconds = expected_seconds(plan)
@@ -71,7 +98,10 @@ def plan_command(
 @study.command("run")
 def run_command(
     asked: StudyArgument,
-    out: Annotated[Path, typer.Option(help="Directory of its store and report.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Directory of its store and report; results/NAME if not given."),
+    ] = None,
     seeds: SeedsOption = None,
     first_seed: FirstSeedOption = None,
     policies: PolicyOption = None,
@@ -88,17 +118,19 @@ def run_command(
         str | None,
         typer.Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N."),
     ] = None,
+    full: FullOption = False,
     trust_code: TrustCodeOption = False,
 ) -> None:
-    """Play the runs that are missing, then print and write the report."""
+    """Play the runs that are missing, then print the answer and write the report."""
     import os
 
     from swarm_logistics_env.studies.engines import engine_named
     from swarm_logistics_env.studies.shards import Shard
 
     part = Shard.parse(shard) if shard else None
-    place = out / part.directory if part else out
-    chosen = study_of(asked, place, seeds, policies, trust_code, first_seed=first_seed)
+    chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed)
+    out = out or Path("results", chosen.specification.name)
+    chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
     typer.echo(f"{chosen.plan()}\n")
@@ -106,7 +138,7 @@ def run_command(
         typer.echo(f"{warning}\n")
     tally = _run(chosen, player, part)
     if part is None:
-        _show(chosen)
+        _show(chosen, full=full)
     else:
         typer.echo(
             f"When all {part.count} shards are done: swarm-logistics study merge "
@@ -123,14 +155,15 @@ def run_command(
 @study.command("report")
 def report_command(
     directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+    full: FullOption = False,
     trust_code: TrustCodeOption = False,
 ) -> None:
-    """Print and write the report of a study again, from its store alone."""
+    """Print the answer and write the report of a study again, from its store alone."""
     from swarm_logistics_env.studies import Study
 
     stored = Study.stored(directory, trust_code=trust_code)
     typer.echo(f"{stored.plan()}\n")
-    _show(stored)
+    _show(stored, full=full)
 
 
 @study.command("export")
@@ -139,8 +172,7 @@ def export_command(
     to: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""
-    from swarm_logistics_env.studies.export import export
-    from swarm_logistics_env.studies.store import Store
+    from swarm_logistics_env.studies.store import Store, export
 
     with Store.existing(directory) as store:
         count, digest = export(store, to)
@@ -237,26 +269,27 @@ def _in_one_line(tally: Tally, players: str) -> str:
     )
 
 
-def show_report(results: StudyResults, whole: Document, out: Path | None) -> None:
-    """Print the summary of a study's report, and write all of it into a directory."""
-    from swarm_logistics_env.cli.terminal_tables import show
+def show_report(
+    results: StudyResults, whole: Document, out: Path | None, *, full: bool = False
+) -> None:
+    """Write a study's report into a directory, and print the answer; the tables too if `full`."""
+    from swarm_logistics_env.cli.terminal_tables import show, show_digest
     from swarm_logistics_env.report.report_files import (
         how_to_get_figures,
         missing_packages,
         write_report,
     )
 
-    for section in whole.summary:
+    for section in whole.summary if full else ():
         show(section)
-    if out is not None:
-        written = write_report(results, out, whole)
-        typer.echo(f"Written: {', '.join(str(path) for path in written)}")
-        if missing := missing_packages():
-            typer.echo(how_to_get_figures(missing))
+    written = write_report(results, out, whole) if out else (None,)
+    show_digest(whole.answer, written[0], whole=full)
+    if out and (missing := missing_packages()):
+        typer.echo(how_to_get_figures(missing))
 
 
-def _show(asked: Study) -> None:
+def _show(asked: Study, *, full: bool) -> None:
     from swarm_logistics_env.report.document import document
 
     results = asked.findings()
-    show_report(results, document(results), asked.out)
+    show_report(results, document(results), asked.out, full=full)

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
+from swarm_logistics_env.report.answer import DIGEST_LINES, Answer, digest
 from swarm_logistics_env.report.markup import section_markdown
 from swarm_logistics_env.report.result_tables import Section
+from swarm_logistics_env.report.verdict_matrix import NOT_ASKED
+from swarm_logistics_env.spi.verdict_signs import SIGNS
+
+_PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
+_COLOURS = {sign.mark: sign.colour for sign in SIGNS.values()}
+# Words of signs alone: a question mark that ends a sentence has no colour.
+_SIGNS = re.compile(rf"(?<!\S)[{''.join(map(re.escape, _COLOURS))}{NOT_ASKED}]+(?!\S)")
 
 
 def show(section: Section) -> None:
@@ -29,3 +41,14 @@ def show(section: Section) -> None:
     for line in section.lines:
         console.print(escape(line))
     console.print()
+
+
+def show_digest(found: Answer, where: Path | None, *, whole: bool = False) -> None:
+    """Print the answer of a study on one screen, or with every row of its matrix."""
+    console = Console(highlight=False)
+    width = console.width if console.is_terminal else _PLAIN_WIDTH
+    shown = Text(digest(found, width, where, None if whole else DIGEST_LINES), no_wrap=True)
+    for word in _SIGNS.finditer(shown.plain):
+        for place in range(word.start(), word.end()):
+            shown.stylize(_COLOURS.get(shown.plain[place], "dim"), place, place + 1)
+    console.print(shown, soft_wrap=True)

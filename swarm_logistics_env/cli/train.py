@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.train.training import preset_names
 
 if TYPE_CHECKING:
     from swarm_logistics_env.train.tuning import Trial, Tuning
@@ -16,7 +21,10 @@ if TYPE_CHECKING:
 def train_command(
     preset: Annotated[
         str | None,
-        typer.Argument(metavar="[PRESET|FILE]", help="Training preset, or TOML file of one."),
+        typer.Argument(
+            metavar="PRESET|FILE",
+            help=f"Training preset ({', '.join(preset_names())}), or TOML file of one.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory; results/train/NAME if not given.")
@@ -38,9 +46,6 @@ def train_command(
     seeds: Annotated[int | None, typer.Option(help="With --tune: episodes a condition.")] = None,
 ) -> None:
     """Train a policy, or tune a scripted one; the same command goes on where it was stopped."""
-    from swarm_logistics_env.train.request import train_as_asked, tune_as_asked
-    from swarm_logistics_env.train.training import preset_names
-
     if (preset is None) == (tune is None):
         raise TrainingError(
             f"train: should be given a preset ({', '.join(preset_names())}), a TOML file, or --tune"
@@ -59,20 +64,21 @@ def train_command(
         if tune is None:
             assert preset is not None
             path = train_as_asked(preset, out, seed, steps, device)
+            _show_training(path)
         else:
             fields = {
                 "objectives": tuple(objectives) if objectives else None,
                 "trials": trials, "seeds": seeds, "seed": seed,
             }  # fmt: skip
             asked, tried, path = tune_as_asked(tune, out, **fields)
-            _show(asked, tried, path)
+            _show_search(asked, tried, path)
     except KeyboardInterrupt:
         typer.echo("\nStopped. The same command goes on.", err=True)
         raise typer.Exit(130) from None
     typer.echo(f"Written: {path}")
 
 
-def _show(asked: Tuning, trials: list[Trial], path: Path) -> None:
+def _show_search(asked: Tuning, trials: list[Trial], path: Path) -> None:
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies.tuned import read_tuned
     from swarm_logistics_env.report.result_tables import Section
@@ -95,3 +101,100 @@ def _show(asked: Tuning, trials: list[Trial], path: Path) -> None:
         if score.low is not None and score.high is not None
     )
     show(Section(title, ("parameters", *asked.objectives, *names), rows, lines))
+
+
+def _show_training(path: Path) -> None:
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.policies import read_card
+    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.train.curve import BEST, PICTURE
+
+    card = read_card(path)
+    rows = tuple(
+        (
+            score.measure,
+            score.condition,
+            f"{score.value:.3g}",
+            *("-" if limit is None else f"{limit:.3g}" for limit in (score.low, score.high)),
+            str(score.seeds),
+        )
+        for score in card.scores
+    )
+    if rows:
+        columns = ("measure", "condition", "value", "low", "high", "seeds")
+        lines = ("low, high: limits of the 95 % interval",)
+        show(Section(f"{card.name}: scores on seeds it was not trained on", columns, rows, lines))
+    typer.echo(f"Curve: {path.parent / PICTURE}")
+    typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
+
+
+def train_as_asked(
+    asked: str,
+    out: Path | None = None,
+    seed: int | None = None,
+    agent_steps: int | None = None,
+    device: str | None = None,
+) -> Path:
+    """Train a preset, or what a TOML file describes; returns the path of the policy file.
+
+    Args:
+        asked: name of the preset, or path of the file.
+        out: directory; None: results/train/NAME.
+        seed, agent_steps: instead of the training's own.
+        device: "cpu" or "cuda"; None: the GPU where there is one.
+
+    Raises:
+        TrainingError: there is no such training, it cannot be, or its libraries are missing.
+    """
+    given = {"seed": seed, "agent_steps": agent_steps}
+    changes = {name: value for name, value in given.items() if value is not None}
+    from swarm_logistics_env.train.training import load_training
+
+    training = load_training(asked, **changes)
+    out = Path("results/train") / training.name if out is None else out
+    words = ["swarm-logistics", "train", asked, "--out", str(out)]
+    for option, value in (("--seed", seed), ("--steps", agent_steps), ("--device", device)):
+        if value is not None:
+            words += [option, str(value)]
+    with _explained():
+        import_module("tensorboard")  # missed before anything is written
+
+        from swarm_logistics_env.train.trainer import train
+    return train(training, out, command=shlex.join(words), device=device)
+
+
+def tune_as_asked(
+    policy: str, out: Path | None = None, **fields: object
+) -> tuple[Tuning, list[Trial], Path]:
+    """Search the parameters of a scripted policy; returns what was asked, the trials, the result.
+
+    Args:
+        policy: its name.
+        out: directory; None: results/tune/NAME.
+        fields: of `Tuning`, where they are not None.
+
+    Raises:
+        TrainingError: there is no such policy, a field cannot be, or Optuna is missing.
+    """
+    given: dict[str, Any] = {n: value for n, value in fields.items() if value is not None}
+    from swarm_logistics_env.train.tuning import RESULT, Tuning, tune
+
+    asked = Tuning(policy=policy, **given)
+    out = Path("results/tune") / policy if out is None else out
+    words = ["swarm-logistics", "train", "--tune", policy, "--out", str(out)]
+    for name, value in given.items():
+        for each in value if isinstance(value, tuple) else (value,):
+            words += [f"--{name.removesuffix('s') if name == 'objectives' else name}", str(each)]
+    with _explained():
+        import_module("optuna")  # as above
+    return asked, tune(asked, out, command=shlex.join(words)), out / RESULT
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise TrainingError(
+            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
+        ) from error

@@ -10,6 +10,7 @@ from swarm_logistics_env.cli.options import (
     FaultOption,
     PolicyOption,
     PresetOption,
+    ScenarioOption,
     SetOption,
     TrustPolicyOption,
     faults_of,
@@ -21,6 +22,7 @@ def watch_command(
     policy: PolicyOption = "swarm-dt",
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
     preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     faults: FaultOption = None,
     speed: Annotated[float, typer.Option(help="How many times real time it plays.")] = 1.0,
@@ -35,8 +37,8 @@ def watch_command(
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.web import serve
 
-    scenario, scheduled = scenario_of(preset, changes), faults_of(faults)
+    scenario, scheduled = scenario_of(preset, scenario_file, changes), faults_of(faults)
     session = Session(
         scenario, lambda: policies.load(policy, trust_code=trust_code), seed, scheduled, speed
     )
-    serve(session, policy, port, announce=typer.echo)
+    serve(session, policies.called(policy), port, announce=typer.echo)

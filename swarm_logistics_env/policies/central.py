@@ -30,7 +30,7 @@ PERSONAL_SPACE = 0.6  # [m] between centres, which waiting robots try to keep
 
 
 class Central:
-    """Scripted central controller; needs the state.
+    """One controller that sees the whole warehouse, for comparison with swarms; needs the state.
 
     Example:
         >>> from swarm_logistics_env import run_episode

@@ -43,7 +43,7 @@ N_DIRECTIONS = 32
 
 
 class Homing:
-    """The policy `homing`; reads observation rows only.
+    """Every robot remembers for some ten seconds where it last entered the delivery area.
 
     Example:
         >>> policy = Homing()

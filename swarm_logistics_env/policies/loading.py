@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import importlib
+import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
-from swarm_logistics_env.policies.files import SUFFIX, read_policy
+from swarm_logistics_env.policies.files import SUFFIX, read_card, read_policy
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.mixed import Mixed
 from swarm_logistics_env.policies.policy import Policy
@@ -87,7 +89,8 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         raise PolicyError(
-            f"no policy {name!r}{suggest(name, known)}, or 'package.module:Class', or a path"
+            f"no policy {name!r}{_classes_of(name) or suggest(name, known)}, or "
+            "'package.module:Class', or a path"
         )
     try:
         policy = make(**parameters)
@@ -101,6 +104,40 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     if not isinstance(policy, Policy):
         raise PolicyError(f"{name!r} is no policy: it should have the methods reset and act")
     return policy
+
+
+class KnownPolicy(NamedTuple):
+    """A policy that `load` knows by name: how it decides, and a sentence about it."""
+
+    name: str
+    kind: str
+    about: str
+
+
+def known_policies() -> Iterator[KnownPolicy]:
+    """Yield the policies of the package, then those that installed packages declare."""
+    for name, make in SCRIPTED.items():
+        given = make.keywords if isinstance(make, functools.partial) else {}
+        kind = make.func if isinstance(make, functools.partial) else make
+        about = (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")
+        with_ = "".join(f" {field} = {value}." for field, value in given.items())
+        yield KnownPolicy(name, "scripted", about + with_)
+    for path in sorted(WEIGHTS.glob(f"*{TUNED}")):
+        yield KnownPolicy(path.stem, "tuned", f"{read_tuned(path).policy}, parameters by a search.")
+    for path in sorted(WEIGHTS.glob(f"*{SUFFIX}")):
+        yield KnownPolicy(path.stem, "trained", read_card(path).about)
+    for point in entry_points(group=ENTRY_POINTS):
+        yield KnownPolicy(point.name, "installed", point.value)
+
+
+def called(name: str) -> str:
+    """Return what people call the policy `name`: a trained policy's file by its card's name."""
+    if not name.endswith(SUFFIX) or name in NAMES:
+        return name
+    try:
+        return read_card(Path(name)).name
+    except PolicyError:  # whoever loads it will say what is wrong with the file
+        return name
 
 
 def _declared(name: str) -> Callable[..., Policy] | None:
@@ -127,11 +164,32 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
         return functools.partial(StableBaselinesPolicy, path, trust_code=trust_code)
     if path.suffix == TUNED:
         return functools.partial(load_tuned, path)
-    if path.is_file():
+    if path.is_file() and path.suffix != ".py":
         raise PolicyError(
             f"{name} is no policy file: should end in {SUFFIX}, {TUNED} or {SB3_SUFFIX}"
         )
     return None
+
+
+def _classes_of(module: str) -> str:
+    """Return the end of an error message that proposes the classes with `act` of a module.
+
+    Its file is looked for in the current folder and read, not imported; empty: there is none.
+    """
+    path = Path(module.removesuffix(".py").replace(".", "/") + ".py")
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return ""
+    found = [
+        f"{path.stem}:{node.name}"
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+        if any(isinstance(part, ast.FunctionDef) and part.name == "act" for part in node.body)
+    ]
+    if not found:
+        return f": {path} has no class with a method act"
+    return f": should name its class, {' or '.join(map(repr, found))}"
 
 
 def _imported(name: str) -> Callable[..., Policy] | None:
@@ -148,7 +206,9 @@ def _imported(name: str) -> Callable[..., Policy] | None:
         for part in attribute.split("."):
             found = getattr(found, part)
     except (ImportError, AttributeError, ValueError) as error:
-        raise PolicyError(f"policy {name!r} cannot be imported: {error}") from None
+        raise PolicyError(
+            f"policy {name!r} cannot be imported: {error}{_classes_of(module)}"
+        ) from None
     except Exception as error:  # of code that is not ours
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error

@@ -79,7 +79,9 @@ class StepConstants(NamedTuple):
 
 
 class SwarmDT:
-    """Swarm Diffusion-Taxis with the given parameters (see `SwarmDTParameters`).
+    """Swarm Diffusion-Taxis: a robot with the requested item follows the lowest timer it hears.
+
+    Its keyword arguments are the fields of `SwarmDTParameters`.
 
     Raises:
         PolicyError: a parameter is unknown or out of range.

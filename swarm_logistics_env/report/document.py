@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from swarm_logistics_env.report.answer import Answer, answer
 from swarm_logistics_env.report.figures import Figure, indicator_figures, scaling_figure
 from swarm_logistics_env.report.further_measures import (
     budget_sections,
@@ -38,12 +39,14 @@ class Document:
 
     Attributes:
         title, text: its heading and the sentences below it.
+        answer: what the study found.
         chapters: its parts, in order.
         summary: the tables, warnings and measures of faults alone, for a terminal.
     """
 
     title: str
     text: tuple[str, ...]
+    answer: Answer
     chapters: tuple[Chapter, ...]
     summary: tuple[Section, ...]
 
@@ -75,7 +78,9 @@ def document(results: StudyResults) -> Document:
         *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
     chapters = tuple(one for one in _chapters(results, result_tables, faults) if one.sections)
-    whole = Document(f"Study {plan.specification.name!r}", tuple(text), chapters, summary)
+    whole = Document(
+        f"Study {plan.specification.name!r}", tuple(text), answer(results), chapters, summary
+    )
     # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
     for figure in whole.figures():

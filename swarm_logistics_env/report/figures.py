@@ -12,7 +12,7 @@ import numpy as np
 
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.drawing import Panel
-from swarm_logistics_env.report.wording import listed, percent, seeds_text
+from swarm_logistics_env.report.wording import DECIDED, listed, percent, seeds_text
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
 from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
@@ -108,7 +108,7 @@ def _panels(
     points: pd.DataFrame, x_label: str, title: str = "", thresholds: tuple[float, ...] = ()
 ) -> list[Panel]:
     """Return a pair of axes for each indicator."""
-    decided = points["verdict_holm"].isin(["supported", "refuted"])
+    decided = points["verdict_holm"].isin(DECIDED)
     points = points.assign(decided=decided, style=points["series"].factorize()[0])
     return [
         Panel(

@@ -5,8 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+from swarm_logistics_env.report.answer import digest
 from swarm_logistics_env.report.document import Document
 from swarm_logistics_env.report.result_tables import Section
+from swarm_logistics_env.spi.verdict_signs import SIGNS
+
+WIDTH = 100  # of the answer [characters]
 
 
 def markdown(document: Document, *, pictures: str | None = None, note: str = "") -> str:
@@ -20,6 +24,8 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
     lines = [f"# {document.title}", ""]
     for paragraph in (*document.text, note):
         lines += [paragraph, ""] if paragraph else []
+    shown = digest(document.answer, WIDTH, None, most=None)
+    lines += ["## Answer", "", "```text", shown, "```", ""]
     for chapter in document.chapters:
         lines += [f"## {chapter.title}", ""]
         lines += [chapter.text, ""] if chapter.text else []
@@ -54,15 +60,6 @@ def _row(values: Sequence[str]) -> str:
     return f"| {' | '.join(escaped)} |"
 
 
-_MARKS = {
-    "supported": "✓",
-    "refuted": "✗",
-    "inconclusive": "?",
-    "unaffected": "=",
-    "blocked": "!",
-}
-
-
 def html(document: Document, drawings: Mapping[str, str]) -> str:
     """Return the whole report.
 
@@ -83,7 +80,11 @@ def html(document: Document, drawings: Mapping[str, str]) -> str:
     environment.filters["unbroken"] = _unbroken
     environment.filters["arrows"] = _arrows
     template = environment.get_template("report.html.jinja")
-    return template.render(document=document, drawings=drawings, marks=_MARKS)
+    return template.render(
+        document=document,
+        drawings=drawings,
+        marks={name: sign.mark for name, sign in SIGNS.items()},
+    )
 
 
 def _unbroken(text: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import partial
 
@@ -12,7 +11,7 @@ from swarm_logistics_env.report.figures import Figure, slug
 from swarm_logistics_env.report.result_tables import Column, Section, table_section
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Setting
-from swarm_logistics_env.studies.performance_table import groups_of, rows_of
+from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.policy_comparison import (
     CellAgainstBaseline,
     IndicatorAgainstBaseline,
@@ -23,7 +22,6 @@ from swarm_logistics_env.studies.policy_comparison import (
 from swarm_logistics_env.studies.results import StudyResults
 
 _HOW_TO_READ = (
-    "How many questions got which Holm-adjusted verdict; the questions themselves follow.",
     (
         "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
         "differences are paired by seed, their intervals jackknifed."
@@ -38,11 +36,11 @@ _HOW_TO_READ = (
 
 
 def policy_sections(results: StudyResults) -> Iterator[Section]:
-    """Yield policy x indicator: verdicts counted, values with differences, P cell by cell."""
+    """Yield policy x indicator: values with differences, then P cell by cell."""
     policies = judged_policies(results)
     if len(policies) < 2:
         return
-    yield _matrix(results, policies)
+    yield Section("", lines=(*_HOW_TO_READ, f"All over {wording.seeds_text(results)}."))
     questions = list(indicators_against_baseline(results))
     cells_by_table = cells_against_baseline(results)
     for table, cells in cells_by_table.items():
@@ -53,20 +51,6 @@ def policy_sections(results: StudyResults) -> Iterator[Section]:
         yield _indicators(table, here, policies, wording.percent(results.confidence))
     for table, cells in cells_by_table.items():
         yield _cells(table, cells, policies[0])
-
-
-def _matrix(results: StudyResults, policies: Sequence[str]) -> Section:
-    tests = results.indicators[results.indicators["kind"] != "policy"]
-
-    def verdicts(policy: str, name: str) -> str:
-        here = rows_of(tests[(tests["policy"] == policy) & (tests["property"] == name)])
-        counts = Counter(wording.counted_as(test, test.verdict_holm) for test in here)
-        return wording.counted(counts) or wording.NOTHING
-
-    columns: list[Column] = [("policy", str)]
-    columns += [(name, partial(verdicts, name=name)) for name in tests["property"].unique()]
-    lines = (*_HOW_TO_READ, f"All over {wording.seeds_text(results)}.")
-    return table_section("Policy x indicator", policies, columns, *lines)
 
 
 def _indicators(

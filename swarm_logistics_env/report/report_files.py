@@ -14,8 +14,8 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import Document, document
 from swarm_logistics_env.report.drawing import INK, PAPER, images
 from swarm_logistics_env.report.markup import html, markdown
-from swarm_logistics_env.studies.export import write_csv
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.store import write_csv
 
 
 def write_report(

@@ -11,9 +11,9 @@ from swarm_logistics_env.report import wording
 from swarm_logistics_env.report.figures import Figure
 from swarm_logistics_env.report.wording import NOTHING, Sentence
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.agreement import Agreement, agreements
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+from swarm_logistics_env.studies.policy_comparison import Agreement, agreements
 from swarm_logistics_env.studies.results import StudyResults
 
 if TYPE_CHECKING:

@@ -22,6 +22,7 @@ SATURATED = "†"
 UNAFFECTED = "unaffected by construction"
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 NOTHING = "–"
+DECIDED = ("supported", "refuted", "equivalent")
 
 
 def is_known(value: float | None) -> TypeGuard[float]:
@@ -100,14 +101,14 @@ def counted_as(test: Row, verdict: str | None) -> str:
 
     A count is a headline: a verdict that assumes normal differences does not stand in it.
     """
-    if verdict in ("supported", "refuted") and "assumes_normal" in test.flags:
+    if verdict in DECIDED and "assumes_normal" in test.flags:
         return _NOT_COUNTED
     return said(verdict)
 
 
 def counted(verdicts: Counter[str]) -> str:
     """Return how many of each verdict, e.g. "7 supported, 1 refuted"."""
-    order = ("supported", "refuted", "inconclusive", _NOT_COUNTED, UNAFFECTED, "blocked")
+    order = (*DECIDED, "inconclusive", _NOT_COUNTED, UNAFFECTED, "blocked")
     return ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in order if verdicts[verdict])
 
 

@@ -14,6 +14,7 @@ from .ratio import RatioTest, paired_ratio
 from .simulation import Simulation, combined_ratio, simulated_samples
 from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
+from .verdict_signs import SIGNS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -92,6 +93,19 @@ class Estimate:
         if not self.identical:
             return self.verdict
         return "supported" if self.value > self.threshold else "refuted"
+
+    def __str__(self) -> str:
+        """Return sign, value, interval and verdict in one line."""
+        shown = SIGNS["unaffected" if self.identical else self.verdict]
+        limits = ""
+        if self.low is not None and self.high is not None and not self.identical:
+            limits = f" [{self.low:.3f}, {self.high:.3f}]"
+        n = f"{self.n_seeds} {'paired seeds' if self.paired else 'runs a condition'}"
+        p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
+        return (
+            f"{shown.mark} {self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
+            f"{shown.word} ({n}{p})"
+        )
 
 
 def verdict_at(alpha: float, p_value: float | None, probability: float | None) -> Verdict:

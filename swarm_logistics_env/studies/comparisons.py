@@ -223,7 +223,7 @@ def load_reference(name: str | None) -> Reference | None:
     """
     if name is None:
         return None
-    from swarm_logistics_env.studies.paper import PAPER
+    from swarm_logistics_env.studies.presets import PAPER
 
     known = {"paper": PAPER}
     if name not in known:

@@ -13,8 +13,10 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.studies.runs import seeds_in_words
+from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.tasks.recorded_trials import Origin
-from swarm_logistics_env.tasks.task_choice import DEFAULT
+from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.task_choice import DEFAULT, NAMES, refuse_untrusted
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.plan import Plan
@@ -85,6 +87,32 @@ def planned(store: Store, directory: Path) -> dict[str, str]:
                 "there (finished runs are kept), then it will"
             )
     return {name: value for name, value in found.items() if value is not None}
+
+
+def read_stored(
+    text: str, place: Path, *, task: Task | None = None, trust_code: bool = False
+) -> Specification:
+    """Return the specification that a store in `place` holds as JSON.
+
+    Args:
+        task: the task that it names; None: it is found by that name.
+        trust_code: whether it may be found by importing it, which runs its module.
+
+    Raises:
+        StudyError: it is damaged, or its task cannot be found.
+    """
+    fields = json.loads(text)
+    named = fields.get("task", DEFAULT)
+    if task is not None:
+        fields["task"] = task
+    elif ":" not in named and named not in NAMES:
+        raise StudyError(
+            f"{place}: was played on the task {named!r}, an object: should be handed over again, "
+            "as Study.stored(.., task=..)"
+        )
+    else:
+        refuse_untrusted(named, place, trust_code=trust_code)
+    return Specification(**fields)
 
 
 # Below ten seeds a verdict rests on normal differences: no look is proposed there.

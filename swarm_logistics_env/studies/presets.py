@@ -1,15 +1,143 @@
-"""The studies that come with the package."""
+"""The studies that come with the package, and the paper's tables and claims that one of them tests.
+
+Source: Milner, Sooriyabandara and Hauert, Swarm Performance Indicators: Metrics for Robustness,
+Fault Tolerance, Scalability and Adaptability; Tables I to III and the text around them.
+"""
 
 from __future__ import annotations
 
+import itertools
+
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies import paper
+from swarm_logistics_env.studies.comparisons import NO_FAULT, Question, Reference, Setting
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Faults,
     Parameter,
     Sizes,
     Specification,
+)
+
+
+def size(n: int) -> Setting:
+    """Return the setting of a swarm size."""
+    return Setting("size", "n_robots", n)
+
+
+def fault(mode: str, m: int) -> Setting:
+    """Return the setting of m robots that fail from the start."""
+    return Setting("fault", mode, m)
+
+
+def parameter(name: str, value: float) -> Setting:
+    """Return the setting of a scenario field."""
+    return Setting("parameter", name, value)
+
+
+# Table I: swarm size N -> P, items delivered in 500 s.
+PAPER_SIZES = {5: 9, 10: 18, 20: 29, 30: 33, 40: 45, 50: 56, 60: 65, 100: 74, 150: 69}
+
+# Table II, N = 25: failure mode -> P for m = 1, 2, 3; "removed" is the paper's P_S.
+PAPER_NO_FAULT = 39
+PAPER_FAULTS = {
+    "removed": (39, 35, 36),
+    "FM1": (41, 38, 35),
+    "FM2": (40, 41, 35),
+    "FM3": (40, 41, 40),
+    "FM4": (39, 15, 12),
+}
+
+# Table III, N = 25: value -> P, x_o first. The printed widths .5 to 2 m cannot be metres (25
+# robots cover 1.2 m^2): the warehouse's are read in units of the stated arena's 10 m, the
+# delivery area's .2 to .05 as fractions of it.
+PAPER_PARAMETERS = {
+    "warehouse_width": {5.0: 47, 10.0: 41, 15.0: 21, 20.0: 8},
+    "delivery_width": {2.0: 41, 1.5: 37, 1.0: 26, 0.5: 16},
+    "n_items": {60.0: 44, 70.0: 31},
+}
+# x_o of these two is the base scenario once more, with another published P: no cells of their own.
+PAPER_REPEATED = (parameter("delivery_width", 2.0), parameter("n_items", 60.0))
+
+PAPER_PERFORMANCE: dict[Setting, float] = {
+    **{size(n): p for n, p in PAPER_SIZES.items()},
+    NO_FAULT: PAPER_NO_FAULT,
+    **{fault(mode, m): p for mode, row in PAPER_FAULTS.items() for m, p in enumerate(row, start=1)},
+    **{parameter(name, x): p for name, row in PAPER_PARAMETERS.items() for x, p in row.items()},
+}
+
+
+def _claims() -> dict[Question, bool]:
+    claims: dict[Question, bool] = {}
+    sizes = list(PAPER_SIZES)
+    # "scalable (S > 0) for all gaps tested from 5 to 100 robots ... a decrease around 150"
+    for n, more in itertools.pairwise(sizes):
+        claims[Question("S", size(n), size(more), 0.0)] = more <= 100
+    # "a superscalable increase if they increase to N = 40 ... [10 to 20] will therefore not be"
+    claims[Question("S", size(30), size(40), 1.0)] = True
+    claims[Question("S", size(10), size(20), 1.0)] = False
+    # "fault tolerant (FT > 0) to FM1 and FM2 up to 2 robot failures, up to 3 failures for FM3 and
+    # not fault tolerant to any failures by FM4"
+    # "robust to 3 agent failures for FM1, FM2 and FM3, and robust to 1 agent failure for FM4"
+    tolerated = {"FM1": 2, "FM2": 2, "FM3": 3, "FM4": 0}
+    robust = {"FM1": 3, "FM2": 3, "FM3": 3, "FM4": 1}
+    for mode in tolerated:
+        for m in (1, 2, 3):
+            failed = fault(mode, m)
+            claims[Question("FT", NO_FAULT, failed, 0.0)] = m <= tolerated[mode]
+            claims[Question("R", NO_FAULT, failed, 0.0)] = m <= robust[mode]
+    # "adaptable to a warehouse width from 0.5 (x_o) to 2 m ... also to a delivery area width from
+    # 0.2 (x_o) to 0.05 m. However it is not adaptable to changing number of items"
+    for name, row in PAPER_PARAMETERS.items():
+        original, *changed = row
+        for x in changed:
+            question = Question("A", parameter(name, original), parameter(name, x), 0.0)
+            claims[question] = name != "n_items"
+    return claims
+
+
+PAPER = Reference(
+    source="Milner, Sooriyabandara and Hauert, Swarm Performance Indicators, Tables I to III",
+    performance=PAPER_PERFORMANCE,
+    cells=tuple(setting for setting in PAPER_PERFORMANCE if setting not in PAPER_REPEATED),
+    claims=_claims(),
+)
+
+# One set of defaults for all tables. Table I delivers 74 of its items, so it cannot have held 60.
+PAPER_STUDY = Specification(
+    name="paper",
+    reference="paper",
+    sizes=(
+        Sizes(
+            title="Table I: scalability",
+            values=tuple(PAPER_SIZES),
+            superlinear=((10, 20), (30, 40)),
+            scenario={"preset": "paper_scalability"},
+        ),
+    ),
+    faults=(
+        Faults(
+            title="Table II: fault tolerance and robustness",
+            modes=tuple(mode for mode in PAPER_FAULTS if mode != "removed"),
+        ),
+    ),
+    parameters=tuple(
+        Parameter(
+            title=f"Table III: adaptability to {name}",
+            name=name,
+            values=tuple(PAPER_PARAMETERS[name]),
+        )
+        for name in PAPER_PARAMETERS
+    ),
+    # Swarm D-T without its taxis, in the scenario of Tables II and III and at N = 100 of Table I.
+    ablations=(
+        Ablation(title="Ablation: without taxis", policy="random-walk"),
+        Ablation(
+            title="Ablation: without taxis",
+            policy="random-walk",
+            fall=1 / 3,
+            scenario={"preset": "paper_scalability", "n_robots": 100},
+        ),
+    ),
 )
 
 # Every indicator once, in under a minute on two cores at 4 seeds.
@@ -40,10 +168,7 @@ RESILIENCE = Specification(
 )
 
 
-def presets() -> dict[str, Specification]:
-    """Return the studies that come with the package, by name."""
-    # Asked for anew each time, as a module attribute: a test may shorten it.
-    return {study.name: study for study in (paper.SPECIFICATION, QUICK, RESILIENCE)}
+PRESETS = {study.name: study for study in (PAPER_STUDY, QUICK, RESILIENCE)}
 
 
 def load_preset(name: str) -> Specification:
@@ -52,7 +177,6 @@ def load_preset(name: str) -> Specification:
     Raises:
         StudyError: there is none.
     """
-    known = presets()
-    if name not in known:
-        raise StudyError(f"no study preset {name!r}{suggest(name, known)}")
-    return known[name]
+    if name not in PRESETS:
+        raise StudyError(f"no study preset {name!r}{suggest(name, PRESETS)}")
+    return PRESETS[name]

@@ -1,9 +1,11 @@
-"""Specification: what a study asks, as one validated record."""
+"""Specification: what a study asks, as one validated record, and as a TOML file."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -20,9 +22,14 @@ from pydantic import (
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_label
+from swarm_logistics_env.tasks.policy_choice import (
+    PolicySource,
+    policy_name,
+    runs_code,
+    told_apart,
+)
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, task_of
+from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, refuse_untrusted, task_of
 
 ScenarioFields = dict[str, Any]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
@@ -242,8 +249,52 @@ class Specification(_Part):
     @field_validator("policies")
     @classmethod
     def _once(cls, policies: tuple[object, ...]) -> tuple[object, ...]:
-        labels = [policy_label(policy) for policy in policies]
-        for label in labels:
-            if labels.count(label) > 1:
-                raise ValueError(f"policy {label!r} is given twice")
-        return policies
+        return told_apart(policies)
+
+
+def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
+    """Return the specification in a TOML file, named after the file where it has no name.
+
+    Example of a file:
+        policies = ["swarm-dt", { name = "swarm-dt", parameters = { taxis_gain = 0.5 } }]
+        seeds = 20
+        scenario = { preset = "paper", duration = 300 }
+
+        [[faults]]
+        modes = ["FM1", "FM4"]
+        robots = [1, 2]
+
+        [[parameters]]
+        name = "delivery_width"
+        values = [2.0, 1.0]
+
+    Args:
+        trust_code: whether its task and its policies may be code ("package.module:Class", or a file
+            of stable-baselines3), which runs when it is loaded.
+
+    Raises:
+        StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
+            it is unknown or cannot be.
+    """
+    try:
+        fields = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise StudyError(f"cannot read the study file {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = str(error).splitlines()[0]
+        raise StudyError(f"the study file {path} is not TOML: {reason}") from error
+    except RecursionError:
+        raise StudyError(f"the study file {path} is nested too deep") from None
+    refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
+    try:
+        specification = Specification(**{"name": path.stem, **fields})
+    except SwarmLogisticsError as error:  # whichever record of it refuses
+        raise StudyError(f"{path}: {error}") from error
+    named = [*specification.policies, *(ablation.policy for ablation in specification.ablations)]
+    for policy in filter(runs_code, named):
+        if not trust_code:
+            raise StudyError(
+                f"{path}: policy {policy_name(policy)!r} is code, which runs when it is loaded: "
+                "should be a policy's name, or be allowed by --trust-code (trust_code=True)"
+            )
+    return specification

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -11,16 +12,16 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import metadata, study_files
+from swarm_logistics_env.progress_bar import ProgressBar
+from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import imported_plan
 from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.run_progress import Progress
 from swarm_logistics_env.studies.shards import Shard
-from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
@@ -97,7 +98,7 @@ class Study:
         Raises:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
         """
-        found = study_files.read_study_file(Path(path), trust_code=trust_code)
+        found = read_study_file(Path(path), trust_code=trust_code)
         return cls._of(found.replace(**fields), out)
 
     @classmethod
@@ -118,7 +119,7 @@ class Study:
         with Store.existing(out) as store:
             noted = metadata.planned(store, out)
             imported = store.note(metadata.IMPORTED)
-        specification = study_files.read_stored(
+        specification = metadata.read_stored(
             noted[metadata.SPECIFICATION], out, task=task, trust_code=trust_code
         )
         study = cls._of(specification, out)
@@ -186,18 +187,20 @@ class Study:
             done = store.succeeded()
             runs = [run for run in whole if run.key not in done]
             kept = len(whole) - len(runs)
+            policies = Counter(run.condition.policy.label for run in runs)
+            progress = ProgressBar(self.specification.name, len(runs), "runs", parts=policies)
+            played, errors = Counter[str](), []
             finished = engine(runs)
-            first_error = None
             # Closed at once where this stops early, so that no worker outlives it.
-            with closing(finished), Progress(runs, self.specification.name) as progress:
+            with closing(finished), progress:
                 for run, outcome in finished:
                     store.add(run, outcome)
-                    progress.advance(run, outcome)
-                    if outcome.error is not None and first_error is None:
-                        first_error = outcome.error.strip().splitlines()[-1]
-                return Tally(
-                    progress.done.total(), progress.failed, kept, progress.seconds, first_error
-                )
+                    played[run.condition.policy.label] += 1
+                    if outcome.error is not None:
+                        errors.append(outcome.error.strip().splitlines()[-1])
+                    progress.reach(played.total(), f"{len(errors)} failed", played)
+            first_error = errors[0] if errors else None
+            return Tally(played.total(), len(errors), kept, progress.seconds, first_error)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -67,6 +68,27 @@ def policy_label(source: object) -> str:
     return source if isinstance(source, str) else type(source).__name__
 
 
+def told_apart(sources: Sequence[object]) -> tuple[object, ...]:
+    """Return policies of which files with the same name on their cards are called by their paths.
+
+    Raises:
+        ValueError: two have the same label all the same.
+    """
+    counts = Counter(policy_label(source) for source in sources)
+    found = tuple(
+        source.replace(label=source.name)
+        if isinstance(source, PolicyChoice)
+        and counts[source.label] > 1
+        and source.label == policies.called(source.name)
+        else source
+        for source in sources
+    )
+    for label, count in Counter(policy_label(source) for source in found).items():
+        if count > 1:
+            raise ValueError(f"policy {label!r} is given twice")
+    return found
+
+
 def policy_of(source: object, known: Known = NONE) -> Policy:
     """Return a policy that no run has used: an object is copied, a name loaded.
 
@@ -106,7 +128,9 @@ def _chosen(value: object) -> object:
     if isinstance(value, dict):
         value = PolicyChoice(**value)
     if isinstance(value, PolicyChoice) and not (value.parameters or value.label):
-        return value.name
+        value = value.name
+    if isinstance(value, str) and (card_name := policies.called(value)) != value:
+        return PolicyChoice(name=value, label=card_name)
     if isinstance(value, str | PolicyChoice) or hasattr(value, "act"):
         return value
     raise ValueError(

@@ -1,24 +1,34 @@
-"""Evaluation of the policy in training, by the same episodes as any other policy."""
+"""Evaluation by the same episodes as any other policy: on the way, and for the scores of a card."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
-from typing import NamedTuple
+from math import isnan
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.episode import run_episode
-from swarm_logistics_env.policies import Policy
+from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.policies import Policy, load
+from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparisons import Arm
+from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.train.settings import Evaluation
+from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.warehouse import Fault
 
 # Scores are measured on seeds 0, 1, .. and trainings use seeds of 63 bits: these are neither.
 FIRST_SEED = 1_000_000
+REFERENCES = ("swarm-dt", "homing")  # scripted policies that a training is shown beside
 
 
 class Evaluated(NamedTuple):
@@ -65,6 +75,14 @@ def evaluate(policy: Policy, scenario: Scenario, asked: Evaluation, threads: int
     return Evaluated(asked.n_robots, asked.faults, p_o, dict(zip(asked.faults, p_f)))
 
 
+def reference_means(training: Training) -> dict[str, dict[str, float]]:
+    """Return what the scripted policies measure on the evaluation's seeds, by their names."""
+    asked, threads = training.evaluation, training.threads
+    return {
+        name: evaluate(load(name), training.scenario, asked, threads).means() for name in REFERENCES
+    }
+
+
 def performances(
     policy: Policy,
     scenario: Scenario,
@@ -83,3 +101,72 @@ def performances(
     with ThreadPoolExecutor(threads) as pool:
         delivered = np.array(list(pool.map(played, jobs)), np.float64)
     return delivered.reshape(len(kinds), len(seeds))
+
+
+def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
+    """Return what `training.scores` asks for; the study lies in `out`, and goes on where it was.
+
+    Raises:
+        TrainingError: a run failed, so that the scores would not be of all seeds.
+    """
+    asked = training.scores
+    if not asked.seeds or not (len(asked.sizes) > 1 or asked.modes):
+        return ()
+    factors: dict[str, Any] = {}
+    if len(asked.sizes) > 1:
+        factors["sizes"] = [{"values": sorted(asked.sizes)}]
+    if asked.modes:
+        factors["faults"] = [{"modes": asked.modes, "robots": asked.robots}]
+    study = Study(
+        out=out,
+        name=f"{training.name}: scores",
+        policies=[policy],
+        seeds=asked.seeds,
+        scenario=training.scenario.replace(n_robots=asked.n_robots),
+        **factors,
+    )
+    study.run(processes=training.threads)
+    results = study.findings()
+    errors = [outcome.error for outcome in results.outcomes.values() if outcome.error]
+    if errors:
+        raise TrainingError(
+            f"{len(errors)} runs of the scores failed ({errors[0].strip().splitlines()[-1]}); the "
+            "policy file is written, without scores: the same command plays them again"
+        )
+    return scores_of(results)
+
+
+def scores_of(results: StudyResults) -> tuple[Score, ...]:
+    """Return every P and every indicator of a study with its interval."""
+    scores = [
+        Score(
+            measure="P",
+            condition=_in_words(cell.arm),
+            value=cell.mean,
+            low=None if isnan(cell.low) else cell.low,
+            high=None if isnan(cell.high) else cell.high,
+            seeds=cell.n_seeds,
+        )
+        for cell in rows_of(results.performance)
+        if cell.n_seeds
+    ]
+    scores += [
+        Score(
+            measure=comparison.indicator,
+            condition=_in_words(comparison.changed),
+            value=estimate.value,
+            low=estimate.low,
+            high=estimate.high,
+            seeds=estimate.n_seeds,
+        )
+        for estimate, comparison in rows_of(results.indicators[["estimate", "compared"]])
+        if estimate is not None
+    ]
+    return tuple(dict.fromkeys(scores))
+
+
+def _in_words(arm: Arm) -> str:
+    setting = str(arm.setting)
+    if arm.setting.kind == "size":
+        return setting
+    return f"N = {arm.condition.scenario.n_robots}, {setting}"

@@ -18,8 +18,8 @@ from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.policies.homing import homing_commands
 from swarm_logistics_env.streams import generator, key
 from swarm_logistics_env.train.learner import actor_parameters, outputs_of
+from swarm_logistics_env.train.live_table import LiveTable
 from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.settings import Imitation, WorldKind
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.train.training_worlds import make_worlds
@@ -40,14 +40,15 @@ def imitate(policy: Any, training: Training, asked: Imitation) -> None:
     view = NetworkView(make_worlds(worlds), training.scenario, training.network.listens)
     optimizer = torch.optim.Adam(actor_parameters(policy), lr=asked.learning_rate)
     demonstrations: list[Demonstrations] = []
-    with ProgressBar(f"{training.name}: imitation", asked.rounds, unit="rounds") as bar:
+    with LiveTable(f"{training.name}: imitation", asked.rounds, unit="rounds") as table:
         for number in range(asked.rounds):
             demonstrations.append(_collect(policy, view, training, asked, number))
             is_last = number == asked.rounds - 1
             steps = asked.last_fit if is_last else asked.fit
             loss = _fit(policy, optimizer, demonstrations, asked, steps)
             size = sum(len(inputs) for inputs, _ in demonstrations)
-            bar.reach(number + 1, f"{size:,} demonstrations, loss {loss:.4f}")
+            table.reach(number + 1)
+            table.measured({"demonstrations": size, "loss": loss})
     view.close()
 
 

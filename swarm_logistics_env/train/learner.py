@@ -1,20 +1,27 @@
-"""The learner: stable-baselines3's PPO, and its policy in the form that is played without it."""
+"""The learner: stable-baselines3's PPO, its networks, and the checkpoints it goes on from."""
 
 from __future__ import annotations
 
+import os
+import pickle
+import random
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import create_mlp
 
 from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.train.critic import AsymmetricPolicy
+from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.training import Training
 
+CHECKPOINT = "checkpoint.pt"
 ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 
 # What an untrained network says whatever it reads: it drives ahead, so that it meets things. One
@@ -113,3 +120,108 @@ def outputs_of(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float32]:
     return tensor.detach().cpu().numpy().astype(np.float32).copy()
+
+
+def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) -> None:
+    """Write a checkpoint, whole or not at all; until then the one before stays.
+
+    To be called between updates: after learning from a batch, before collecting the next; or
+    before the first.
+
+    Args:
+        log: what else the training remembers; picklable.
+    """
+    state = {
+        "policy": learner.policy.state_dict(),
+        "optimizer": learner.policy.optimizer.state_dict(),
+        "num_timesteps": learner.num_timesteps,
+        "n_updates": learner._n_updates,
+        "last_observations": learner._last_obs,
+        "last_starts": learner._last_episode_starts,
+        "view": pickle.dumps(view),
+        "torch": torch.get_rng_state(),
+        "cuda": torch.cuda.get_rng_state_all(),
+        # stable-baselines3 shuffles minibatches by numpy's global generator.
+        "numpy": np.random.get_state(),  # noqa: NPY002
+        "python": random.getstate(),
+        "log": log,
+    }
+    part = directory / f"{CHECKPOINT}.part"
+    with part.open("wb") as file:
+        torch.save(state, file)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(directory / CHECKPOINT)
+
+
+def read_checkpoint(directory: Path) -> dict[str, Any] | None:
+    """Return the checkpoint in a training's directory; None: there is none.
+
+    It is a pickle: resume trainings of your own only.
+
+    Raises:
+        TrainingError: it cannot be read.
+    """
+    path = directory / CHECKPOINT
+    if not path.exists():
+        return None
+    try:
+        state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=False)
+    except (OSError, RuntimeError, EOFError, pickle.UnpicklingError, AttributeError) as error:
+        reason = str(error).splitlines()[0]
+        raise TrainingError(
+            f"the checkpoint {path} cannot be read ({reason}): train into a new directory"
+        ) from error
+    return state
+
+
+def view_of(state: dict[str, Any]) -> NetworkView:
+    """Return the worlds as they stood."""
+    view: NetworkView = pickle.loads(state["view"])
+    return view
+
+
+def restore(learner: PPO, state: dict[str, Any]) -> None:
+    """Bring a learner that was made over `view_of(state)` to where it stood."""
+    learner.policy.load_state_dict(state["policy"])
+    learner.policy.optimizer.load_state_dict(state["optimizer"])
+    learner.num_timesteps = state["num_timesteps"]
+    learner._n_updates = state["n_updates"]
+    learner._last_obs = state["last_observations"]
+    learner._last_episode_starts = state["last_starts"]
+    torch.set_rng_state(state["torch"])
+    if state["cuda"] and torch.cuda.is_available():
+        torch.cuda.set_rng_state_all(state["cuda"])
+    np.random.set_state(state["numpy"])  # noqa: NPY002 - see above
+    random.setstate(state["python"])
+
+
+class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the environment of the type check
+    """PPO's two networks: the actor reads the first `len(INPUTS)` columns, the critic all."""
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch, self.activation_fn)
+
+
+class _TwoReaders(torch.nn.Module):
+    def __init__(
+        self, n_columns: int, widths: dict[str, list[int]], activation: type[torch.nn.Module]
+    ) -> None:
+        super().__init__()
+        self.policy_net = torch.nn.Sequential(
+            *create_mlp(len(INPUTS), -1, widths["pi"], activation)
+        )
+        # Cheaper than tanh, and as good for values.
+        self.value_net = torch.nn.Sequential(
+            *create_mlp(n_columns, -1, widths["vf"], torch.nn.LeakyReLU)
+        )
+        self.latent_dim_pi, self.latent_dim_vf = widths["pi"][-1], widths["vf"][-1]
+
+    def forward(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        return self.forward_actor(columns), self.forward_critic(columns)
+
+    def forward_actor(self, columns: torch.Tensor) -> Any:
+        return self.policy_net(columns[:, : len(INPUTS)])
+
+    def forward_critic(self, columns: torch.Tensor) -> Any:
+        return self.value_net(columns)

@@ -168,7 +168,7 @@ class PPOSettings(Part):
         value_warmup: updates at the start in which the value network alone learns, so that what a
             training goes on from is not spoilt by values that mean nothing yet.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot
-            can sense, see `critic`.
+            can sense, see `network_view.KNOWN`.
     """
 
     n_steps: PositiveInt = 128

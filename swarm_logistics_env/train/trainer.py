@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from swarm_logistics_env.errors import PolicyError, TrainingError
@@ -17,26 +18,27 @@ from swarm_logistics_env.policies.card import Network, PolicyCard
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.train.checkpoint import (
-    read_checkpoint,
-    restore,
-    save_checkpoint,
-    view_of,
-)
+from swarm_logistics_env.train.curve import BEST, PICTURE, TrainingLog
+from swarm_logistics_env.train.evaluation import evaluate, reference_means, score
 from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import (
     device_of,
+    linears,
     make_learner,
+    read_checkpoint,
+    restore,
+    save_checkpoint,
     take_tensors,
     tensors_of,
+    view_of,
 )
+from swarm_logistics_env.train.live_table import LiveTable
 from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.progress_bar import ProgressBar
 from swarm_logistics_env.train.run_record import enter, simulation, versions
-from swarm_logistics_env.train.scoring import score
 from swarm_logistics_env.train.training import Training
-from swarm_logistics_env.train.training_callback import TrainingCallback, TrainingLog
 from swarm_logistics_env.train.training_worlds import make_worlds
+
+CHECKPOINT_EVERY = 20.0  # seconds
 
 
 def train(
@@ -44,10 +46,11 @@ def train(
 ) -> Path:
     """Train a policy, or go on with it, and return the path of its file.
 
-    What is in `out` afterwards: the policy file NAME.safetensors; training.json, how it was made;
-    curve.csv, what was measured on the way; tensorboard/; scores/, the study behind the card; and
-    the checkpoint, from which the same call goes on after a crash. The result is the same, bit by
-    bit, as without one (on a CPU).
+    What is in `out` afterwards: the policy file NAME.safetensors, as it was at the end, and
+    best.safetensors, as it was when it measured the highest P; training.json, how it was made;
+    curve.csv, curve.png and summary.json, what was measured on the way (see `curve`); tensorboard/;
+    scores/, the study behind the card; and the checkpoint, from which the same call goes on after a
+    crash. The result is the same, bit by bit, as without one (on a CPU).
 
     Args:
         out: directory of this training.
@@ -85,19 +88,40 @@ def train(
         take_tensors(learner.policy, first.tensors)
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
-        with ProgressBar(training.name, training.agent_steps, learner.num_timesteps) as bar:
-            callback = TrainingCallback(training, view, log, out, bar)
+        log.references = log.references or reference_means(training)
+        with _live_table(training, learner.num_timesteps, log) as table:
+            callback = TrainingCallback(training, view, log, out, table)
             learner.learn(
                 training.agent_steps - learner.num_timesteps, callback, reset_num_timesteps=False
             )
             callback.end()
     view.close()
-    tensors = tensors_of(learner.policy)
-    return _write(training, out, command, learner.num_timesteps, tensors, log.versions)
+    asked = training.evaluation
+    log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
+    tensors, card = tensors_of(learner.policy), _card(training, learner.num_timesteps, log, command)
+    path = out / f"{training.name}.safetensors"
+    # The file is written before the scores are measured, which takes minutes.
+    write_policy(path, card, tensors)
+    scores = score(LearnedPolicy(card, tensors), training, out / "scores")
+    if scores:
+        write_policy(path, card.replace(scores=scores, scored_with=simulation()), tensors)
+    return path
 
 
 def _new_view(training: Training) -> NetworkView:
     return NetworkView(make_worlds(training), training.scenario, training.network.listens)
+
+
+def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
+    asked = training.evaluation
+    return LiveTable(
+        training.name,
+        training.agent_steps,
+        done,
+        about=f"N = {asked.n_robots}, {asked.seeds} seeds",
+        references=log.references,
+        before=[(int(row["agent_steps"]), log.measures(row)) for row in log.curve],
+    )
 
 
 def _start(name: str, network: Network) -> LearnedPolicy:
@@ -112,32 +136,97 @@ def _start(name: str, network: Network) -> LearnedPolicy:
     return policy
 
 
-def _write(
-    training: Training,
-    out: Path,
-    command: str,
-    agent_steps: int,
-    tensors: Mapping[str, NDArray[np.float32]],
-    learned_with: dict[str, str] | None,
-) -> Path:
-    path = out / f"{training.name}.safetensors"
-    card = PolicyCard(
+class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
+    """Evaluates and writes checkpoints between updates."""
+
+    def __init__(
+        self, training: Training, view: NetworkView, log: TrainingLog, out: Path, table: LiveTable
+    ) -> None:
+        super().__init__()
+        self._training, self._view, self._log = training, view, log
+        self._out, self._table = out, table
+        self._start, self._saved_at = time.monotonic(), -math.inf
+        self._before = log.seconds
+        self._cpu = time.process_time()
+
+    def _on_step(self) -> bool:
+        self._table.reach(self.num_timesteps)
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self._log.collecting += self._cpu_seconds()
+
+    def _on_rollout_start(self) -> None:
+        self._log.updating += self._cpu_seconds()
+        is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
+        policy = self.model.policy
+        for layer in linears(policy):
+            layer.requires_grad_(is_free)
+        policy.log_std.requires_grad_(is_free)
+        floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
+        with torch.no_grad():
+            policy.log_std.clamp_(min=math.log(floor))
+        curve = self._log.curve
+        if (
+            not curve
+            or self.num_timesteps >= curve[-1]["agent_steps"] + self._training.evaluation.every
+        ):
+            self._evaluate()
+        if time.monotonic() - self._saved_at >= CHECKPOINT_EVERY:
+            self._save()
+        self._cpu_seconds()
+
+    def end(self) -> None:
+        """Evaluate and save the policy at the end of the training."""
+        self._log.updating += self._cpu_seconds()
+        if self._log.curve[-1]["agent_steps"] < self.num_timesteps:
+            self._evaluate()
+        self._save()
+
+    def _cpu_seconds(self) -> float:
+        """Return the processor time since the last call [s]."""
+        before, self._cpu = self._cpu, time.process_time()
+        return self._cpu - before
+
+    def _save(self) -> None:
+        learner: PPO = self.model
+        self._log.seconds = self._before + time.monotonic() - self._start
+        save_checkpoint(self._out, learner, self._view, self._log)
+        self._saved_at = time.monotonic()
+
+    def _evaluate(self) -> None:
+        training, log = self._training, self._log
+        tensors = tensors_of(self.model.policy)
+        card = _card(training, self.num_timesteps, log)
+        means = evaluate(
+            LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads
+        ).means()
+        row = {
+            "agent_steps": self.num_timesteps,
+            "seconds": round(self._before + time.monotonic() - self._start, 1),
+            "cpu_seconds": round(log.collecting + log.updating, 1),
+        }
+        log.curve.append({**row, **means})
+        for name, value in means.items():
+            self.logger.record(f"evaluation/{name}", value)
+        self._table.measured(means)
+        log.write(self._out)
+        if log.best is log.curve[-1]:
+            write_policy(self._out / BEST, card, tensors)
+
+
+def _card(training: Training, agent_steps: int, log: TrainingLog, command: str = "") -> PolicyCard:
+    return PolicyCard(
         name=training.name,
         about=training.about,
         network=training.network,
         command=command,
-        versions=learned_with or versions(),
+        versions=log.versions or versions(),
         scenario=_changed(training.scenario),
         training=training.model_dump(mode="json", exclude_defaults=True),
         seed=training.seed,
         agent_steps=agent_steps,
     )
-    # The file is written before the scores are measured, which takes minutes.
-    write_policy(path, card, tensors)
-    scores = score(LearnedPolicy(card, tensors), training, out / "scores")
-    if scores:
-        write_policy(path, card.replace(scores=scores, scored_with=simulation()), tensors)
-    return path
 
 
 def _changed(scenario: Scenario) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from swarm_logistics_env.policies.tuned import TunedPolicy
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate, performances
-from swarm_logistics_env.train.progress_bar import ProgressBar
+from swarm_logistics_env.train.live_table import LiveTable
 from swarm_logistics_env.train.run_record import enter, versions
 from swarm_logistics_env.train.settings import Evaluation, Modes
 from swarm_logistics_env.train.training import Seed, as_scenario
@@ -118,12 +118,12 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
     if not study.get_trials():
         study.enqueue_trial(_own_parameters(asked.policy))
     done = len(_completed(study))
-    with ProgressBar(f"tuning {asked.policy}", asked.trials, done, unit="trials") as bar:
+    with LiveTable(f"tuning {asked.policy}", asked.trials, done, unit="trials") as table:
         while done < asked.trials:
             values = _try(study, asked, done)
             done = len(_completed(study))
-            shown = (f"{name} = {value:.3g}" for name, value in zip(asked.objectives, values))
-            bar.reach(done, ", ".join(shown))
+            table.reach(done)
+            table.measured(dict(zip(asked.objectives, values)))
     trials = _trials(study)
     best = max(trials, key=lambda trial: trial.values[0])
     record = TunedPolicy(

@@ -9,8 +9,10 @@ import pytest
 import typer
 
 import swarm_logistics_env
-from swarm_logistics_env import Scenario
+from swarm_logistics_env import SCENARIO_PRESETS, Scenario, policies
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.studies.presets import presets
+from swarm_logistics_env.train import preset_names
 
 SMALL = [
     *("--set", "n_robots=3"),
@@ -33,6 +35,10 @@ SMALL = [
         (["run", "--set", "n_robots"], "FIELD=VALUE"),
         (["run", "--set", "n_robots=-3"], "n_robots = -3"),
         (["run", "--preset", "papr"], "did you mean 'paper'?"),
+        (["run", "--set", "width=3"], "did you mean 'delivery_width' or 'warehouse_width'?"),
+        (["run", "--policy", "ppo"], "did you mean 'ppo-delivery', 'ppo-"),
+        (["run", "--fault", "fm4"], "did you mean 'FM4' or 'FM4_jam'?"),
+        (["run", "--scenario", "none.toml"], "--scenario none.toml: No such file"),
         (["run", "--policy", "swarm-td"], "did you mean 'swarm-dt'?"),
         (["run", "--fault", "FM9"], "no failure mode 'FM9'"),
         (["run", "--fault", "FM1:x"], "MODE[:ROBOTS][@ONSET]"),
@@ -40,7 +46,6 @@ SMALL = [
         (["run", "--fault", "FM1:99"], "at most n_robots = 25"),
         (["scenario", "--set", "delivery_width=10"], "leaves no storage"),
         (["study", "run", "papr", "--out", "x"], "did you mean 'paper'?"),
-        (["study", "run", "paper"], "--out"),
         (["study", "run", "none.toml", "--out", "x"], "cannot read the study file none.toml"),
         (["study", "run", "quick", "--out", "x", "--shard", "0/2"], "i/n with i from 1 to n"),
         (["study", "run", "quick", "--out", "x", "--engine", "slurm"], "no engine 'slurm'"),
@@ -79,7 +84,7 @@ def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> N
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(Scenario, "sheet", broken)
+    monkeypatch.setattr(Scenario, "conditions", broken)
     with pytest.raises(ZeroDivisionError):
         app.run(["scenario"])
 
@@ -119,6 +124,7 @@ def test_no_command_prints_the_help_and_nothing_else(capsys: pytest.CaptureFixtu
         ("Unmade", ("'own_faulty:Unmade' cannot be made: KeyError: 'gain'",)),
         ("./own_faulty.py", ("should be MODULE:CLASS, as 'own_faulty:Torn'",)),
         ("unread", ("'unread:Torn' cannot be imported: SyntaxError", "line 1")),
+        ("Tron", ("has no attribute 'Tron': should name its class, 'own_faulty:Torn'",)),
     ],
 )
 def test_what_a_policy_of_ones_own_raises_is_one_sentence(
@@ -148,6 +154,81 @@ def test_what_a_policy_of_ones_own_raises_is_one_sentence(
     (said,) = capsys.readouterr().err.splitlines()
     for part in words:
         assert part in said
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("mine.py", "should name its class, 'mine:Slow' or 'mine:Fast'"),
+        ("mine", "should name its class, 'mine:Slow' or 'mine:Fast'"),
+        ("empty.py", "empty.py has no class with a method act"),
+        ("none.py", "no policy 'none.py'; known: "),
+    ],
+)
+def test_a_file_without_a_class_is_told_its_classes(
+    name: str,
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    act = "    def act(self, observations): ...\n"
+    Path("mine.py").write_text(f"1 / 0\nclass Slow:\n{act}class Helper: ...\nclass Fast:\n{act}")
+    Path("empty.py").write_text("class Helper: ...\n")
+    assert app.run(["run", "--policy", name]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_policies_lists_every_name_that_load_knows(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["policies"]) == 0
+    printed = capsys.readouterr().out
+    for name in policies.NAMES:
+        (row,) = [line for line in printed.splitlines() if line.startswith(f"| {name} |")]
+        assert len(row.split(" | ")[2]) > 10
+
+
+def test_help_names_every_preset(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    for command, names in (
+        (["run"], SCENARIO_PRESETS),
+        (["scenario"], SCENARIO_PRESETS),
+        (["study", "run"], presets()),
+        (["study", "plan"], presets()),
+        (["train"], preset_names()),
+    ):
+        assert app.run([*command, "--help"]) == 0
+        page = capsys.readouterr().out
+        assert ", ".join(names) in page
+        assert "[[" not in page
+
+
+def test_a_scenario_is_read_from_a_file_wherever_fields_are_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert app.run(["scenario", *SMALL, "--json"]) == 0
+    Path("small.json").write_text(capsys.readouterr().out)
+    assert app.run(["run", *SMALL]) == 0
+    expected = capsys.readouterr().out.splitlines()[:-1]
+    assert app.run(["run", "--scenario", "small.json"]) == 0
+    assert capsys.readouterr().out.splitlines()[:-1] == expected
+    # --set has the last word, and the file goes before --preset.
+    Path("dots.toml").write_text("preset = 'dots'\nn_robots = 7\nn_items = 9\n")
+    given = ["--preset", "realistic", "--scenario", "dots.toml", "--set", "n_items=8"]
+    assert app.run(["scenario", "--json", *given]) == 0
+    wanted = Scenario.preset("dots").replace(n_robots=7, n_items=8)
+    assert Scenario.from_json(capsys.readouterr().out) == wanted
+    for text, words in (("n_robots = [", "is not TOML"), ("robots = 7", "'n_robots'?")):
+        Path("bad.toml").write_text(text)
+        assert app.run(["run", "--scenario", "bad.toml"]) == 2
+        assert words in capsys.readouterr().err
+    commands: Any = typer.main.get_command(app)
+    for name, command in commands.commands.items():
+        options = {option for parameter in command.params for option in parameter.opts}
+        assert ("--scenario" in options) == ("--set" in options), name
 
 
 def test_scenario_sheet_and_json(capsys: pytest.CaptureFixture[str]) -> None:

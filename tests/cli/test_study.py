@@ -4,22 +4,28 @@ import csv
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.policies import read_card
+from swarm_logistics_env.policies.loading import WEIGHTS
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.presets import presets
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 SHORT_PAPER = """
 import signal
 import sys
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.studies import paper
+from swarm_logistics_env.studies import presets
 from swarm_logistics_env.cli import app
 
 def shorter(factor):
@@ -28,8 +34,8 @@ def shorter(factor):
 if __name__ == "__main__":
     # Also where the gate itself was started to ignore it, as by nohup.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    old = paper.SPECIFICATION
-    paper.SPECIFICATION = old.replace(
+    old = presets.PRESETS["paper"]
+    presets.PRESETS["paper"] = old.replace(
         scenario=Scenario(duration=DURATION),
         **{k: tuple(map(shorter, getattr(old, k))) for k in ("sizes", "ablations")},
     )
@@ -51,7 +57,7 @@ def records(path: Path) -> list[dict[str, str]]:
 def test_study_run_prints_and_writes_the_report(tmp_path: Path) -> None:
     script, out = short_paper(tmp_path, 0.5), tmp_path / "out"
     command = [sys.executable, str(script), "study"]
-    arguments = ["run", "paper", "--seeds", "2", "--processes", "1", "--out", str(out)]
+    arguments = ["run", "paper", "--seeds", "2", "--processes", "1", "--out", str(out), "--full"]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
     # Nobody delivers in half a second: every ratio is undefined, and that is said.
     assert done.returncode == 0, done.stderr
@@ -148,7 +154,7 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     printed = capsys.readouterr().out
     # It warns before it plays, so that one can still stop it.
     warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
-    assert warning < printed.index("## ")
+    assert warning < printed.index("questions, 4 paired seeds")
     assert "4 seeds (0 to 3) every verdict is exploratory." in printed
     assert "The verdicts are exploratory: seeds were added" in (out / "report.md").read_text()
     assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
@@ -273,3 +279,53 @@ def test_failed_runs_give_exit_code_1_and_a_report(tmp_path: Path) -> None:
     # 32 conditions of the broken policy and the ablation's two, which stand.
     assert "32 failed, the first with RuntimeError: a wheel came off; " in done.stdout
     assert "1 of 1 runs failed" in (out / "report.md").read_text()
+
+
+def test_a_study_is_kept_under_its_name_where_no_directory_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text(
+        "seeds = 2\nscenario = { duration = 0.5 }\n[[sizes]]\nvalues = [2, 3]\n"
+    )
+    assert app.run(["study", "run", "mine.toml", "--engine", "local"]) == 0
+    assert stored(Path("results/mine")) == 4
+    assert app.run(["study", "run", "mine.toml", "--engine", "local", "--shard", "1/2"]) == 0
+    assert stored(Path("results/mine/shard-1-of-2")) > 0
+    assert "study merge results/mine/shard-*-of-2 --out results/mine" in capsys.readouterr().out
+
+
+def test_study_list_names_every_preset(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["study", "list"]) == 0
+    printed = capsys.readouterr().out
+    for name in presets():
+        assert f"| {name} | " in printed
+    assert "| paper | 20 | 680 | Table I: scalability; " in printed
+
+
+def test_a_trained_policy_is_called_by_the_name_on_its_card(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    card = read_card(WEIGHTS / "ppo-delivery.safetensors")
+    for file in ("first.safetensors", "second.safetensors"):
+        shutil.copy(WEIGHTS / "ppo-delivery.safetensors", file)
+    assert app.run(["run", "--policy", "first.safetensors", "--set", "duration=1"]) == 0
+    assert f"robots with {card.name}, seed 0" in capsys.readouterr().out
+    fields: dict[str, Any] = {
+        "seeds": 2,
+        "scenario": {"duration": 1.0},
+        "sizes": [{"values": [2, 3]}],
+    }
+    study = Study(out=tmp_path / "out", policies=["first.safetensors"], **fields)
+    study.run()
+    Path("first.safetensors").unlink()  # the store knows the name, whatever became of the file
+    for found in (study, Study.stored(tmp_path / "out")):
+        assert set(found.performance()["policy"]) == {card.name}
+    shutil.copy("second.safetensors", "first.safetensors")
+    alike = Study(policies=["first.safetensors", "second.safetensors", "swarm-dt"], **fields)
+    assert [cell[0] for cell in alike.plan().cells[::2]] == [
+        "first.safetensors", "second.safetensors", "swarm-dt"
+    ]  # fmt: skip
+    beside = Study(policies=["ppo-delivery", "first.safetensors"], **fields)
+    assert [cell[0] for cell in beside.plan().cells[::2]] == ["ppo-delivery", "first.safetensors"]

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,17 +19,19 @@ from swarm_logistics_env.report.report_files import write_report
 from swarm_logistics_env.report.wording import sentence
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Setting
-from swarm_logistics_env.studies.paper import PAPER
 from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
 
 NARROW = Setting("parameter", "warehouse_width", 5.0)
 
 
-def results(seeds: int, p: Callable[[str, Setting], float] | None = None) -> StudyResults:
+def results(
+    seeds: int, p: Callable[[str, Setting], float] | None = None, **fields: Any
+) -> StudyResults:
     """The paper's study if every cell gave the published P, and noise at several seeds."""
-    plan = Study.preset("paper", seeds=seeds).plan()
+    plan = Study.preset("paper", seeds=seeds, **fields).plan()
     levels = {arm.condition.key: (policy, arm.setting) for policy, _, arm in reversed(plan.cells)}
     noise = np.random.default_rng(0)
     outcomes = {}

@@ -10,8 +10,7 @@ import pytest
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.export import export
-from swarm_logistics_env.studies.store import Store
+from swarm_logistics_env.studies.store import Store, export
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import Study, paper
+from swarm_logistics_env.studies import Study, presets
 from swarm_logistics_env.studies.fault_measures import resiliences
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.performance_table import rows_of
@@ -19,11 +19,11 @@ from swarm_logistics_env.studies.store import FILE_NAME, Store
 def papers_tables() -> str:
     """The paper's Tables I to III, one run a row; each table has its own P_o."""
     rows = ["kind,name,value,n_robots,delivered"]
-    rows += [f"size,n_robots,{n},,{p}" for n, p in paper.SIZES.items()]
-    rows += [f"fault,none,0,25,{paper.NO_FAULT_PERFORMANCE}"]
-    for mode, performances in paper.FAULTS.items():
+    rows += [f"size,n_robots,{n},,{p}" for n, p in presets.PAPER_SIZES.items()]
+    rows += [f"fault,none,0,25,{presets.PAPER_NO_FAULT}"]
+    for mode, performances in presets.PAPER_FAULTS.items():
         rows += [f"fault,{mode},{m},25,{p}" for m, p in enumerate(performances, start=1)]
-    for name, row in paper.PARAMETERS.items():
+    for name, row in presets.PAPER_PARAMETERS.items():
         rows += [f"parameter,{name},{x},,{p}" for x, p in row.items()]
     return "\n".join(rows) + "\n"
 

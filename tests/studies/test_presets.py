@@ -3,11 +3,11 @@ from __future__ import annotations
 import pytest
 
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparisons import OTHER_BEHAVIOUR
-from swarm_logistics_env.studies.presets import presets
+from swarm_logistics_env.studies.comparisons import OTHER_BEHAVIOUR, Comparison
+from swarm_logistics_env.studies.presets import PAPER, PRESETS
 
 
-@pytest.mark.parametrize("name", list(presets()))
+@pytest.mark.parametrize("name", list(PRESETS))
 def test_every_preset_can_be_planned(name: str) -> None:
     assert Study.preset(name).plan().comparisons
 
@@ -35,3 +35,60 @@ def test_resilience_has_both_references_and_a_null() -> None:
         assert comparison.changed.condition.scenario.restock
         if comparison.removed:
             assert comparison.removed.condition.faults[0].onset == fault.onset
+
+
+# The specification of the statistics prints these to three decimals.
+GOLDEN = {
+    "S": [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135],
+    "FT": [0.051, 0.077, -0.026, 0.026, 0.154, -0.026, 0.026, 0.154, 0.103, 0.0, -0.513, -0.615],
+    "R": [0.091, 0.054, 0.017, 0.066, 0.131, 0.017, 0.066, 0.131, 0.146, 0.040, -0.535, -0.572],
+    "A": [0.872, 0.723, 0.723, 0.610, 0.268, 0.187, -0.773],
+}
+
+COMPARISONS = Study.preset("paper").plan().comparisons
+
+
+def published(comparison: Comparison) -> float:
+    estimate = PAPER.estimate(comparison)
+    assert estimate is not None
+    return estimate.value
+
+
+@pytest.mark.parametrize("indicator", GOLDEN)
+def test_published_tables_give_the_golden_values(indicator: str) -> None:
+    values = [
+        published(comparison)
+        for comparison in COMPARISONS
+        if comparison.indicator == indicator and comparison.threshold == 0
+    ]
+    assert values == pytest.approx(GOLDEN[indicator], abs=5e-4)
+
+
+def test_every_claim_follows_from_the_published_tables() -> None:
+    claims = {
+        comparison: PAPER.claims[comparison.question]
+        for comparison in COMPARISONS
+        if comparison.indicator != "change"
+    }
+    assert len(claims) == len(PAPER.claims) == 41
+    for comparison, claim in claims.items():
+        assert (published(comparison) > comparison.threshold) == claim, comparison.label
+
+
+def test_33_cells() -> None:
+    assert len(PAPER.cells) == 9 + 4 + 12 + 4 + 3 + 1
+    planned = {arm.setting for comparison in COMPARISONS for arm in comparison.arms}
+    assert set(PAPER.cells) <= planned
+
+
+def test_one_set_of_defaults_for_all_tables() -> None:
+    """All but the factor itself and Table I's number of items is the base scenario."""
+    plan = Study.preset("paper").plan()
+    base = plan.specification.scenario
+    for _, table, arm in plan.cells:
+        ours, theirs = arm.condition.scenario.model_dump(), base.model_dump()
+        varied = {name for name in ours if ours[name] != theirs[name]}
+        allowed = {arm.setting.name} if arm.setting.kind in {"size", "parameter"} else set()
+        if table.startswith("Table I:") or arm.setting.value == 100:
+            allowed |= {"n_items", "n_robots"}
+        assert varied <= allowed

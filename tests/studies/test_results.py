@@ -13,12 +13,12 @@ from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.markup import markdown
 from swarm_logistics_env.report.result_tables import warnings
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.agreement import agreement, agreements
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Setting
 from swarm_logistics_env.studies.fault_measures import fault_budgets
 from swarm_logistics_env.studies.indicator_table import INDICATORS
-from swarm_logistics_env.studies.paper import PAPER
 from swarm_logistics_env.studies.performance_table import PERFORMANCE, rows_of
+from swarm_logistics_env.studies.policy_comparison import agreement, agreements
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
 

@@ -14,8 +14,8 @@ from safetensors.numpy import load_file
 pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
+from swarm_logistics_env.cli import app
 from swarm_logistics_env.train import trainer
-from swarm_logistics_env.train.request import train_as_asked
 from swarm_logistics_env.train.settings import Evaluation, Imitation
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
@@ -71,14 +71,14 @@ seeds = 0
 SCRIPT = """\
 import os, signal, sys
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.train import training_callback
-last, save, saved = int(sys.argv.pop(1)), training_callback.save_checkpoint, []
+from swarm_logistics_env.train import trainer
+last, save, saved = int(sys.argv.pop(1)), trainer.save_checkpoint, []
 def save_and_die(*given):
     save(*given)
     saved.append(given)
     if len(saved) == last:
         os.kill(os.getpid(), signal.SIGKILL)
-training_callback.CHECKPOINT_EVERY, training_callback.save_checkpoint = 0.0, save_and_die
+trainer.CHECKPOINT_EVERY, trainer.save_checkpoint = 0.0, save_and_die
 app()
 """
 
@@ -93,7 +93,9 @@ def started(directory: Path, last_checkpoint: int) -> tuple[int, str]:
 
 def test_a_training_that_was_killed_ends_as_one_that_was_not(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TRAINING)
-    whole = train_as_asked(str(tmp_path / "tiny.toml"), tmp_path / "whole", device="cpu")
+    whole = tmp_path / "whole" / "tiny.safetensors"
+    words = ["train", str(tmp_path / "tiny.toml"), "--out", str(whole.parent), "--device", "cpu"]
+    assert app.run(words) == 0
     cut = tmp_path / "cut"
     code, told = started(tmp_path, 10)
     assert code == -signal.SIGKILL, told
@@ -102,6 +104,7 @@ def test_a_training_that_was_killed_ends_as_one_that_was_not(tmp_path: Path) -> 
     assert code == 0, told
     assert "tiny: 0 of" not in told
     assert_same_weights(cut / "tiny.safetensors", whole)
+    assert_same_weights(cut / "best.safetensors", whole.with_name("best.safetensors"))
     assert curve(cut) == curve(whole.parent)
 
 
@@ -134,7 +137,7 @@ def assert_same_weights(one: Path, other: Path) -> None:
 
 
 def curve(directory: Path) -> list[list[str]]:
-    """Return the rows of curve.csv but for the seconds, which are those of the clock."""
+    """Return the rows of curve.csv but for the seconds, which no two trainings share."""
     rows = [line.split(",") for line in (directory / "curve.csv").read_text().splitlines()]
     assert len(rows) == 6
-    return [[row[0], *row[2:]] for row in rows]
+    return [[row[0], *row[3:]] for row in rows]

@@ -16,14 +16,14 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.policies.homing import homing_commands
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
-from swarm_logistics_env.train.critic import KNOWN
 from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
-from swarm_logistics_env.train.request import train_as_asked
+from swarm_logistics_env.train.network_view import KNOWN
 from swarm_logistics_env.train.run_record import simulation
 from swarm_logistics_env.train.settings import Imitation, Indicators, Scores
 from swarm_logistics_env.train.trainer import train
@@ -49,7 +49,7 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
     measured = {(score.measure, score.condition) for score in card.scores}
     assert measured >= {("P", "N = 2"), ("P", "N = 3"), ("P", "N = 3, FM4, m = 1")}
     curve = (tmp_path / "curve.csv").read_text().splitlines()
-    assert curve[0] == "agent_steps,seconds,P,P_FM4,R_FM4"
+    assert curve[0] == "agent_steps,seconds,cpu_seconds,P,P_FM4,R_FM4"
     assert [line.split(",")[0] for line in curve[1:]] == ["0", "320", "640"]
     assert list((tmp_path / "tensorboard").glob("events*"))
     record = json.loads((tmp_path / "training.json").read_text())
@@ -170,12 +170,17 @@ def test_what_is_no_record_of_a_training_is_refused(small: Any, tmp_path: Path) 
 
 @pytest.mark.parametrize("package", ["torch", "tensorboard"])
 def test_a_missing_library_is_told_before_anything_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    package: str,
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.delitem(sys.modules, "swarm_logistics_env.train.trainer")
-    with pytest.raises(TrainingError, match=f"{package}.*pip install 'swarm-logistics-env.train.'"):
-        train_as_asked("delivery", tmp_path / "out")
+    assert app.run(["train", "delivery", "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert package in told
+    assert "pip install 'swarm-logistics-env[train]'" in told
     assert not (tmp_path / "out").exists()
 
 

@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.export import export
-from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.studies.store import FILE_NAME, Store, export
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 

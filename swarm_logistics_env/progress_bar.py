@@ -1,0 +1,133 @@
+"""Progress of long work, of a study or a training: bars at a terminal, a sparse line elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Self
+
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+LINE_EVERY = 30.0  # seconds between plain lines
+_NOTHING: Mapping[str, int] = {}
+
+
+class ProgressBar:
+    """Shows on standard error how much is done, while it is entered.
+
+    Args:
+        label: what is done.
+        total: how much there is to do, in `unit`.
+        unit: in words, e.g. "runs".
+        done: how much of it was done before now.
+        parts: how much there is to do of each part of it, by the part's name; several have a bar
+            each.
+        console: the console to write to; None means standard error.
+    """
+
+    def __init__(
+        self,
+        label: str,
+        total: int,
+        unit: str,
+        *,
+        done: int = 0,
+        parts: Mapping[str, int] = _NOTHING,
+        console: Console | None = None,
+    ) -> None:
+        self._label, self._total, self._unit = label, total, unit
+        self._first = self._done = done
+        self._parts = parts if len(parts) > 1 else {}
+        self._parts_done: Mapping[str, int] = {}
+        self._note = ""
+        self._console = console or Console(stderr=True, highlight=False)
+        self._bars: Progress | None = None
+        self._tasks: list[TaskID] = []
+        self._start = self._last_line = time.monotonic()
+
+    def __enter__(self) -> Self:
+        self._start = self._last_line = time.monotonic()
+        if self._total and self._console.is_terminal:
+            self._bars = _bars(self._console)
+            self._tasks = [
+                self._bars.add_task(name, total=total, completed=done, note="")
+                for name, done, total in self._shown()
+            ]
+            self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bars:
+            self._bars.stop()
+
+    @property
+    def seconds(self) -> float:
+        """Time since it was entered [s]."""
+        return time.monotonic() - self._start
+
+    def reach(self, done: int, note: str = "", parts: Mapping[str, int] = _NOTHING) -> None:
+        """Show that so much is done.
+
+        Args:
+            note: what plain lines say besides.
+            parts: how much is done of each part.
+        """
+        self._done, self._note, self._parts_done = done, note, parts
+        if self._bars:
+            for task, (_, part, total) in zip(self._tasks, self._shown()):
+                self._bars.update(task, completed=part, note=self._pace(part, total))
+        elif time.monotonic() - self._last_line >= LINE_EVERY:
+            self.say()
+
+    def say(self, what: str = "") -> None:
+        """Print a line: how much is done, and `what`."""
+        self._last_line = time.monotonic()
+        _, *parts = self._shown()
+        reached = f"{self._done:,} of {self._total:,} {self._unit}"
+        if parts:
+            each = (f"{name} {done:,} of {total:,}" for name, done, total in parts)
+            reached += f" ({', '.join(each)})"
+        told = (reached, self._note, self._pace(self._done, self._total), what)
+        line = f"{self._label}: {', '.join(part for part in told if part)}"
+        self._console.print(line, soft_wrap=True, markup=False)
+
+    def _shown(self) -> list[tuple[str, int, int]]:
+        """Return name, what is done and what there is to do: of the whole, then of each part."""
+        parts = [(name, self._parts_done.get(name, 0), n) for name, n in self._parts.items()]
+        return [(self._label, self._done, self._total), *parts]
+
+    def _pace(self, done: int, total: int) -> str:
+        rate = (done - self._first) / max(self.seconds, 1e-9)
+        shown = f"{rate:,.2f}" if rate < 10 else f"{rate:,.0f}"
+        left = f", {clock((total - done) / rate)} left" if rate > 0 and done < total else ""
+        return f"{shown} {self._unit}/s{left}"
+
+
+def clock(seconds: float) -> str:
+    """Return a time as h:mm:ss, or m:ss below an hour."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def _bars(console: Console) -> Progress:
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
+    return Progress(
+        # Names are not Rich's markup.
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[note]}", markup=False),
+        console=console,
+    )
