@@ -45,6 +45,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "studies": {"errors", "records", "streams", "spi", "tasks"},
     "report": {"errors", "spi", "tasks", "studies"},
     "train": RUNS
+    | {"progress_bar"}
     | ENVIRONMENT
     | {"progress_bar", "wrappers", "adapters", "spi", "tasks", "studies"},
     "testing": RUNS | ENVIRONMENT | {"wrappers", "adapters"},

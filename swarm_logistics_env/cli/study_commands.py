@@ -64,10 +64,10 @@ def list_command() -> None:
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.presets import presets
+    from swarm_logistics_env.studies.presets import PRESETS
 
     rows = []
-    for name in presets():
+    for name in PRESETS:
         plan = Study.preset(name).plan()
         asked = dict.fromkeys(table for _, table, _ in plan.cells)
         n_runs = len(plan.conditions) * len(plan.seeds)

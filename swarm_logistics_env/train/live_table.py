@@ -12,7 +12,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from swarm_logistics_env.studies.run_progress import clock
+from swarm_logistics_env.progress_bar import clock
 
 LINE_EVERY = 30.0  # seconds between plain lines
 

@@ -11,7 +11,7 @@ import typer
 import swarm_logistics_env
 from swarm_logistics_env import SCENARIO_PRESETS, Scenario, policies
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.studies.presets import presets
+from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.train import preset_names
 
 SMALL = [
@@ -195,8 +195,8 @@ def test_help_names_every_preset(
     for command, names in (
         (["run"], SCENARIO_PRESETS),
         (["scenario"], SCENARIO_PRESETS),
-        (["study", "run"], presets()),
-        (["study", "plan"], presets()),
+        (["study", "run"], PRESETS),
+        (["study", "plan"], PRESETS),
         (["train"], preset_names()),
     ):
         assert app.run([*command, "--help"]) == 0

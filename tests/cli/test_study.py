@@ -18,7 +18,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.policies.loading import WEIGHTS
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.presets import presets
+from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 SHORT_PAPER = """
@@ -298,7 +298,7 @@ def test_a_study_is_kept_under_its_name_where_no_directory_is_given(
 def test_study_list_names_every_preset(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["study", "list"]) == 0
     printed = capsys.readouterr().out
-    for name in presets():
+    for name in PRESETS:
         assert f"| {name} | " in printed
     assert "| paper | 20 | 680 | Table I: scalability; " in printed
 

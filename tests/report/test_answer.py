@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from swarm_logistics_env.studies.paper import PAPER
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.answer import DIGEST_LINES, answer, digest
 from swarm_logistics_env.report.verdict_matrix import text_lines, verdict_matrix
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.comparisons import Setting
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults
 from tests.report.test_report_files import results
 
@@ -26,7 +26,7 @@ def compared() -> StudyResults:
     """Two policies: the second delivers half as much, and collapses under FM1."""
 
     def p(policy: str, setting: Setting) -> float:
-        published = PAPER.performance.get(setting, 10.0)
+        published = float(PAPER.performance.get(setting, 10.0))
         collapses = setting.name == "FM1"
         return published if policy == "swarm-dt" else published * (0.1 if collapses else 0.5)
 
@@ -78,9 +78,7 @@ def test_digest_counts_claims_and_names_what_contradicts_the_paper(found: StudyR
     # The robots of a fleet that FM4 spares deliver all the same: the paper says they do not.
     tough = results(4, lambda _, setting: 39.0 if setting.name == "FM4" else 20.0)
     surprises = answer(tough).surprises
-    assert any("FM4, m=3" in one and "swarm-dt is tolerant, " in one for one in surprises), (
-        surprises
-    )
+    assert any("FM4, m=3" in one and "swarm-dt is tolerant, " in one for one in surprises)
 
 
 def test_policies_stand_side_by_side_with_their_greatest_contrast(compared: StudyResults) -> None:
