@@ -53,7 +53,7 @@ class Attack:
     seed: int = 0
 
     def faults(self) -> list[Fault]:
-        """Return all faults that are searched: every mode, role (None: by the seed), onset and duration.
+        """Return all faults that are searched: every mode, role, onset and duration.
 
         Raises:
             SetupError: a mode is unknown, or there are fewer robots.
@@ -62,9 +62,7 @@ class Attack:
             if mode not in MODES:
                 raise SetupError(f"modes: no mode {mode!r} to search{suggest(mode, MODES)}")
         if not 1 <= self.robots < self.scenario.n_robots:
-            raise SetupError(
-                f"robots = {self.robots}: should be 1 to {self.scenario.n_robots - 1}"
-            )
+            raise SetupError(f"robots = {self.robots}: should be 1 to {self.scenario.n_robots - 1}")
         end = self.scenario.duration
         return [
             Fault(
@@ -74,9 +72,7 @@ class Attack:
                 duration=None if lasts is None else round(lasts * end, 1),
                 role=role,
             )
-            for mode, role, onset, lasts in product(
-                self.modes, (None, *ROLES), _ONSETS, _DURATIONS
-            )
+            for mode, role, onset, lasts in product(self.modes, (None, *ROLES), _ONSETS, _DURATIONS)
             # At the start nobody carries anything, and nobody stands in the delivery area.
             if onset > 0.0 or role in (None, "searching")
         ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,7 +109,7 @@ class Attribution:
     def capabilities(self) -> tuple[Share, ...]:
         """What each lost capability costs; the rows sum to the total."""
         return tuple(
-            self._share(name, MECHANISMS[name], lambda each, name=name: each.capabilities[name])
+            Share(name, MECHANISMS[name], _interval([e.capabilities[name] for e in self.seeds]))
             for name in self.seeds[0].capabilities
         )
 
@@ -167,14 +167,17 @@ def losses(scenario: Scenario, policy: Policy, fault: Fault, seed: int) -> Losse
     def lost(outcome: AfterOnset) -> float:
         return float(sound.delivered - outcome.delivered)
 
-    def lost_with(robots: Iterable[Any], taken: Iterable[Any] = capabilities) -> float:
+    def lost_with(robots: Iterable[int], taken: Iterable[str] = capabilities) -> float:
         return lost(fork.go_on([_part(fault, robots, taken)]))
 
-    by_robots: dict[Any, float] = {frozenset(): 0.0, frozenset(robots): lost(whole)}
+    by_robots: dict[frozenset[int], float] = {frozenset(): 0.0, frozenset(robots): lost(whole)}
     for some in coalitions(robots):
         if some not in by_robots:
             by_robots[some] = lost_with(some)
-    by_capabilities: dict[Any, float] = {frozenset(): 0.0, frozenset(capabilities): lost(whole)}
+    by_capabilities: dict[frozenset[str], float] = {
+        frozenset(): 0.0,
+        frozenset(capabilities): lost(whole),
+    }
     for taken in coalitions(capabilities):
         if taken not in by_capabilities:
             by_capabilities[taken] = lost_with(robots, taken)

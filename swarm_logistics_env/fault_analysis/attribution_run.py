@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import closing
 from pathlib import Path
@@ -20,7 +20,7 @@ from swarm_logistics_env.fault_analysis.attribution import (
     losses,
 )
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.studies.engines.process_pool import workers
+from swarm_logistics_env.studies.engines import workers
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_of
 from swarm_logistics_env.warehouse import Fault
@@ -63,9 +63,10 @@ def attribute_in(
     finished = _finished(out / FINISHED, about)
     missing = [seed for seed in seeds if seed not in finished]
     arguments = [(scenario, policy, fault, seed) for seed in missing]
-    with (out / FINISHED).open("a", encoding="utf-8") as file, closing(
-        _played(arguments, processes)
-    ) as played:
+    with (
+        (out / FINISHED).open("a", encoding="utf-8") as file,
+        closing(_played(arguments, processes)) as played,
+    ):
         if not finished and file.tell() == 0:
             file.write(json.dumps(about) + "\n")
         for found in played:
@@ -78,7 +79,7 @@ def attribute_in(
 
 
 def write_tables(found: Attribution, out: Path) -> list[Path]:
-    """Write attribution.csv, and attribution.png where matplotlib is installed; return the paths."""
+    """Write attribution.csv, and with matplotlib attribution.png; return their paths."""
     with (out / TABLE).open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(HEADINGS)
@@ -100,7 +101,7 @@ def _losses(arguments: tuple[Scenario, object, Fault, int]) -> Losses:
 
 def _played(
     arguments: Sequence[tuple[Scenario, object, Fault, int]], processes: int
-) -> Iterator[Losses]:
+) -> Generator[Losses, None, None]:
     if processes == 1 or len(arguments) < 2:
         yield from map(_losses, arguments)
         return

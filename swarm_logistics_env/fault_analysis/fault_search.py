@@ -17,7 +17,9 @@ from swarm_logistics_env.warehouse import Fault
 # relative change of performance, P_F / P_o - 1, of each: the lower, the worse the fault.
 Play: TypeAlias = Callable[[Sequence[tuple[int, int]]], Sequence[float]]
 
-_FIRST_SHARE = 0.25  # of the budget: faults at random, so that the model has something to learn from
+_FIRST_SHARE = (
+    0.25  # of the budget: faults at random, so that the model has something to learn from
+)
 _ROUNDS = 8  # in which the rest is spent; the runs of one round are played side by side
 _SEEDS_AT_RANDOM = 2  # runs of each fault in a random search, to tell faults from luck
 # Shares of the variance between faults: by mode; by mode and role; by mode, onset and duration; by
@@ -101,18 +103,20 @@ def random_search(
 def _covariance(faults: Sequence[Fault]) -> NDArray[np.float64]:
     """Return how alike the faults are expected to be, (faults, faults), 1 on the diagonal."""
 
-    def equal(values: Sequence[object]) -> NDArray[np.bool_]:
+    def are_equal(values: Sequence[object]) -> NDArray[np.bool_]:
         return np.array([[one == other for other in values] for one in values])
 
     def near(values: Sequence[float]) -> NDArray[np.float64]:
         steps = np.searchsorted(np.unique(values), values)
-        return np.exp(-0.5 * (steps[:, None] - steps[None, :]) ** 2)
+        alike: NDArray[np.float64] = np.exp(-0.5 * (steps[:, None] - steps[None, :]) ** 2)
+        return alike
 
-    mode, role = equal([fault.mode for fault in faults]), equal([fault.role for fault in faults])
-    time = near([fault.onset for fault in faults])
-    time = time * near([np.inf if f.duration is None else f.duration for f in faults])
-    parts = (mode, mode & role, mode * time, (mode & role) * time)
-    return np.sum([share * part for share, part in zip(_SHARES, parts)], axis=0)
+    mode, role = (are_equal([getattr(f, name) for f in faults]) for name in ("mode", "role"))
+    lasting = near([np.inf if fault.duration is None else fault.duration for fault in faults])
+    time = near([fault.onset for fault in faults]) * lasting
+    both = mode & role
+    by_mode, by_role, by_time, by_all = _SHARES
+    return by_mode * mode + by_role * both + by_time * mode * time + by_all * both * time
 
 
 def _posterior(

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from itertools import combinations
 from math import factorial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from .inputs import IndicatorError
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+
+Cause = TypeVar("Cause", int, str)
 
 
-def coalitions(causes: Sequence[Hashable]) -> Iterator[frozenset[Hashable]]:
+def coalitions(causes: Sequence[Cause]) -> Iterator[frozenset[Cause]]:
     """Yield every set of the causes, the empty one first: 2^k of k causes."""
     for size in range(len(causes) + 1):
         yield from map(frozenset, combinations(causes, size))
 
 
 def shapley_values(
-    causes: Sequence[Hashable], loss: Mapping[frozenset[Hashable], float]
-) -> dict[Hashable, float]:
+    causes: Sequence[Cause], loss: Mapping[frozenset[Cause], float]
+) -> dict[Cause, float]:
     """Return what each cause contributes to the loss with all of them (Shapley 1953).
 
     A cause's value is what it adds to the loss of the causes before it, averaged over all orders in
@@ -39,7 +41,7 @@ def shapley_values(
         if coalition not in loss:
             raise IndicatorError(f"loss: should tell that of {sorted(map(str, coalition))}, too")
     count = len(causes)
-    values: dict[Hashable, float] = {}
+    values: dict[Cause, float] = {}
     for cause in causes:
         others = [each for each in causes if each != cause]
         values[cause] = sum(
