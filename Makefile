@@ -27,7 +27,7 @@ INSTALLED := .venvs/lowest .venvs/newest
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
-	@echo "make tables          play the studies behind the README's tables (a quarter of an hour) and write the tables"
+	@echo "make tables          play the studies behind docs/results.md (half an hour), write its tables, the README's numbers and the score cards"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make check           lint and types only"
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
