@@ -85,6 +85,11 @@ The reward is the weighted sum of these terms, for example `parallel_env(rewards
 
 {rewards}
 
+The difference of a potential $\\Phi$ is paid as $\\gamma \\Phi(s') - \\Phi(s)$, which leaves the best behaviour as it is (Ng et al. 1999): what a lift pays is
+taken back by the delivery. It needs the learner's discount $\\gamma$ among the weights, as `{{"own_delivery": 1.0, "carrying": 0.5, "discount": 0.99}}`; in
+a training file it is `ppo.gamma`. `approach` can be earned in circles: a robot that puts the item down, steps back and lifts it from there has
+brought it back unpaid.
+
 ## Episode end
 
 All agents terminate when every item is delivered, which never happens with `restock`. A robot terminates when it is removed. All agents are

@@ -44,7 +44,8 @@ error, which suggests the nearest known field. Each factor that the study varies
 
 ## Presets
 
-`swarm-logistics study run NAME` knows these without a file:
+`swarm-logistics study run NAME` knows these by name. Each is a study file in `swarm_logistics_env/studies/preset_studies/`, from which a study of
+your own may start:
 
 {presets}
 
@@ -54,7 +55,7 @@ error, which suggests the nearest known field. Each factor that the study varies
 
 {performance}
 
-`Study.indicators()` has one row a comparison, and `claims.csv` holds it but for the last two columns:
+`Study.indicators()` has one row a comparison, and `claims.csv` holds it but for the last three columns:
 
 {indicators}
 """

@@ -92,10 +92,8 @@ def judge_command(
     from tempfile import TemporaryDirectory
 
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.document import document
-    from swarm_logistics_env.report.latex import latex_tables
-    from swarm_logistics_env.report.report_files import write_text
-    from swarm_logistics_env.report.with_simulation import with_simulation
+    from swarm_logistics_env.report.document import document, with_simulation
+    from swarm_logistics_env.report.report_files import latex_tables, write_text
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.importing import import_results
 
@@ -192,7 +190,7 @@ def power_command(
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
     from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.result_tables import Section
-    from swarm_logistics_env.studies.effort import demands
+    from swarm_logistics_env.studies.results import demands
 
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
@@ -209,6 +207,7 @@ def power_command(
                 demand.problem or str(demand.seeds),
                 "–" if demand.least_power is None else f"{demand.least_power:.0%}",
                 "–" if demand.detectable is None else f"{demand.detectable:.3f}",
+                "–" if demand.unchanged is None else str(demand.unchanged),
             )
         )
     if not rows:
@@ -224,6 +223,7 @@ def power_command(
         "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power on average",
         "power in nine pilots of ten at least",
         f"distance that {n_seeds} seeds find",
+        f"seeds for equivalent at {results.plan.specification.margin:.0%}",
     )  # fmt: skip
     show(Section(f"Seeds needed, from {n_seeds} seeds", columns, tuple(rows)))
 

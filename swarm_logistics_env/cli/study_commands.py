@@ -86,7 +86,7 @@ def plan_command(
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.studies.effort import expected_seconds
+    from swarm_logistics_env.studies.engines import expected_seconds
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     seconds = expected_seconds(plan)

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import Record
+from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.studies.runs import seeds_in_words
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.tasks.recorded_trials import Origin
@@ -20,6 +21,7 @@ from swarm_logistics_env.tasks.task_choice import DEFAULT, NAMES, refuse_untrust
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.plan import Plan
+    from swarm_logistics_env.studies.specification import Specification
     from swarm_logistics_env.studies.store import Store
 
 
@@ -29,6 +31,7 @@ IDENTITIES = "identities"  # of policies, JSON
 DECLARED_SEEDS = "declared_seeds"  # how many, at the first run
 DECLARED_FIRST_SEED = "declared_first_seed"  # at the first run; absent: 0
 DECLARED_LOOKS = "declared_looks"  # JSON, at the first run
+DECLARED_MARGIN = "declared_margin"  # at the first run; absent: the default
 IMPORTED = "imported"  # the source of imported results; absent if the runs were played
 
 _NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
@@ -37,6 +40,7 @@ _NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
 # int() reads them back, so nothing but digits may stand there.
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
+_Share = Annotated[float, Field(gt=0, lt=1)]
 
 
 class _Specified(Record):
@@ -57,6 +61,7 @@ _FORMS: dict[str, TypeAdapter[Any]] = {
     DECLARED_SEEDS: TypeAdapter(_Count),
     DECLARED_FIRST_SEED: TypeAdapter(_Seed),
     DECLARED_LOOKS: TypeAdapter(tuple[_Count, ...]),
+    DECLARED_MARGIN: TypeAdapter(_Share),
     IMPORTED: TypeAdapter(Origin),
 }
 
@@ -121,15 +126,22 @@ FEWEST_TO_PROPOSE = 10
 
 @dataclass(frozen=True)
 class Declaration:
-    """The seeds and looks that a study declared before its first run.
+    """The seeds, looks and margin that a study declared before its first run.
 
     Attributes:
         seeds: of every condition.
         looks: numbers of seeds, from the first on, at which it was to be judged; empty: any.
+        margin: of equivalence, as a share of P_o.
     """
 
     seeds: range
     looks: tuple[int, ...] = ()
+    margin: float = MARGIN
+
+    @classmethod
+    def of(cls, specification: Specification) -> Self:
+        """Return what a study declares that is run for the first time."""
+        return cls(specification.seed_numbers, specification.looks, specification.margin)
 
     @classmethod
     def noted(cls, store: Store) -> Self | None:
@@ -139,12 +151,14 @@ class Declaration:
             return None
         first = int(store.note(DECLARED_FIRST_SEED) or 0)
         looks = json.loads(store.note(DECLARED_LOOKS) or "[]")
-        return cls(range(first, first + int(count)), tuple(looks))
+        margin = float(store.note(DECLARED_MARGIN) or MARGIN)
+        return cls(range(first, first + int(count)), tuple(looks), margin)
 
     def note(self, store: Store) -> None:
         """Write it into a store."""
         store.set_note(DECLARED_FIRST_SEED, str(self.seeds.start))
         store.set_note(DECLARED_LOOKS, json.dumps(self.looks))
+        store.set_note(DECLARED_MARGIN, str(self.margin))
         # The number of seeds is written last, so a store that has it has the others as well.
         store.set_note(DECLARED_SEEDS, str(len(self.seeds)))
 

@@ -180,7 +180,7 @@ class Study:
         with self._store() as store:
             self._refuse_another(store)
             if Declaration.noted(store) is None:
-                Declaration(self.specification.seed_numbers, self.specification.looks).note(store)
+                Declaration.of(self.specification).note(store)
             store.set_note(metadata.SPECIFICATION, self.specification.to_json())
             store.set_note(metadata.CODE, plan.code)
             store.set_note(metadata.IDENTITIES, json.dumps(dict(plan.identities)))

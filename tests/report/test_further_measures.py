@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import NO_FAULT, OTHER_BEHAVIOUR, Setting
 from swarm_logistics_env.studies.fault_measures import (
