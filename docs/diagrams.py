@@ -78,8 +78,7 @@ def flow(boxes: Sequence[Box]) -> str:
         left = 1 + place * (_BOX + _GAP)
         middle = left + _BOX / 2
         parts += [
-            f'<rect x="{left}" y="1" width="{_BOX}" height="{_HEIGHT}" rx="8" fill="{_FILL}" '
-            f'stroke="{_EDGE}"/>',
+            _box(left, 1, _BOX, _HEIGHT, f'rx="8" fill="{_FILL}" stroke="{_EDGE}"'),
             _text(middle, 28, title, "bold 15px", _INK),
             _text(middle, 49, below, "13px", _SOFT),
         ]
@@ -94,11 +93,10 @@ def flow(boxes: Sequence[Box]) -> str:
 
 def verdicts() -> str:
     """Return four intervals and a threshold, with the verdict that each gives."""
-    threshold, margin, left, rows = 300, 45, 20, 4
+    threshold, margin, rows = 300, 45, 4
     height = 34 * rows + 34
     parts = [
-        f'<rect x="{threshold - margin}" y="6" width="{2 * margin}" height="{34 * rows}" '
-        'fill="#f1f2f4"/>',
+        _box(threshold - margin, 6, 2 * margin, 34 * rows, 'fill="#f1f2f4"'),
         f'<path d="M{threshold} 6V{34 * rows + 6}" stroke="{_INK}" stroke-width="1.5"/>',
         _text(threshold, height - 8, "threshold, and what is too near to matter", "13px", _SOFT),
     ]
@@ -113,11 +111,14 @@ def verdicts() -> str:
         parts += [
             f'<path d="M{low} {y}H{high}" stroke="{colour}" stroke-width="3"/>',
             f'<circle cx="{(low + high) / 2}" cy="{y}" r="6" fill="{colour}"/>',
-            f'<text x="{470 + left}" y="{y + 5}" font-weight="bold" font-size="15" '
-            f'fill="{colour}">{name}</text>',
-            f'<text x="{590 + left}" y="{y + 5}" font-size="13" fill="{_SOFT}">{why}</text>',
+            _text(540, y + 5, name, "bold 15px", colour),
+            _text(690, y + 5, why, "13px", _SOFT),
         ]
     return _svg(780, height, parts)
+
+
+def _box(left: float, top: float, width: float, height: float, more: str) -> str:
+    return f'<rect x="{left}" y="{top}" width="{width}" height="{height}" {more}/>'
 
 
 def _text(x: float, y: float, text: str, font: str, colour: str) -> str:
@@ -132,7 +133,7 @@ def _svg(width: int, height: int, parts: Sequence[str]) -> str:
     body = "\n".join(parts)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
-        f'height="{height}" font-family="system-ui, Helvetica, Arial, sans-serif">\n{body}\n</svg>\n'
+        f'height="{height}" font-family="system-ui, Helvetica, sans-serif">\n{body}\n</svg>\n'
     )
 
 
