@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -126,7 +129,35 @@ def test_links_of_the_readme_exist() -> None:
     assert defined - used == set()
 
 
+def test_a_release_leaves_no_relative_link(tmp_path: Path) -> None:
+    for name in ("README.md", "pyproject.toml"):
+        shutil.copy(ROOT / name, tmp_path)
+    script = [sys.executable, str(ROOT / "docs" / "absolute_links.py")]
+    home = "https://example.org/somebody/swarm"
+    subprocess.run([*script, home, "v1.0", "--root", str(tmp_path)], check=True)
+    before = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme = (tmp_path / "README.md").read_text(encoding="utf-8")
+    defined = dict(re.findall(r"^\[([^\]]+)\]: (\S+)$", readme, re.MULTILINE))
+    assert all(link.startswith("https://") for link in defined.values())
+    assert defined["film"] == f"{home}/raw/v1.0/docs/media/fm4.gif"
+    assert defined["training"] == f"{home}/blob/v1.0/docs/training.md"
+    assert re.sub(rf"{home}/(raw|blob)/v1.0/", "", readme) == before
+    inline = re.findall(r"\]\(([^)]+)\)", readme)
+    assert all(link.startswith(("https://", "#")) for link in inline)
+    project = tomllib.loads((tmp_path / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["urls"]["Source"] == home
+    assert project["urls"]["Paper"] == PROJECT["urls"]["Paper"]
+
+
 def test_the_project_and_the_citation_name_the_same_paper() -> None:
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     [paper] = cited["references"]
     assert paper["url"] == PROJECT["urls"]["Paper"]
+
+
+def test_version_and_date_are_those_of_the_changelog() -> None:
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    head = f"## [{PROJECT['version']}] - {cited['date-released']}"
+    assert head == re.findall(r"^## \[\d.*$", changelog, re.MULTILINE)[0]
+    assert cited["version"] == PROJECT["version"]

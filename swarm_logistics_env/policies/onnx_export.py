@@ -14,6 +14,7 @@ from swarm_logistics_env.policies.policy import Policy
 
 # Both are old enough for the runtimes of 2022.
 OPERATORS, FORMAT = 17, 8
+DEVIATIONS = "deviations"  # in the metadata
 
 
 def write_onnx(policy: Policy, path: Path | str) -> None:
@@ -21,8 +22,9 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
 
     Its input "inputs" is float32 (robots, inputs), in the order of its card; its output "outputs"
     is float32 (robots, 3), `motion.OUTPUTS`. What makes inputs of observations and a memory, and
-    commands of outputs, is `motion.MotionFrame`; docs/onnx.md has it in words. The noise of a
-    policy that explores is not in the file; the card is, in its metadata.
+    commands of outputs, is `motion.MotionFrame`; docs/onnx.md has it in words. The metadata hold
+    the card, and as "deviations" three numbers: the standard deviations of the noise that is added
+    to the outputs at each step, zeros for a policy that does not explore.
 
     Args:
         policy: a trained one, as `policies.load("ppo-delivery")`.
@@ -73,7 +75,9 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
         ir_version=FORMAT,
         producer_name="swarm-logistics-env",
     )
-    helper.set_model_props(model, {CARD: policy.card.to_json()})
+    noise = tensors["deviations"] * np.float32(network.exploration)
+    props = {CARD: policy.card.to_json(), DEVIATIONS: " ".join(map(str, noise.tolist()))}
+    helper.set_model_props(model, props)
     checker.check_model(model)
     path = Path(path)
     try:

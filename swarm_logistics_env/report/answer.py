@@ -103,7 +103,7 @@ def _asked(results: StudyResults, matrix: VerdictMatrix) -> str:
 def _counts(results: StudyResults) -> Iterator[str]:
     for policy, tests in groups_of(results.indicators, "policy"):
         claims = tests[tests["claim"].notna()]
-        what, verdicts = "questions", tests["answer_holm"]
+        what, verdicts = "questions", tests["conclusion"]
         if not claims.empty:
             what, verdicts = "claims", claims["claim_verdict_holm"]
         counts = Counter(verdict or "blocked" for verdict in verdicts)
@@ -172,9 +172,9 @@ def _contrast(tests: pd.DataFrame) -> str | None:
 def _unanswered(results: StudyResults) -> str:
     """Return how many questions are open, and the seeds that would decide them."""
     tests = results.indicators
-    blocked = int(tests["answer_holm"].isna().sum())
+    blocked = int(tests["conclusion"].isna().sum())
     said = [f"{blocked} blocked, since runs failed or are missing"] if blocked else []
-    left = tests[tests["answer_holm"] == "inconclusive"]
+    left = tests[tests["conclusion"] == "inconclusive"]
     if left.empty:
         return f"Open: {'; '.join(said) or 'nothing'}."
     said.insert(0, f"Open: {len(left)} of {len(tests)}")

@@ -15,7 +15,7 @@ from swarm_logistics_env.studies.fault_measures import (
     anchoring_loads,
     fault_budgets,
 )
-from swarm_logistics_env.studies.indicator_table import CONFIDENCE
+from swarm_logistics_env.studies.judged_comparisons import CONFIDENCE
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import SizeSeries, steps
 

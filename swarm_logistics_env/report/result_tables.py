@@ -225,6 +225,11 @@ def _warnings(results: StudyResults) -> Iterator[str]:
         if results.looks:
             because = "the study is judged at a look that was not declared before its first run"
         yield f"The verdicts are exploratory: {because}, so they err more often than their level."
+    if results.late_margin:
+        yield (
+            "The verdicts on the margin of equivalence are exploratory: another margin was "
+            "declared before the first run."
+        )
     for cell in rows_of(results.performance):
         if cell.problem:
             yield f"{cell.policy}, {cell.table}, {cell.cell} is incomplete: {cell.problem}."

@@ -129,7 +129,7 @@ def seeds_text(results: StudyResults) -> str:
 
 @dataclass(frozen=True)
 class Sentence:
-    """One verdict in words; `verdict`: Holm's on the property, "unaffected" or "blocked"."""
+    """One verdict in words; `verdict`: the conclusion, "unaffected" or "blocked"."""
 
     head: str
     text: str
@@ -140,7 +140,7 @@ def sentence(results: StudyResults, test: Row) -> Sentence:
     """Return the verdict on one comparison in words."""
     head = f"{test.policy}, {test.property}? {_conditions(test)}."
     text = " ".join(_parts(results, test))
-    return Sentence(head, text, "blocked" if test.problem else test.answer_holm or "blocked")
+    return Sentence(head, text, "blocked" if test.problem else test.conclusion or "blocked")
 
 
 def _parts(results: StudyResults, test: Row) -> Iterator[str]:
@@ -166,6 +166,8 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
         plain, adjusted = test.claim_verdict, said(test.claim_verdict_holm)
         both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
         yield f'Claim "{test.claim}": {both}.'
+    if test.equivalence is not None:
+        yield _unchanged(test)
     if "inconclusive" in (test.answer, test.answer_holm):
         yield from _what_it_takes(test)
     if is_known(test.pairing_correlation):
@@ -176,6 +178,18 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
         yield "Skewed: at so few seeds the verdict errs more often than its level."
     if results.exploratory:
         yield "Exploratory."
+
+
+def _unchanged(test: Row) -> str:
+    """Return the verdict on equivalence, e.g. "P_F within 10 % of P_o? Change -0.023 [..]: .."."""
+    limits = ""
+    if is_known(test.change_low) and is_known(test.change_high):
+        limits = f" [{fixed(test.change_low, 3)}, {fixed(test.change_high, 3)}]"
+    adjusted = ""
+    if test.equivalence_holm != test.equivalence:
+        adjusted = f" ({said(test.equivalence_holm)} under Holm)"
+    change = f"{fixed(test.change, 3)}{limits}"
+    return f"{test.unchanged}? Change {change}: {test.equivalence}{adjusted}."
 
 
 def _conditions(test: Row) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .efficiency import karp_flatt
+from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
 from .indicators import (
@@ -18,6 +19,7 @@ from .power import (
     lower_decile_of_power,
     minimum_detectable_effect,
     no_plan_because,
+    seeds_for_equivalence,
     seeds_for_power,
 )
 from .resilience import resilience_index
@@ -38,6 +40,7 @@ from .survival import SurvivalCurve, kaplan_meier
 from .trials import Trial, Trials, read_trials
 
 __all__ = [
+    "Equivalence",
     "Estimate",
     "FaultBudget",
     "IndicatorError",
@@ -54,6 +57,7 @@ __all__ = [
     "adjust",
     "adjusted_p_values",
     "compare_scaling",
+    "equivalence",
     "fault_budget",
     "fault_tolerance",
     "fit_scaling",
@@ -76,6 +80,7 @@ __all__ = [
     "resilience_index",
     "robustness",
     "scalability",
+    "seeds_for_equivalence",
     "seeds_for_power",
     "self_repair",
     "worst_decile",

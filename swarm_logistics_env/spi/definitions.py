@@ -82,6 +82,19 @@ class Definition:
             return f"P falls by more than {-100 * threshold:.0f} %" if threshold else "P falls"
         return self.adjectives.get(threshold) or f"{self.symbol} > {threshold:.3g}"
 
+    def unchanged(self, margin: float) -> str | None:
+        """Return what equivalence says, e.g. "P_F within 10 % of P_o"; None for S.
+
+        Robots are added so that P grows, and a share of P means more for 5 robots than for 50: no
+        one margin fits the steps of S.
+        """
+        if self.compares == "size":
+            return None
+        original, changed, *removed = self.performances.values()
+        if removed:
+            return f"{changed} within {100 * margin:.3g} % of {original} from {removed[0]}"
+        return f"{changed} within {100 * margin:.3g} % of {original}"
+
 
 DEFINITIONS: dict[str, Definition] = {
     definition.symbol: definition

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-Verdict = Literal["supported", "refuted", "inconclusive"]
+Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +93,10 @@ class Estimate:
         if not self.identical:
             return self.verdict
         return "supported" if self.value > self.threshold else "refuted"
+
+    def verdict_for(self, p_value: float | None) -> Verdict:
+        """Return the verdict at a two-sided p, e.g. one that Holm adjusted."""
+        return verdict_at(1.0 - self.confidence, p_value, self.probability)
 
     def __str__(self) -> str:
         """Return sign, value, interval and verdict in one line."""

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .estimate import verdict_at
 from .inputs import IndicatorError, numbers
 
 if TYPE_CHECKING:
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from .equivalence import Equivalence
     from .estimate import Estimate, Verdict
 
 
@@ -39,12 +39,13 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     return adjusted
 
 
-def adjust(estimates: Sequence[Estimate]) -> tuple[Verdict, ...]:
+def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[Verdict, ...]:
     """Verdicts of one declared family (all modes x m of one indicator, say) under Holm.
 
     In the order given. An estimate without a p (one seed) counts in the family and stays
-    inconclusive. One of identical runs is no evidence: it stays inconclusive and outside the
-    family. The family-wise error is 1 - confidence.
+    inconclusive. One of identical runs is no evidence and outside the family: it stays inconclusive
+    on a threshold, and is equivalent. The family-wise error is 1 - confidence, of equivalences
+    their alpha.
 
     Raises:
         IndicatorError: The estimates' confidences differ.
@@ -53,12 +54,12 @@ def adjust(estimates: Sequence[Estimate]) -> tuple[Verdict, ...]:
     if len(confidences) > 1:
         raise IndicatorError(f"confidence = {confidences} in one family: should be one number")
     return tuple(
-        verdict_at(1.0 - estimate.confidence, p, estimate.probability)
+        estimate.verdict_for(p)
         for estimate, p in zip(estimates, adjusted_p_values(estimates), strict=True)
     )
 
 
-def adjusted_p_values(estimates: Sequence[Estimate]) -> tuple[float | None, ...]:
+def adjusted_p_values(estimates: Sequence[Estimate | Equivalence]) -> tuple[float | None, ...]:
     """Holm-adjusted p of every estimate, in the order given; None for identical runs."""
     adjusted = iter(
         holm([1.0 if e.p_value is None else e.p_value for e in estimates if not e.identical])

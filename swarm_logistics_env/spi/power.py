@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 from .inputs import IndicatorError, between_0_and_1, count, finite
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .equivalence import Equivalence
     from .estimate import Estimate
 
 MAX_SEEDS = 1_000_000
@@ -67,13 +70,33 @@ def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> in
     if no_plan_because(estimate, effect) is not None:
         return None
 
-    def enough(n: int) -> bool:
-        return _power_at(estimate, effect, n, PLANNED_LIMIT) >= power
+    return _least_seeds(lambda n: _power_at(estimate, effect, n, PLANNED_LIMIT) >= power)
 
-    high = 2
-    while not enough(high):
-        high *= 2
-    return 2 + bisect_left(range(2, high), x=True, key=enough)
+
+def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int | None:
+    """Seeds that the verdict "equivalent" needs if the change truly is 0.
+
+    Both tests have to reject: the chance of that is at least the sum of their powers less 1. The
+    spread is the one of `seeds_for_power`.
+
+    Returns:
+        The smallest n >= 2; None where the runs are the same, or show no spread.
+
+    Raises:
+        IndicatorError: power outside (0, 1) or not above alpha.
+    """
+    tests = equivalence.above, equivalence.below
+    for test in tests:
+        _check_power(test, power)
+    if equivalence.change.difference_sd in (None, 0.0) or any(
+        no_plan_because(test, 0.0) is not None for test in tests
+    ):
+        return None
+
+    def enough(n: int) -> bool:
+        return sum(_power_at(test, 0.0, n, PLANNED_LIMIT) for test in tests) - 1.0 >= power
+
+    return _least_seeds(enough)
 
 
 def lower_decile_of_power(estimate: Estimate, effect: float, n_seeds: int) -> float | None:
@@ -108,6 +131,14 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
     if 8.0 * (_spread_limit(estimate, PLANNED_LIMIT) / distance) ** 2 > MAX_SEEDS:
         return f"an effect of {effect:g} needs more than {MAX_SEEDS:,} seeds"
     return None
+
+
+def _least_seeds(enough: Callable[[int], bool]) -> int:
+    """Return the smallest n >= 2 that is enough; more than enough is enough too."""
+    high = 2
+    while not enough(high):
+        high *= 2
+    return 2 + bisect_left(range(2, high), x=True, key=enough)
 
 
 def _check_power(estimate: Estimate, power: float) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
+from swarm_logistics_env.spi.equivalence import Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.simulation import Simulation
 from swarm_logistics_env.studies.runs import Condition
@@ -186,6 +187,39 @@ class Comparison:
             simulation=simulation,
             # The removed robots make the third condition another one by construction.
             **({} if self.removed else {"identical": identical}),
+        )
+
+    def equivalence(
+        self,
+        performance: Performance,
+        *,
+        margin: float,
+        alpha: float,
+        paired: bool = True,
+        saturated: Collection[Arm] = (),
+        identical: bool = False,
+    ) -> Equivalence | None:
+        """Return whether P is unchanged within a margin; None for S, which has no such question.
+
+        Args:
+            margin, alpha: as in `spi.equivalence`.
+            performance, paired, saturated, identical: as in `estimate`.
+
+        Raises:
+            IndicatorError: the change is undefined, e.g. because mean P_o is 0.
+        """
+        if self.definition.unchanged(margin) is None:
+            return None
+        named = {"p_o": self.original, "p_new": self.changed}
+        if self.removed:
+            named["p_s"] = self.removed
+        return equivalence(
+            **{name: performance(arm) for name, arm in named.items()},
+            margin=margin,
+            alpha=alpha,
+            paired=paired,
+            saturated=[name for name, arm in named.items() if arm in saturated],
+            identical=identical and not self.removed,
         )
 
 

@@ -27,7 +27,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
-from swarm_logistics_env.studies.indicator_table import estimate_of, same_runs
+from swarm_logistics_env.studies.judged_comparisons import estimate_of, same_runs
 from swarm_logistics_env.studies.matching import Match, match, outcomes
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults

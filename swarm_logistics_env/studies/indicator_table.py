@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.comparisons import Arm, Comparison, Reference
-from swarm_logistics_env.studies.performance_table import Columns, Row, table_of
-from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.comparisons import Comparison, Reference
+from swarm_logistics_env.studies.judged_comparisons import Judged
+from swarm_logistics_env.studies.performance_table import Columns, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
 POWER = 0.8
-CONFIDENCE = 0.95
 UNAFFECTED = "unaffected"
-CellKey = tuple[str, str, Arm]  # policy, table, arm
 
 INDICATORS: Columns = {
     "policy": (object, "label of the policy"),
@@ -48,43 +46,46 @@ INDICATORS: Columns = {
     "published": (float, "the reference's value of the indicator"),
     "claim_verdict": (object, "on the claim"),
     "claim_verdict_holm": (object, "the same after Holm"),
+    "unchanged": (object, "what equivalence says, e.g. P_F within 10 % of P_o; None: not asked"),
+    "margin": (float, "the largest change that counts as none, as a share of P_o"),
+    "change": (float, "relative change, e.g. P_F / P_o - 1; of FT (P_F - P_S) / P_o"),
+    "change_low": (float, "lower limit of its interval, of level 1 - 2 alpha"),
+    "change_high": (float, "upper limit of it"),
+    "p_unchanged": (float, "p of equivalence, or, of a change beyond the margin, of that"),
+    "equivalence": (object, "verdict on unchanged: equivalent, refuted or inconclusive"),
+    "equivalence_holm": (object, "the same after Holm"),
     "seeds_for_power_80": (object, "seeds for 80 % power at the published value, on average"),
     "no_plan": (object, "why no such number can be named"),
     "problem": (object, "why the comparison is blocked, e.g. by a failed run"),
     "property": (object, "what is asked, e.g. tolerant, FT > 0.5 or P falls"),
     "answer": (object, "verdict on the property"),
     "answer_holm": (object, "the same after Holm"),
+    "conclusion": (object, "answer_holm; equivalent where that is inconclusive and P unchanged"),
     "claimed": (object, "whether the indicator is claimed to lie above the threshold, or None"),
     "detectable": (float, "distance from the threshold that these seeds find with 80 % power"),
     "least_power": (float, "power of the seeds needed that nine pilots of ten reach"),
     "compared": (object, "the `Comparison`"),
     "estimate": (object, "the `Estimate`; None: blocked"),
+    "equivalence_test": (object, "the `Equivalence`; None: blocked or not asked"),
 }
 
 
 def indicator_table(
-    plan: Plan, cells: Mapping[CellKey, Row], reference: Reference | None, confidence: float
+    judged: Iterable[Judged], reference: Reference | None, margin: float
 ) -> pd.DataFrame:
-    """Return every comparison of a plan with its verdicts, in the order of the report.
-
-    A comparison that needs a run which failed or is missing is blocked, and with it the adjusted
-    verdicts of its family, whose size would else be too small.
+    """Return every comparison of a study with its verdicts, in the order given.
 
     Args:
-        plan: of the study.
-        cells: rows of the table of performances.
+        judged: the comparisons with their verdicts.
         reference: published performances and claims; None: there are none.
-        confidence: confidence level of intervals and verdicts, in (0, 1).
+        margin: of equivalence, as a share of P_o.
 
     Returns:
         A table with the columns of `INDICATORS`.
     """
-    found = [
-        estimate_of(c, cells, paired=plan.paired, confidence=confidence) for c in plan.comparisons
-    ]
-    adjusted = _adjusted(plan.comparisons, found)
     rows = []
-    for comparison, estimate, (p_holm, holm) in zip(plan.comparisons, found, adjusted):
+    for one in judged:
+        comparison = one.comparison
         rows.append(
             {
                 "policy": comparison.policy,
@@ -98,73 +99,22 @@ def indicator_table(
                 "onset": comparison.changed.setting.onset,
                 "n_robots": comparison.original.condition.size,
                 "threshold": comparison.threshold,
-                "p_holm": p_holm,
-                "saturated": any(
-                    cells[comparison.policy, comparison.table, arm].saturated
-                    for arm in comparison.arms
-                ),
-                "problem": estimate if isinstance(estimate, str) else None,
+                "p_holm": one.p_holm,
+                "saturated": one.saturated,
+                "problem": one.estimate if isinstance(one.estimate, str) else None,
                 "compared": comparison,
-                **_verdicts(comparison, reference, estimate, holm),
-                **_estimated(comparison, reference, estimate),
+                **_verdicts(one, reference),
+                **_estimated(comparison, reference, one.estimate),
+                **_unchanged(one, margin),
             }
         )
     return table_of(rows, INDICATORS)
 
 
-def estimate_of(
-    comparison: Comparison,
-    cells: Mapping[CellKey, Row],
-    *,
-    paired: bool,
-    confidence: float = CONFIDENCE,
-) -> Estimate | str:
-    """Return the estimate of a comparison from a study's cells, or why there is none."""
-    used = {arm: cells[comparison.policy, comparison.table, arm] for arm in comparison.arms}
-    problems = [f"{arm.setting}: {cell.problem}" for arm, cell in used.items() if cell.problem]
-    if problems:
-        return "; ".join(problems)
-    before, after = used[comparison.original], used[comparison.changed]
-    try:
-        return comparison.estimate(
-            lambda arm: used[arm].by_seed,
-            confidence=confidence,
-            paired=paired,
-            saturated=[arm for arm, cell in used.items() if cell.saturated],
-            identical=comparison.removed is None and same_runs(before.digests, after.digests),
-        )
-    except spi.IndicatorError as error:
-        return str(error)
-
-
-def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool:
-    """Return whether two conditions gave the same run at every seed, by the digests of the runs."""
-    return list(before) == list(after) and None not in before
-
-
-def _adjusted(
-    comparisons: Sequence[Comparison], found: Sequence[Estimate | str]
-) -> list[tuple[float | None, str | None]]:
-    """Return p and verdict under Holm; None where the family has a blocked comparison."""
-    families: dict[tuple[str, str], list[int]] = {}
-    for index, comparison in enumerate(comparisons):
-        families.setdefault(comparison.family, []).append(index)
-    adjusted: list[tuple[float | None, str | None]] = [(None, None)] * len(found)
-    for members in families.values():
-        estimates = [e for e in (found[index] for index in members) if isinstance(e, Estimate)]
-        if len(estimates) < len(members):
-            continue
-        verdicts = zip(spi.adjusted_p_values(estimates), spi.adjust(estimates))
-        for index, estimate, (p, verdict) in zip(members, estimates, verdicts):
-            if not estimate.identical:
-                adjusted[index] = p, verdict
-    return adjusted
-
-
-def _verdicts(
-    comparison: Comparison, reference: Reference | None, estimate: Estimate | str, holm: str | None
-) -> dict[str, Any]:
+def _verdicts(one: Judged, reference: Reference | None) -> dict[str, Any]:
     """Return the columns on what is asked and claimed."""
+    comparison, estimate = one.comparison, one.estimate
+    holm: str | None = one.verdict_holm
     claimed = comparison.claim
     if claimed is None and reference:
         claimed = reference.claims.get(comparison.question)
@@ -177,6 +127,8 @@ def _verdicts(
         plain = holm = UNAFFECTED
     said, said_holm = (_turned(v) if below else v for v in (plain, holm))
     nothing = claimed is None
+    answer_holm = said_holm if asks_for_fall else holm
+    open_but_unchanged = answer_holm == "inconclusive" and one.equivalence_holm == "equivalent"
     return {
         "verdict": plain,
         "verdict_holm": holm,
@@ -186,7 +138,8 @@ def _verdicts(
         "claim_verdict_holm": None if nothing else said_holm,
         "property": asked,
         "answer": said if asks_for_fall else plain,
-        "answer_holm": said_holm if asks_for_fall else holm,
+        "answer_holm": answer_holm,
+        "conclusion": "equivalent" if open_but_unchanged else answer_holm,
     }
 
 
@@ -224,4 +177,23 @@ def _estimated(
         "detectable": spi.minimum_detectable_effect(estimate, POWER),
         "least_power": least,
         "estimate": estimate,
+    }
+
+
+def _unchanged(one: Judged, margin: float) -> dict[str, Any]:
+    """Return the columns on equivalence."""
+    asked = one.comparison.definition.unchanged(margin)
+    found = one.equivalence
+    if asked is None or found is None:
+        return {"unchanged": asked}
+    return {
+        "unchanged": asked,
+        "margin": margin,
+        "change": found.change.value,
+        "change_low": found.change.low,
+        "change_high": found.change.high,
+        "p_unchanged": found.p_value,
+        "equivalence": found.verdict,
+        "equivalence_holm": one.equivalence_holm,
+        "equivalence_test": found,
     }

@@ -22,6 +22,7 @@ from pydantic import (
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.policy_choice import (
     PolicySource,
     policy_name,
@@ -158,6 +159,8 @@ class Specification(_Part):
         indicators: the indicators to test; conditions that only others need are not run.
         looks: rising numbers of seeds at which the study will be judged. If they are declared
             before the first run, the error over all looks stays at 5 % (O'Brien-Fleming spending).
+        margin: the largest change of P that counts as none, as a share of P_o, in (0, 1); every R,
+            FT and A is tested for it as well.
         reference: published results, which the report shows beside those of the study.
 
     Raises:
@@ -176,6 +179,7 @@ class Specification(_Part):
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
     indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     looks: tuple[PositiveInt, ...] = ()
+    margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
     reference: str | None = None
 
     @property

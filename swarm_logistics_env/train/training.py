@@ -8,7 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
-from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.scenario import Scenario
@@ -50,7 +50,7 @@ class Training(Part):
         seed: decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
-            added to them.
+            added to them. Potentials are discounted by `ppo.gamma`.
         indicators: pays them instead of the task.
         conditions: kinds of episodes that are mixed; none: nobody fails.
         imitation: what comes before PPO; none: it begins from nothing, or from `start`.
@@ -90,7 +90,9 @@ class Training(Part):
     @field_validator("rewards")
     @classmethod
     def _terms(cls, rewards: dict[str, float]) -> dict[str, float]:
-        RewardTerms(rewards)
+        if "discount" in rewards:
+            raise ValueError("discount: should be left out, it is `ppo.gamma`")
+        RewardTerms(_discounted(rewards, 1.0))
         return rewards
 
     @model_validator(mode="after")
@@ -127,6 +129,11 @@ class Training(Part):
         return self
 
     @property
+    def reward_weights(self) -> dict[str, float]:
+        """The rewards as the environment takes them: potentials with the learner's discount."""
+        return _discounted(self.rewards, self.ppo.gamma)
+
+    @property
     def world_scenarios(self) -> tuple[Scenario, ...]:
         """The scenario of every world."""
         return tuple(
@@ -146,6 +153,10 @@ class Training(Part):
     def rows(self) -> int:
         """Robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
+
+
+def _discounted(rewards: dict[str, float], gamma: float) -> dict[str, float]:
+    return rewards if POTENTIALS.isdisjoint(rewards) else {**rewards, "discount": gamma}
 
 
 def preset_names() -> list[str]:

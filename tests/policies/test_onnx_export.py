@@ -16,8 +16,8 @@ from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame, memory
 from swarm_logistics_env.policies import PolicyCard
 from swarm_logistics_env.policies.files import CARD
-from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
-from swarm_logistics_env.policies.onnx_export import write_onnx
+from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy, explore
+from swarm_logistics_env.policies.onnx_export import DEVIATIONS, write_onnx
 from swarm_logistics_env.streams import row_keys
 
 PAGE = Path(__file__).parents[2] / "docs" / "onnx.md"
@@ -63,9 +63,13 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
     policy.reset(25, 3)
     # Beside the policy, a frame of its own: with the same rows it has the same memories.
     frame = MotionFrame(scenario, policy.card.network.listens)
-    frame.begin(row_keys(3, STREAM, 25))
+    keys = row_keys(3, STREAM, 25)
+    frame.begin(keys)
     width = len(policy.card.network.inputs)
-    furthest, n_rows = 0.0, 0
+    told = session.get_modelmeta().custom_metadata_map[DEVIATIONS]
+    deviations = np.array(told.split(), np.float32)
+    assert deviations.any() == (policy.card.network.exploration > 0)
+    furthest, n_rows, step = 0.0, 0, 0
     while not (world.is_over_time or world.all_delivered):
         inputs = frame.read(rows)
         ours = policy._network(inputs)
@@ -74,7 +78,10 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
         furthest = max(furthest, float(np.abs(theirs - ours).max()))
         n_rows += len(rows)
         commands = policy.act(rows)
+        if deviations.any():
+            explore(keys, step, deviations, ours)
         np.testing.assert_array_equal(frame.command(ours), commands)
+        step += 1
         rows = world.step(commands)
     assert n_rows == 25_000
     assert furthest < 1e-5

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.report.result_tables import warnings
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Setting
 from swarm_logistics_env.studies.fault_measures import fault_budgets
 from swarm_logistics_env.studies.indicator_table import INDICATORS
+from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.performance_table import PERFORMANCE, rows_of
 from swarm_logistics_env.studies.policy_comparison import agreement, agreements
 from swarm_logistics_env.studies.presets import PAPER
@@ -179,6 +180,43 @@ def test_ablation_that_falls_is_supported(published: StudyResults) -> None:
     assert "swarm-dt: Ablation: without taxis" in titles
 
 
+def test_a_fault_without_harm_is_equivalent_where_its_threshold_is_open() -> None:
+    tests = list(rows_of(results(as_published).indicators))
+    faults = {(t.indicator, t.comparison): t for t in tests if t.kind == "fault"}
+    # FM2, m = 1: P_F is 38 and P_S 37 of 39 items.
+    small = faults["FT", "FM2, m = 1"]
+    assert small.unchanged == "P_F within 10 % of P_o from P_S"
+    assert small.equivalence == small.equivalence_holm == "equivalent"
+    assert small.change == small.value
+    assert faults["R", "FM4, m = 3"].equivalence_holm == "refuted"
+    unchanged = 0
+    for test in faults.values():
+        # What the threshold says comes first.
+        expected = test.answer_holm
+        if expected == "inconclusive" and test.equivalence_holm == "equivalent":
+            expected, unchanged = "equivalent", unchanged + 1
+        assert test.conclusion == expected
+    assert unchanged
+    for test in tests:
+        assert test.kind != "size" or (test.unchanged, test.equivalence) == (None, None)
+
+
+def test_a_sentence_tells_the_change_and_whether_it_is_within_the_margin() -> None:
+    text = markdown(document(results(as_published)))
+    assert re.search(r"P_F within 10 % of P_o\? Change -0\.7\d\d \[.*\]: refuted\.", text)
+    assert "P_F within 10 % of P_o from P_S? Change" in text
+
+
+def test_a_margin_that_was_not_declared_is_exploratory() -> None:
+    found = results(as_published)
+    declared = Declaration(range(SEEDS), margin=0.2)
+    late = judge(found.plan, found.outcomes, declared)
+    assert late.late_margin
+    assert not late.exploratory
+    assert any("margin of equivalence are exploratory" in text for text in warnings(late))
+    assert not any("margin of equivalence" in text for text in warnings(found))
+
+
 def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
     found = results(as_published, same=frozenset({"FM2"}))
     tests = found.indicators
@@ -187,6 +225,10 @@ def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
     assert list(unaffected["value"]) == list(unaffected["after"] / 25)
     assert unaffected["p_holm"].isna().all()
     assert set(unaffected["claim_verdict_holm"]) == {"unaffected"}
+    # The same runs answer whether P is unchanged, exactly and without evidence.
+    assert set(unaffected["equivalence_holm"]) == {"equivalent"}
+    assert unaffected["p_unchanged"].isna().all()
+    assert set(unaffected["conclusion"]) == {"unaffected"}
     # Holm's family of R has nine members left, so the smallest p counts nine times.
     rest = tests[(tests["indicator"] == "R") & (tests["verdict"] != "unaffected")]
     assert len(rest) == 9

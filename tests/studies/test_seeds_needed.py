@@ -5,32 +5,9 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.effort import demands, expected_seconds
-from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.results import StudyResults, demands, judge
 from swarm_logistics_env.tasks.task import Outcome
-
-
-class Broken:
-    """Fails at once."""
-
-    identity = "broken"
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        raise RuntimeError("a wheel came off")
-
-    def act(self, observations: Any) -> Any: ...
-
-
-def test_more_seeds_take_more_time(small: dict[str, Any]) -> None:
-    few, many = (expected_seconds(Study(**{**small, "seeds": seeds}).plan()) for seeds in (2, 200))
-    assert 0 < few < many
-
-
-def test_policy_that_fails_is_named(small: dict[str, Any]) -> None:
-    with pytest.raises(StudyError, match=r"'Broken' fails .*a wheel came off"):
-        expected_seconds(Study(**{**small, "policies": [Broken()]}).plan())
 
 
 def pilot(preset: str = "", seeds: int = 5, **fields: Any) -> StudyResults:
