@@ -79,7 +79,13 @@ class WatchServer:
         self.recording, self.replicas = Recording(session), Replicas()
         self.address = ""
         self._pages: dict[web.WebSocketResponse, dict[str, Any]] = {}
-        app = web.Application(middlewares=[web.middleware(self._guard)])
+
+        @web.middleware
+        async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+            self._check(request)
+            return await handler(request)
+
+        app = web.Application(middlewares=[guard])
         app.router.add_get("/{token}/live", self._live)
         app.router.add_get("/{token}/recording.html", self._save)
         app.router.add_get("/{token}/{name:.*}", self._file)
@@ -172,7 +178,7 @@ class WatchServer:
         page = await asyncio.to_thread(self.recording.page)
         return self._web.Response(text=page, content_type="text/html", headers=headers)
 
-    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+    def _check(self, request: web.Request) -> None:
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
         own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0])
         token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
@@ -180,7 +186,6 @@ class WatchServer:
         if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
             raise self._web.HTTPForbidden(text=text)
-        return await handler(request)
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
