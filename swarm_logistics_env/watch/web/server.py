@@ -90,8 +90,8 @@ class WatchServer:
         app.router.add_get("/{token}/recording.html", self._save)
         app.router.add_get("/{token}/{name:.*}", self._file)
         app.on_response_prepare.append(_add_headers)
-        # Requests that are no HTTP are the sender's affair; our own errors are shown.
         logger = logging.getLogger(__name__)
+        logger.addFilter(_is_own_error)
         self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
 
     async def start(self) -> None:
@@ -186,6 +186,13 @@ class WatchServer:
         if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
             raise self._web.HTTPForbidden(text=text)
+
+
+def _is_own_error(record: logging.LogRecord) -> bool:
+    """Return whether an error is ours: requests that are no HTTP are answered and not shown."""
+    from aiohttp.http_exceptions import HttpProcessingError
+
+    return not (record.exc_info and isinstance(record.exc_info[1], HttpProcessingError))
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
