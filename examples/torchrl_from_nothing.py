@@ -26,7 +26,7 @@ def network(n_outputs):
     return nn.Sequential(*hidden, nn.Linear(64, n_outputs))
 
 
-def main(total_frames=100_000, duration=200.0, seed=0, judged=20):
+def main(total_frames=100_000, duration=200.0, seed=0, judged=10):
     torch.manual_seed(seed)
     torch.set_num_threads(1)
     scenario = Scenario(n_robots=N_ROBOTS, n_items=8, restock=True, duration=duration, **SMALL)
