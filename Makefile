@@ -34,7 +34,7 @@ help:
 	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
-	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
+	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"
 	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, AgileRL, SuperSuit, Minari and two plain loops on the environment; see interop/"
 	@echo "make tasks           studies of RWARE, simple_spread and VMAS, with their tests; checks the numbers of their pages"
 	@echo "make docs            the documentation site, site/index.html"
@@ -80,6 +80,7 @@ benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 
 benchmark-learning: $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
+	$(SUPERSUIT)/bin/python -m benchmarks.learning_speed
 
 # Makes the environment of each library by the rule below, and runs its scripts there.
 interop:
@@ -119,7 +120,7 @@ clean:
 	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,docs,study,render,train,onnx
+$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl mpe2
@@ -136,7 +137,7 @@ $(SUPERSUIT)/installed: OTHERS := supersuit mpe2
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
 .venvs/lowest.txt: pyproject.toml verification/lowest.py
 	@mkdir -p $(@D)
-	$(PYTHON) verification/lowest.py study render > $@
+	$(PYTHON) verification/lowest.py study render watch > $@
 
 .venvs/lowest/wheel: BOUNDS := --constraint .venvs/lowest.txt
 .venvs/newest/wheel: BOUNDS := --upgrade --upgrade-strategy eager
@@ -148,7 +149,7 @@ $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(@D)/bin/python -m pip wheel --no-deps --wheel-dir build/wheels .
 	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
 	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
-		"$$(echo build/wheels/*.whl)[study,render]" build hypothesis pytest pytest-xdist setuptools
+		"$$(echo build/wheels/*.whl)[study,render,watch]" build hypothesis pytest pytest-xdist setuptools
 
 # What is measured beside this package: an environment of their own, as their requirements clash
 # with ours. One that cannot be installed is named in the benchmark's table.

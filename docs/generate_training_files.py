@@ -37,6 +37,10 @@ TEXT = """\
 
 <!-- Written by docs/generate_training_files.py from the code; change that, not this. -->
 
+```{{figure}} media/flow-training_files.svg
+:alt: From a training file over the training to a policy file
+```
+
 A training is a TOML file. An unknown field is an error, which suggests the nearest known field. [Training](training.md) explains how
 trainings work.
 

@@ -40,7 +40,7 @@ def imitate(policy: Any, training: Training, asked: Imitation) -> None:
     view = NetworkView(make_worlds(worlds), training.scenario, training.network.listens)
     optimizer = torch.optim.Adam(actor_parameters(policy), lr=asked.learning_rate)
     demonstrations: list[Demonstrations] = []
-    with LiveTable(f"{training.name}: imitation", asked.rounds, unit="rounds") as table:
+    with LiveTable(f"{training.name}: imitation", asked.rounds, "rounds") as table:
         for number in range(asked.rounds):
             demonstrations.append(_collect(policy, view, training, asked, number))
             is_last = number == asked.rounds - 1

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     AfterValidator,
+    BeforeValidator,
     Field,
     NonNegativeFloat,
     NonNegativeInt,
@@ -35,31 +37,24 @@ def _known(modes: tuple[str, ...]) -> tuple[str, ...]:
 Modes = Annotated[tuple[str, ...], AfterValidator(_known)]
 
 
+def one_of(record: type[Record]) -> Callable[[object], object]:
+    """Return what makes a record of a table, and leaves anything else as it is."""
+    # The record's own constructor raises errors that suggest the field that was meant.
+    return lambda value: record(**value) if isinstance(value, dict) else value
+
+
+def each_of(record: type[Record]) -> Callable[[object], object]:
+    """Return what makes a tuple of records of a list of tables."""
+    one = one_of(record)
+    return lambda values: (
+        tuple(one(value) for value in values) if isinstance(values, list | tuple) else values
+    )
+
+
 class Part(Record):
     """A table of a training, or all of it."""
 
     error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
-
-
-class WorldKind(Part):
-    """Worlds of one kind, among those that stand side by side.
-
-    Args:
-        count: how many.
-        n_robots: the swarm size.
-        scenario: fields in which they differ from the training's scenario.
-    """
-
-    count: PositiveInt = 1
-    n_robots: PositiveInt = 25
-    scenario: dict[str, Any] = Field(default_factory=dict)
-
-    @field_validator("scenario")
-    @classmethod
-    def _possible(cls, fields: dict[str, Any]) -> dict[str, Any]:
-        if "n_robots" in fields:
-            raise ValueError("the swarm size is a field of its own, `n_robots`")
-        return fields
 
 
 class Conditions(Part):
@@ -94,6 +89,29 @@ class Conditions(Part):
                 raise ValueError("swarm sizes belong in `worlds` of the training")
             for value in values:
                 Scenario(**{name: value})
+        return fields
+
+
+class WorldKind(Part):
+    """Worlds of one kind, among those that stand side by side.
+
+    Args:
+        count: how many.
+        n_robots: the swarm size.
+        scenario: fields in which they differ from the training's scenario.
+        conditions: kinds of episodes that are mixed in these worlds; none: the training's.
+    """
+
+    count: PositiveInt = 1
+    n_robots: PositiveInt = 25
+    scenario: dict[str, Any] = Field(default_factory=dict)
+    conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
+
+    @field_validator("scenario")
+    @classmethod
+    def _possible(cls, fields: dict[str, Any]) -> dict[str, Any]:
+        if "n_robots" in fields:
+            raise ValueError("the swarm size is a field of its own, `n_robots`")
         return fields
 
 

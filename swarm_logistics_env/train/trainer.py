@@ -117,7 +117,8 @@ def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
     return LiveTable(
         training.name,
         training.agent_steps,
-        done,
+        "agent-steps",
+        done=done,
         about=f"N = {asked.n_robots}, {asked.seeds} seeds",
         references=log.references,
         before=[(int(row["agent_steps"]), log.measures(row)) for row in log.curve],
