@@ -120,7 +120,7 @@ clean:
 	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,docs,study,render,train,onnx
+$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl mpe2
@@ -137,7 +137,7 @@ $(SUPERSUIT)/installed: OTHERS := supersuit mpe2
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
 .venvs/lowest.txt: pyproject.toml verification/lowest.py
 	@mkdir -p $(@D)
-	$(PYTHON) verification/lowest.py study render > $@
+	$(PYTHON) verification/lowest.py study render watch > $@
 
 .venvs/lowest/wheel: BOUNDS := --constraint .venvs/lowest.txt
 .venvs/newest/wheel: BOUNDS := --upgrade --upgrade-strategy eager
@@ -149,7 +149,7 @@ $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(@D)/bin/python -m pip wheel --no-deps --wheel-dir build/wheels .
 	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
 	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
-		"$$(echo build/wheels/*.whl)[study,render]" build hypothesis pytest pytest-xdist setuptools
+		"$$(echo build/wheels/*.whl)[study,render,watch]" build hypothesis pytest pytest-xdist setuptools
 
 # What is measured beside this package: an environment of their own, as their requirements clash
 # with ours. One that cannot be installed is named in the benchmark's table.

@@ -136,6 +136,6 @@ def test_site_builds_without_warnings(tmp_path: Path) -> None:
             places = index["terms"].get(stem, [])
             found = [places] if isinstance(places, int) else places
             assert index["docnames"].index(page) in found, f"{page}: {stem}"
-    for page in out.glob("*.html"):
-        loads = re.findall(r'(?:src|<link[^>]* href)="(https?:[^"]+)"', page.read_text("utf-8"))
-        assert not loads, f"{page.name} loads {loads[0]}"
+    for built in out.glob("*.html"):
+        loads = re.findall(r'(?:src|<link[^>]* href)="(https?:[^"]+)"', built.read_text("utf-8"))
+        assert not loads, f"{built.name} loads {loads[0]}"

@@ -40,7 +40,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "adapters": ENVIRONMENT | {"motion", "policies", "wrappers"},
     "episode": WORLD | {"policies"},
     "spi": set(),
-    "watch": RUNS | {"rendering"},
+    "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
     "studies": {"errors", "records", "streams", "spi", "tasks"},
     "report": {"errors", "spi", "tasks", "studies"},

@@ -98,6 +98,7 @@ def _question(results: StudyResults, test: Row, places: dict[str, int]) -> dict[
     compared: Comparison = test.compared
     return {
         "policy": test.policy,
+        "table": test.table,
         "head": told.head,
         "text": told.text,
         "verdict": told.verdict,

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, Self
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import metadata
+from swarm_logistics_env.studies.metadata import Metadata, StoredSpecification, rows_of
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
-from swarm_logistics_env.tasks.task_choice import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -70,88 +68,73 @@ def merge(directories: Sequence[Path], out: Path) -> int:
             has, two stores have different results of one run, or `out` holds a study.
     """
     refuse_study_in(out, "merge")
-    planned = {directory: _notes(directory) for directory in directories}
-    merged = _united(planned)
+    stored = {directory: _played(directory) for directory in directories}
+    merged = _united(stored)
     with new_store(out) as store:
         for directory in directories:
             store.absorb(directory / FILE_NAME)
-        for name, value in merged.items():
-            store.set_note(name, value)
+        store.note(merged)
         return len(store)
 
 
-def _notes(directory: Path) -> dict[str, str]:
+def _played(directory: Path) -> Metadata:
     with Store.existing(directory) as store:
-        if store.note(metadata.IMPORTED) is not None:
-            raise StudyError(f"{directory} was imported: only studies that were run are merged")
-        return metadata.planned(store, directory)
+        found = store.needed_metadata()
+    if found.imported is not None:
+        raise StudyError(f"{directory} was imported: only studies that were run are merged")
+    return found
 
 
-def _united(planned: dict[Path, dict[str, str]]) -> dict[str, str]:
+def _united(stored: dict[Path, Metadata]) -> dict[str, str]:
+    """Return the metadata of studies as that of one."""
     # Sort by seeds, so that each study joins the seeds of those before it.
-    first, *others = sorted(planned, key=lambda directory: _seeds(planned[directory]).start)
-    united = dict(planned[first])
-    for other in others:
-        theirs = planned[other]
-        if theirs[metadata.CODE] != united[metadata.CODE]:
-            raise StudyError(
-                f"{first} was played under code version {united[metadata.CODE]}, {other} under "
-                f"{theirs[metadata.CODE]}: a verdict never mixes two versions"
-            )
-        if theirs.get(metadata.DECLARED_LOOKS) != united.get(metadata.DECLARED_LOOKS):
-            raise StudyError(f"{first} and {other} declared different looks")
-        united[metadata.SPECIFICATION] = _specification(united, theirs, first, other)
-        united[metadata.IDENTITIES] = _identities(united, theirs, first, other)
-        declared = _declared(united, theirs)
-        united[metadata.DECLARED_FIRST_SEED] = str(declared.start)
-        united[metadata.DECLARED_SEEDS] = str(len(declared))
-    return united
-
-
-def _seeds(planned: dict[str, str]) -> range:
-    fields = _fields(planned)
-    return range(fields["first_seed"], fields["first_seed"] + fields["seeds"])
-
-
-def _fields(planned: dict[str, str]) -> dict[str, Any]:
-    # Older stores know neither of the two.
-    return {"first_seed": 0, "task": DEFAULT, **json.loads(planned[metadata.SPECIFICATION])}
-
-
-def _declared(ours: dict[str, str], theirs: dict[str, str]) -> range:
-    mine, yours = (
-        range(first, first + int(one[metadata.DECLARED_SEEDS]))
-        for one in (ours, theirs)
-        for first in [int(one.get(metadata.DECLARED_FIRST_SEED, 0))]
+    first, *others = sorted(
+        stored, key=lambda directory: stored[directory].specification.first_seed
     )
-    both = range(max(mine.start, yours.start), min(mine.stop, yours.stop))
-    # Without a common seed any part will do: nobody declared the whole.
-    return both or mine
+    one = stored[first]
+    fields, identities, declared = one.specification.model_dump(), one.identities, one.declared
+    for directory in others:
+        other = stored[directory]
+        if other.code != one.code:
+            raise StudyError(
+                f"{first} was played under code version {one.code}, {directory} under "
+                f"{other.code}: a verdict never mixes two versions"
+            )
+        for name in ("looks", "margin"):
+            if getattr(other.declared, name) != getattr(declared, name):
+                raise StudyError(f"{first} and {directory} declared different {name}")
+        fields = _joined(fields, other.specification, first, directory)
+        for part in identities.keys() & other.identities.keys():
+            if identities[part] != other.identities[part]:
+                raise StudyError(
+                    f"the {part} of {first} is not the one of {directory}: its code differs"
+                )
+        identities = {**identities, **other.identities}
+        mine, theirs = declared.seeds, other.declared.seeds
+        both = range(max(mine.start, theirs.start), min(mine.stop, theirs.stop))
+        # Without a common seed any part will do: nobody declared the whole.
+        declared = replace(declared, seeds=both or mine)
+    return rows_of(fields, one.code, identities, declared)
 
 
-def _specification(ours: dict[str, str], theirs: dict[str, str], first: Path, other: Path) -> str:
-    mine, yours = _fields(ours), _fields(theirs)
+def _joined(
+    fields: dict[str, Any], other: StoredSpecification, first: Path, directory: Path
+) -> dict[str, Any]:
+    """Return the fields of a specification, with the seeds and the policies of another as well."""
+    theirs = other.model_dump()
     free = ("first_seed", "seeds", "policies")
-    names = [name for name in {**mine, **yours} if name not in free]
-    differing = [name for name in names if mine.get(name) != yours.get(name)]
+    names = [name for name in {**fields, **theirs} if name not in free]
+    differing = [name for name in names if fields.get(name) != theirs.get(name)]
     if differing:
-        raise StudyError(f"{first} and {other} differ in {', '.join(differing)}: not one study")
-    seeds, further = _seeds(ours), _seeds(theirs)
-    if further.start > seeds.stop:
+        raise StudyError(f"{first} and {directory} differ in {', '.join(differing)}: not one study")
+    stop = fields["first_seed"] + fields["seeds"]
+    if other.first_seed > stop:
         raise StudyError(
-            f"{other} has the seeds from {further.start} on, the studies before it end with seed "
-            f"{seeds.stop - 1}: seeds lie between them that no study has, and to judge them as "
-            "one study each seed is needed"
+            f"{directory} has the seeds from {other.first_seed} on, the studies before it end with "
+            f"seed {stop - 1}: seeds lie between them that no study has, and to judge them as one "
+            "study each seed is needed"
         )
-    mine["seeds"] = max(seeds.stop, further.stop) - seeds.start
-    mine["policies"] += [policy for policy in yours["policies"] if policy not in mine["policies"]]
-    return json.dumps(mine)
-
-
-def _identities(ours: dict[str, str], theirs: dict[str, str], first: Path, other: Path) -> str:
-    mine: dict[str, Any] = json.loads(ours[metadata.IDENTITIES])
-    yours: dict[str, Any] = json.loads(theirs[metadata.IDENTITIES])
-    for part in mine.keys() & yours.keys():
-        if mine[part] != yours[part]:
-            raise StudyError(f"the {part} of {first} is not the one of {other}: its code differs")
-    return json.dumps({**mine, **yours})
+    seeds = max(stop, other.seed_numbers.stop) - fields["first_seed"]
+    policies = [*fields["policies"], *theirs["policies"]]
+    distinct = [policy for n, policy in enumerate(policies) if policy not in policies[:n]]
+    return {**fields, "seeds": seeds, "policies": distinct}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.database import Database
+from swarm_logistics_env.studies.metadata import Metadata, missing_in
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -165,20 +165,34 @@ class Store:
                     row["delivery_times"] = _times(row["delivery_times"], row["delivered"]).tolist()
                 yield row
 
-    def note(self, name: str) -> str | None:
-        """Return what was noted under `name`."""
-        for row in self._database.read("SELECT value FROM notes WHERE name = ?", name):
-            if not metadata.reads(name, row["value"]):
-                raise StudyError(
-                    f"the store {self.path} is damaged: its note {name!r} does not read"
-                )
-            return str(row["value"])
-        return None
+    def metadata(self) -> Metadata | None:
+        """Return what was noted about the study; None: nothing yet, or not all that is needed."""
+        return Metadata.read(self._notes(), self.path)
 
-    def set_note(self, name: str, value: str) -> None:
-        """Note a fact about the study."""
+    def needed_metadata(self) -> Metadata:
+        """Return what was noted about the study.
+
+        Raises:
+            StudyError: something is missing or does not read.
+        """
+        notes = self._notes()
+        found = Metadata.read(notes, self.path)
+        if found is None:
+            raise StudyError(
+                f"the store {self.path} does not note its {missing_in(notes)}: run the study once "
+                "more there (finished runs are kept), then it will"
+            )
+        return found
+
+    def note(self, notes: Mapping[str, str]) -> None:
+        """Note facts about the study, by name; earlier ones of these names are replaced."""
         with self._database.transaction() as write:
-            write("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
+            for row in notes.items():
+                write("INSERT OR REPLACE INTO notes VALUES (?, ?)", row)
+
+    def _notes(self) -> dict[str, object]:
+        rows = self._database.read("SELECT name, value FROM notes")
+        return {row["name"]: row["value"] for row in rows}
 
     @contextmanager
     def _sound(self) -> Iterator[None]:

@@ -84,6 +84,14 @@ def test_shards_of_one_declared_study_stay_as_declared(tmp_path: Path) -> None:
     assert not Study.stored(tmp_path / "both").findings().exploratory
 
 
+def test_merged_study_keeps_its_declared_margin(tmp_path: Path) -> None:
+    parts = [played(tmp_path / name, margin=0.2) for name in ("one", "other")]
+    merge(parts, tmp_path / "both")
+    with Store.existing(tmp_path / "both") as store:
+        assert store.needed_metadata().declared.margin == 0.2
+    assert not Study.stored(tmp_path / "both").findings().late_margin
+
+
 def test_success_wins_over_failure_whichever_comes_first(tmp_path: Path) -> None:
     whole = played(tmp_path / "whole")
     failed = altered(
@@ -119,6 +127,7 @@ def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
         ),
         ({"sizes": [{"values": [2, 4]}]}, "SELECT 1", "differ in sizes"),
         ({"looks": [2, 4]}, "SELECT 1", "different looks"),
+        ({"margin": 0.3}, "SELECT 1", "different margin"),
     ],
 )
 def test_what_is_not_one_study_is_not_merged(
