@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 AT = """(() => {{
 const canvas = element('arena0'), box = canvas.getBoundingClientRect();
-const place = placeOf(canvas, latest.scenario), pose = posesBetween(shown.now, shown.next, shown.share, 0)[{robot}];
+const place = placeOf(canvas, latest.scenario);
+const pose = posesBetween(shown.now, shown.next, shown.share, 0)[{robot}];
 return [box.left + place.left + place.scale * pose[0] / 1000,
 box.top + place.bottom - place.scale * pose[1] / 1000];
 }})()"""
