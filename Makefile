@@ -34,7 +34,7 @@ help:
 	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
-	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
+	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"
 	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, AgileRL, SuperSuit, Minari and two plain loops on the environment; see interop/"
 	@echo "make tasks           studies of RWARE, simple_spread and VMAS, with their tests; checks the numbers of their pages"
 	@echo "make docs            the documentation site, site/index.html"
@@ -80,6 +80,7 @@ benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 
 benchmark-learning: $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
+	$(SUPERSUIT)/bin/python -m benchmarks.learning_speed
 
 # Makes the environment of each library by the rule below, and runs its scripts there.
 interop:
@@ -107,9 +108,10 @@ dist: $(DEV)/installed
 		(cd build/dist && bin/swarm-logistics run --seed 0 --set duration=20) || exit 1; \
 	done
 
-# What the page on the package index needs; changes README.md and pyproject.toml, so only a release calls it.
-absolute-links:
-	$(PYTHON) docs/absolute_links.py $(REPOSITORY) $(TAG)
+# For the page on the package index; it changes README.md and pyproject.toml, so only a release calls it, which knows the address.
+absolute-links: $(DEV)/installed
+	sed -i 's|^\[project.urls\]$$|&\nRepository = "$(REPOSITORY)"|' pyproject.toml
+	$(DEV)/bin/python docs/front_page.py
 
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 DOCS = Path(__file__).parent
 README, RESULTS = DOCS.parent / "README.md", DOCS / "results.md"
-PICTURE = DOCS / "media" / "policies.svg"
+MEDIA = DOCS / "media"
 
 BLOCK = "<!-- tables: {name} -->"
 END = "<!-- end of tables -->"
@@ -214,6 +214,44 @@ def draw(rows: Rows, path: Path) -> None:
         canvas.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
 
 
+_PACKAGES = {
+    "env.step_arrays": "this package, arrays",
+    "env.step": "this package, dicts",
+    "RWARE": "RWARE",
+    "MPE2 simple_spread": "MPE2 simple_spread",
+    "VMAS navigation, 1 world": "VMAS navigation, 1 world",
+    "VMAS navigation, 256 worlds": "VMAS navigation, 256 worlds",
+}
+
+
+def draw_speed(costs: str, path: Path) -> None:
+    """Draw agent-steps a second of this package and of others, from the table of costs."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    rates = {
+        line.split("|")[1].partition(":")[0].strip(): float(line.split("|")[2].replace(",", ""))
+        for line in costs.splitlines()[2:]
+        if line.startswith("| ")
+    }
+    shown = {label: rates[name] for name, label in _PACKAGES.items() if name in rates}
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams |= {"svg.hashsalt": "front page", "font.size": 9.0, "axes.linewidth": 0.6}
+        canvas = Figure(figsize=(7.2, 2.1), layout="constrained")
+        axes = canvas.subplots()
+        colours = ["#0072b2" if "this" in label else "#9aa0a8" for label in shown]
+        bars = axes.barh(list(shown), list(shown.values()), color=colours, height=0.65)
+        axes.bar_label(bars, [f"{rate:,.0f}" for rate in shown.values()], padding=4)
+        axes.set_xscale("log")
+        axes.set_xlim(1e3, 5e6)
+        axes.invert_yaxis()
+        axes.spines[["top", "right", "left"]].set_visible(False)
+        axes.tick_params(axis="y", length=0)
+        axes.set_xlabel("agent-steps a second, logarithmic")
+        canvas.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
+
+
 # -- links --------------------------------------------------------------------------------------
 
 _PAGES = {
@@ -278,7 +316,9 @@ def blocks() -> dict[str, str]:
 def main() -> None:
     """Write the README's blocks and the picture."""
     README.write_text(rewritten(README.read_text(encoding="utf-8"), blocks()), encoding="utf-8")
-    draw(rows_of(block_of(RESULTS.read_text(encoding="utf-8"), "policies")), PICTURE)
+    page = RESULTS.read_text(encoding="utf-8")
+    draw(rows_of(block_of(page, "policies")), MEDIA / "policies.svg")
+    draw_speed(block_of(page, "costs"), MEDIA / "speed.svg")
 
 
 if __name__ == "__main__":

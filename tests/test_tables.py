@@ -1,4 +1,4 @@
-"""The tables of docs/results.md: written from studies, the same at every call, none typed by hand."""
+"""The tables of docs/results.md: written from studies, none typed by hand."""
 
 from __future__ import annotations
 

@@ -134,10 +134,12 @@ function choose(question, seed) {
 }
 
 function chooseCondition(condition, seed) {
-  // The question that asks about this condition, so that there is something to compare it with.
-  let question = data.questions.findIndex((one) => one.arms[1][2] === condition);
-  if (question < 0) question = data.questions.findIndex((one) => one.arms.some((arm) => arm[2] === condition));
-  choose(question, seed);
+  // A question about this condition, of the table that is shown, has something to compare it with.
+  const here = data.views[at("views").value].name.slice("P: ".length);
+  const about = [(one) => one.arms[1][2] === condition, (one) => one.arms.some((arm) => arm[2] === condition)];
+  const found = about.flatMap((fits) => [
+    data.questions.findIndex((one) => one.table === here && fits(one)), data.questions.findIndex(fits)]);
+  choose(found.find((question) => question >= 0), seed);
 }
 
 function showQuestion() {
@@ -173,7 +175,7 @@ function drawSlopes() {
       if (point) drawn += `<circle class="dot${marked}" cx="${x(i)}" cy="${y(samples[i][k])}" r="4" fill="${colour(i)}" data-seed="${k}"><title>seed ${data.seeds[k]}: ${samples[i][k]}</title></circle>`;
     });
   }
-  drawn += `<polyline fill="none" points="${means.map((p, i) => `${x(i)},${y(p)}`).join(" ")}" stroke="var(--ink)" stroke-width="3"/>`;
+  drawn += `<polyline fill="none" points="${means.map((p, i) => `${x(i)},${y(p)}`).join(" ")}" stroke="var(--ink)" stroke-width="3.5"/>`;
   put(place, width, height, drawn, "P seed by seed");
 }
 
@@ -185,6 +187,8 @@ function timesOf(gaps) {
 function drawCurves() {
   const place = at("curves"), width = Math.max(280, place.clientWidth), height = 220;
   const curves = chosen.arms.map((arm) => data.conditions[arm[2]].curves.map((gaps) => gaps && timesOf(gaps)));
+  place.parentElement.hidden = !curves.flat().some(Boolean);  // no times were recorded
+  if (place.parentElement.hidden) return;
   const end = Math.max(...chosen.arms.map((arm) => data.conditions[arm[2]].end));
   const most = Math.max(1, ...curves.flat().filter(Boolean).map((times) => times.length));
   const box = { left: 42, right: width - 12, top: 20, bottom: height - 24, low: 0, high: most * 1.05 };
@@ -213,7 +217,7 @@ function showRun() {
   });
   const found = data.replays.findIndex((one) => one.seed === seed && chosen.arms.some((arm) => arm[2] === one.conditions[0]));
   const watch = found < 0 ? "" : `<button type="button" data-replay="${found}">Watch this run here</button>`;
-  place.innerHTML = `<b>Seed ${seed}</b> ${watch}<br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
+  place.innerHTML = `<b>${data.paired ? "Seed" : "Run"} ${seed}</b> ${watch}<br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
 }
 
 // Replays: a run beside its twin, from positions kept as changes
@@ -366,6 +370,8 @@ function draw() {
 let width = innerWidth;
 addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; draw(); } });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => film && paint());
+// On paper nothing can be unfolded: the warnings belong to the answer.
+addEventListener("beforeprint", () => { for (const one of document.querySelectorAll(".warnings")) one.open = true; });
 // A link to a folded chapter unfolds it.
 const unfold = () => { const found = at(location.hash.slice(1)); if (found && found.matches("details")) found.open = true; };
 addEventListener("hashchange", unfold);

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _MOST_REPLAYS = 3
-_MOST_TIMES = 250_000  # deliveries in the curves of a page: about half a megabyte
+_MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
 _STEPS_A_METRE = 50  # of positions in a replay
 
 
@@ -98,6 +98,7 @@ def _question(results: StudyResults, test: Row, places: dict[str, int]) -> dict[
     compared: Comparison = test.compared
     return {
         "policy": test.policy,
+        "table": test.table,
         "head": told.head,
         "text": told.text,
         "verdict": told.verdict,

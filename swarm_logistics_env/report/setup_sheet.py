@@ -9,7 +9,7 @@ from importlib.metadata import version
 from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.report.wording import NOTHING
 from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
-from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
 from swarm_logistics_env.studies.plan import Plan
 
 
@@ -141,21 +141,20 @@ def glossary(plan: Plan) -> Section:
     rows = [
         ("P", f"performance: {plan.specification.played.performance}"),
         ("P_o, P_new", "P in the original condition, and in the changed one"),
-        *((DEFINITIONS[symbol].heading, _MEANINGS[symbol]) for symbol in asked),
+        *((DEFINITIONS[symbol].heading, _meaning(DEFINITIONS[symbol])) for symbol in asked),
         *_WORDS,
     ]
     return Section("", ("word", "meaning"), tuple(rows))
 
 
-_MEANINGS = {
-    "S": "gain of P from N to N + m robots over the robots' share: (P_N+m - P_N) / P_N / (m/N); "
-    "above 0 scalable, above 1 superlinear",
-    "FT": "m faulty robots against m removed ones: (P_F - P_S) / P_o; above 0 tolerant",
-    "R": "loss by m faulty robots against their share: (P_F - P_o) / P_o + m/N; above 0 robust",
-    "A": "change of P against that of a parameter x: ((P_new - P_o) / P_o) / |(x_new - x_o) / x_o| "
-    "+ 1; above 0 adaptable",
-    "change": "relative change of P where another policy takes its place: (P_new - P_o) / P_o",
-}
+def _meaning(definition: Definition) -> str:
+    """Return an indicator's formula, which its function's docstring begins with, and its words."""
+    formula, *_ = (definition.function.__doc__ or "").strip().splitlines()
+    formula = formula.partition(" (paper")[0].rstrip(".")
+    adjectives = (f"above {x:g} {adjective}" for x, adjective in definition.adjectives.items())
+    return "; ".join([formula, *adjectives])
+
+
 _WORDS = (
     ("N, m", "number of robots of the swarm; number of those added, faulty or removed"),
     ("seed", "number that decides the layout, the requests, which robots fail and the behaviour"),

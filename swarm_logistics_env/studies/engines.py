@@ -108,7 +108,7 @@ class ProcessPool:
         waiting = deque(runs)
         while waiting:
             interrupted: list[Run] = []
-            with _workers(min(self.count, len(waiting))) as pool:
+            with workers(min(self.count, len(waiting))) as pool:
                 for run, outcome in _played(pool, waiting, self.count):
                     if outcome is None:
                         interrupted.append(run)
@@ -143,7 +143,7 @@ def _played(
 
 def _played_alone(run: Run) -> Outcome:
     others = set(multiprocessing.active_children())
-    with _workers(1) as pool:
+    with workers(1) as pool:
         (worker,) = set(multiprocessing.active_children()) - others
         try:
             return pool.submit(_play, run.key, _pickled(run)).result()
@@ -156,7 +156,7 @@ def _played_alone(run: Run) -> Outcome:
 
 
 @contextmanager
-def _workers(count: int) -> Iterator[ProcessPoolExecutor]:
+def workers(count: int) -> Iterator[ProcessPoolExecutor]:
     """Start worker processes, and end them at once with the block, or when this process dies."""
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)

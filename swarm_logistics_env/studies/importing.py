@@ -15,6 +15,7 @@ from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
 from swarm_logistics_env.studies import comparisons, metadata
 from swarm_logistics_env.studies.comparisons import Arm, Comparison, NullPair, Setting
+from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.studies.specification import Specification
@@ -87,11 +88,9 @@ def import_results(
             for number, row in enumerate(rows):
                 run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
                 store.add(run, _outcome(run.key, row))
-        store.set_note(metadata.SPECIFICATION, specification.to_json())
-        store.set_note(metadata.CODE, RECORDED.code())
-        store.set_note(metadata.IDENTITIES, "{}")
-        store.set_note(metadata.DECLARED_SEEDS, str(specification.seeds))
-        store.set_note(metadata.IMPORTED, origin.to_json())
+        declared = Declaration.of(specification)
+        notes = metadata.rows_of(specification, RECORDED.code(), {}, declared)
+        store.note({**notes, "imported": origin.to_json()})
     return len(trials.rows)
 
 

@@ -18,8 +18,8 @@ class LiveTable(ProgressBar):
     Args:
         label: what is done.
         total: how much there is to do, in `unit`.
-        done: of it before now.
         unit: in words.
+        done: of it before now.
         about: in what the measures were taken, for the corner of the table.
         references: name -> measures of what stands beside it.
         before: (done, measures) of what was measured before now, in order.
@@ -30,9 +30,9 @@ class LiveTable(ProgressBar):
         self,
         label: str,
         total: int,
-        done: int = 0,
+        unit: str,
         *,
-        unit: str = "agent-steps",
+        done: int = 0,
         about: str = "",
         references: Mapping[str, Measured] | None = None,
         before: list[tuple[int, Measured]] | None = None,

@@ -8,14 +8,13 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
-from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
-    Imitation,
     Indicators,
     Part,
     PPOSettings,
@@ -50,10 +49,9 @@ class Training(Part):
         seed: decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
-            added to them.
+            added to them. Potentials are discounted by `ppo.gamma`.
         indicators: pays them instead of the task.
         conditions: kinds of episodes that are mixed; none: nobody fails.
-        imitation: what comes before PPO; none: it begins from nothing, or from `start`.
         network: what the policy reads and commands.
         ppo, evaluation, scores: see there.
 
@@ -74,7 +72,6 @@ class Training(Part):
     rewards: dict[str, float] = Field(default_factory=lambda: {"delivery": 1.0})
     indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
-    imitation: Annotated[Imitation | None, BeforeValidator(one_of(Imitation))] = None
     network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
     ppo: Annotated[PPOSettings, BeforeValidator(one_of(PPOSettings))] = PPOSettings()
     evaluation: Annotated[Evaluation, BeforeValidator(one_of(Evaluation))] = Evaluation()
@@ -90,7 +87,9 @@ class Training(Part):
     @field_validator("rewards")
     @classmethod
     def _terms(cls, rewards: dict[str, float]) -> dict[str, float]:
-        RewardTerms(rewards)
+        if "discount" in rewards:
+            raise ValueError("discount: should be left out, it is `ppo.gamma`")
+        RewardTerms(_discounted(rewards, 1.0))
         return rewards
 
     @model_validator(mode="after")
@@ -99,15 +98,6 @@ class Training(Part):
         if any(scenario.message_size for scenario in scenarios):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         played = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
-        if self.imitation is not None:
-            played |= set(self.imitation.sizes)
-            if self.imitation.seconds < self.scenario.control_period:
-                raise ValueError(
-                    f"imitation.seconds = {self.imitation.seconds}: should be at least the "
-                    f"control period, {self.scenario.control_period} s"
-                )
-            if self.start is not None:
-                raise ValueError(f"start = {self.start!r}: should be left out beside `imitation`")
         for size in sorted(played):
             self.scenario.replace(n_robots=size)
         for world in self.worlds:
@@ -125,6 +115,11 @@ class Training(Part):
                 f"{self.rows} robots x {self.ppo.n_steps} steps"
             )
         return self
+
+    @property
+    def reward_weights(self) -> dict[str, float]:
+        """The rewards as the environment takes them: potentials with the learner's discount."""
+        return _discounted(self.rewards, self.ppo.gamma)
 
     @property
     def world_scenarios(self) -> tuple[Scenario, ...]:
@@ -146,6 +141,10 @@ class Training(Part):
     def rows(self) -> int:
         """Robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
+
+
+def _discounted(rewards: dict[str, float], gamma: float) -> dict[str, float]:
+    return rewards if POTENTIALS.isdisjoint(rewards) else {**rewards, "discount": gamma}
 
 
 def preset_names() -> list[str]:

@@ -41,7 +41,8 @@ def make_worlds(training: Training) -> SwarmVecEnv:
 def _make_env(training: Training, references: References, world: int) -> Wrapper:
     scenario = training.world_scenarios[world]
     env = EpisodeMix(
-        SwarmLogisticsEnv(scenario, rewards=training.rewards), training.world_conditions[world]
+        SwarmLogisticsEnv(scenario, rewards=training.reward_weights),
+        training.world_conditions[world],
     )
     asked = training.indicators
     if asked is None:

@@ -63,7 +63,8 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
     policy.reset(25, 3)
     # Beside the policy, a frame of its own: with the same rows it has the same memories.
     frame = MotionFrame(scenario, policy.card.network.listens)
-    frame.begin(row_keys(3, STREAM, 25))
+    keys = row_keys(3, STREAM, 25)
+    frame.begin(keys)
     width = len(policy.card.network.inputs)
     told = session.get_modelmeta().custom_metadata_map[DEVIATIONS]
     deviations = np.array(told.split(), np.float32)

@@ -18,6 +18,7 @@ from swarm_logistics_env.report.page_data import page_data, watch_command
 from swarm_logistics_env.report.verdict_matrix import verdict_matrix
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
+from verification.browser import Browser
 
 SCENARIO = {
     "n_robots": 4, "n_items": 8, "warehouse_width": 4.0, "warehouse_height": 3.0, "duration": 30.0,
@@ -143,3 +144,34 @@ def test_text_of_a_study_cannot_end_the_script(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text()
     assert hostile not in page
     assert page.count("</script>") == 2
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+def test_answer_and_comparison_stand_on_the_first_screen_and_a_click_shows_the_question(
+    size: tuple[int, int], directory: Path, data: Any, tmp_path: Path
+) -> None:
+    try:
+        browser = Browser(tmp_path, size)
+    except FileNotFoundError as missing:
+        pytest.skip(str(missing))
+    try:
+        browser.open((directory / "report.html").resolve().as_uri())
+        browser.wait_for("document.querySelectorAll('#comparison svg').length")
+        assert browser.value("document.documentElement.scrollWidth") <= size[0]
+        bottom = "document.querySelector('#comparison').getBoundingClientRect().bottom"
+        assert browser.value(bottom) <= size[1]
+        asked = len(data["questions"]) - 1
+        place = (
+            f"document.querySelector('.sign[data-question=\"{asked}\"]').getBoundingClientRect()"
+        )
+        browser.click(browser.value(f"{place}.x") + 4, browser.value(f"{place}.y") + 4)
+        shown = browser.wait_for("document.querySelector('.sign.chosen').dataset.question")
+        assert int(shown) == asked
+        head = browser.value("document.querySelector('#question h2').textContent")
+        assert head == data["questions"][asked]["head"]
+        lines = browser.value("document.querySelectorAll('#slopes polyline.thin').length")
+        assert lines == len(data["seeds"])
+        browser.wait_for("document.querySelector('#clock').textContent")  # a replay is unpacked
+        assert browser.console == []
+    finally:
+        browser.close()
