@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 
 AT = """(() => {{
 const canvas = element('arena0'), box = canvas.getBoundingClientRect();
-const place = placeOf(canvas, latest.scenario), poses = frames.at(-1).poses0;
-return [box.left + place.left + place.scale * poses[3 * {robot}] / 1000,
-box.top + place.bottom - place.scale * poses[3 * {robot} + 1] / 1000];
+const place = placeOf(canvas, latest.scenario);
+const pose = posesBetween(shown.now, shown.next, shown.share, 0)[{robot}];
+return [box.left + place.left + place.scale * pose[0] / 1000,
+box.top + place.bottom - place.scale * pose[1] / 1000];
 }})()"""
 
 
@@ -25,7 +26,7 @@ def test_robot_is_broken_by_click_and_by_touch(served: Served, browser: Browser)
     browser.open(served.server.address)
     browser.wait_for("latest && latest.time > 1")
     browser.press(" ")
-    browser.wait_for("latest.paused")
+    browser.wait_for("latest.paused && Math.abs(playhead - latest.time) < 0.01")
     browser.click(*browser.value(AT.format(robot=4)))
     browser.wait_for("latest.selected && latest.selected.robot === 4")
     browser.click_on("#break")

@@ -31,7 +31,7 @@ const element = (id) => document.getElementById(id);
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const recorded = element("recording");
 let fixed = null, latest = null, frames = [], socket = null, retries = 0;
-let playhead = 0, before = 0, drawn = null, problem = { text: "", until: 0 };
+let playhead = 0, before = 0, drawn = null, shown = null, problem = { text: "", until: 0 };
 const rate = { frames: 0, since: 0 }; // drawn frames, for measurements
 
 // Frames from the server
@@ -93,6 +93,7 @@ function animate(moment) {
   playhead = Math.max(frames[0].time, Math.min(last, playhead));
   const nth = Math.max(0, frameAt(playhead)), now = frames[nth], next = frames[nth + 1] ?? now;
   const share = next === now ? 0 : (playhead - now.time) / (next.time - now.time);
+  shown = { now, next, share };
   for (const number of [0, 1]) {
     const trails = element("trails").checked ? trailsUntil(nth, number) : [];
     drawArena(element(`arena${number}`), number, now, next, share, { trails, links: element("links").checked, selected: latest.selected });
@@ -217,8 +218,7 @@ function robotAt(event, number) {
   const canvas = element(`arena${number}`), { left, top } = canvas.getBoundingClientRect(), place = placeOf(canvas, latest.scenario);
   const x = (event.clientX - left - place.left) / place.scale, y = (place.bottom - (event.clientY - top)) / place.scale;
   let nearest = null, least = Math.max(2 * latest.scenario.robot_radius, 22 / place.scale);
-  const nth = frameAt(playhead);
-  posesBetween(frames[nth], frames[nth], 0, number).forEach((pose, robot) => {
+  posesBetween(shown.now, shown.next, shown.share, number).forEach((pose, robot) => {
     const away = pose ? Math.hypot(pose[0] / 1000 - x, pose[1] / 1000 - y) : Infinity;
     if (away <= least) [nearest, least] = [robot, away];
   });
@@ -229,13 +229,13 @@ function listen() {
   for (const number of [0, 1]) {
     const canvas = element(`arena${number}`);
     canvas.addEventListener("click", (event) => {
-      if (!latest) return;
+      if (!shown) return;
       const robot = robotAt(event, number);
       order(event.shiftKey && robot !== null ? { do: "toggle", robot } : { do: "select", robot });
     });
     canvas.addEventListener("contextmenu", (event) => {
       event.preventDefault();
-      const robot = latest && robotAt(event, number);
+      const robot = shown && robotAt(event, number);
       if (robot !== null) order({ do: "toggle", robot });
     });
   }
