@@ -140,7 +140,7 @@ def test_a_study_plays_it(tmp_path: Path) -> None:
 
 
 def test_it_can_be_watched() -> None:
-    session = Session(SMALL, lambda: policies.load("swarm-dt=8,homing=2"), 2, [Fault("FM4", 3)])
+    session = Session(SMALL, "swarm-dt=8,homing=2", seed=2, faults=[Fault("FM4", 3)])
     session.play(1e6)
     played = run_episode(SMALL, policies.load("swarm-dt=8,homing=2"), 2, [Fault("FM4", 3)])
     assert list(session.curves[0].times) == played.delivery_times.tolist()
