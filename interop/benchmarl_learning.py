@@ -22,10 +22,12 @@ from interop.benchmarl_mappo import SwarmTask
 from interop.results import passes, runs_with
 from interop.torchrl_worlds import TorchRLWorlds
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
+from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.wrappers import MotionFrame
 
 SCENARIO = Scenario(n_robots=10, restock=True, duration=200.0)
 START: Any = policies.load("ppo-delivery")
+READ = [INPUTS.index(name) for name in START.card.network.inputs]
 REWARDS = {"own_delivery": 1.0, "lift_requested": 0.5, "approach": 0.1, "contact": -0.05}
 WORLDS, STEPS, ITERATIONS = 8, 125, 4
 SEEDS = range(10_000, 10_010)  # nothing was learned on them
@@ -121,7 +123,8 @@ def prepared(folder: str) -> Experiment:
         for number, layer in enumerate(layers):
             weight = torch.from_numpy(START.tensors[f"layers.{number}.weight"])
             layer.weight.zero_()
-            layer.weight[: len(weight)] = weight
+            columns = READ if number == 0 else slice(None)
+            layer.weight[: len(weight), columns] = weight
             layer.bias[: len(weight)] = torch.from_numpy(START.tensors[f"layers.{number}.bias"])
         # The last layer tells the noise as well: of each output the logarithm of its deviation.
         layers[-1].bias[len(weight) :] = torch.from_numpy(START.tensors["deviations"]).log()
