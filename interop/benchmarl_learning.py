@@ -2,7 +2,7 @@
 
 The warehouse of the paper, with 10 robots that read and command in the frame of their motion.
 From nothing it takes longer than this script should: after a million agent-steps of BenchMARL's in
-a warehouse of 6 m x 5 m P was 12, that of Swarm D-T 26.
+a warehouse of 6 m x 5 m P was 12, that of Swarm D-T 26, one training seed.
 """
 
 from __future__ import annotations
@@ -117,17 +117,17 @@ def prepared(folder: str) -> Experiment:
     )
     for loss in experiment.losses.values():
         loss.normalize_advantage = True
-    layers = [part for part in experiment.policy.modules() if isinstance(part, torch.nn.Linear)]
-    assert len(layers) == len(START.card.network.hidden) + 1
+    # TorchRL keeps the parameters beside the layers: weight and bias of each, one after another.
+    parts = list(experiment.policy.parameters())
+    weights, biases = parts[::2], parts[1::2]
     with torch.no_grad():
-        for number, layer in enumerate(layers):
-            weight = torch.from_numpy(START.tensors[f"layers.{number}.weight"])
-            layer.weight.zero_()
-            columns = READ if number == 0 else slice(None)
-            layer.weight[: len(weight), columns] = weight
-            layer.bias[: len(weight)] = torch.from_numpy(START.tensors[f"layers.{number}.bias"])
+        for number, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+            shipped = torch.from_numpy(START.tensors[f"layers.{number}.weight"])
+            weight.zero_()
+            weight[: len(shipped), READ if number == 0 else slice(None)] = shipped
+            bias[: len(shipped)] = torch.from_numpy(START.tensors[f"layers.{number}.bias"])
         # The last layer tells the noise as well: of each output the logarithm of its deviation.
-        layers[-1].bias[len(weight) :] = torch.from_numpy(START.tensors["deviations"]).log()
+        biases[-1][len(shipped) :] = torch.from_numpy(START.tensors["deviations"]).log()
     return experiment
 
 
