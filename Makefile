@@ -108,9 +108,10 @@ dist: $(DEV)/installed
 		(cd build/dist && bin/swarm-logistics run --seed 0 --set duration=20) || exit 1; \
 	done
 
-# What the page on the package index needs; changes README.md and pyproject.toml, so only a release calls it.
-absolute-links:
-	$(PYTHON) docs/absolute_links.py $(REPOSITORY) $(TAG)
+# For the page on the package index; it changes README.md and pyproject.toml, so only a release calls it, which knows the address.
+absolute-links: $(DEV)/installed
+	sed -i 's|^\[project.urls\]$$|&\nRepository = "$(REPOSITORY)"|' pyproject.toml
+	$(DEV)/bin/python docs/front_page.py
 
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .

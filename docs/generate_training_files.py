@@ -12,7 +12,6 @@ from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
-    Imitation,
     Indicators,
     PPOSettings,
     Scores,
@@ -26,7 +25,6 @@ TABLES = {
     "[[worlds]]": WorldKind,
     "[[conditions]]": Conditions,
     "[indicators]": Indicators,
-    "[imitation]": Imitation,
     "[ppo]": PPOSettings,
     "[evaluation]": Evaluation,
     "[scores]": Scores,

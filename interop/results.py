@@ -50,6 +50,7 @@ def raised(call: Callable[[], Any]) -> tuple[str, str]:
     except Exception as error:  # noqa: BLE001  # whatever the library raises is the result
         last = traceback.extract_tb(error.__traceback__)[-1]
         parts = Path(last.filename).parts
-        place = "/".join(parts[parts.index("site-packages") + 1 :])
+        first = parts.index("site-packages") + 1 if "site-packages" in parts else -2
+        place = "/".join(parts[first:])
         return f"{place}:{last.lineno} `{last.line}`", f"{type(error).__name__}: {error}"
     raise AssertionError(f"{call} passes: the report says that it fails")

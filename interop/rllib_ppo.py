@@ -9,7 +9,7 @@ from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
 from ray.tune.registry import register_env
 
-from interop.conditions import CONDITIONS, MAX_CYCLES, N_ROBOTS, plain
+from interop.conditions import CONDITIONS, MAX_CYCLES, plain, without_fixed_agents
 from interop.mpe2_swarm import FewerAgents
 from interop.results import fails_on_mpe2_too, passes, runs_with, same_line
 from swarm_logistics_env.adapters import CentralEnv
@@ -43,7 +43,7 @@ def main() -> None:
     for name in CONDITIONS:
         train(name, CENTRAL)
     proof = same_line(
-        lambda: rollout(ParallelPettingZooEnv(SwarmSize(plain(), [3, N_ROBOTS]))),
+        lambda: rollout(ParallelPettingZooEnv(without_fixed_agents(3))),
         lambda: rollout(ParallelPettingZooEnv(FewerAgents(first=2, then=3))),
     )
     fails_on_mpe2_too("ParallelPettingZooEnv, sizes that change, without FixedAgents", proof)

@@ -7,7 +7,14 @@ from typing import Any
 from torchrl.envs import GymEnv, PettingZooWrapper
 from torchrl.envs.utils import check_env_specs
 
-from interop.conditions import CONDITIONS, MAX_CYCLES, N_ROBOTS, plain, played
+from interop.conditions import (
+    CONDITIONS,
+    MAX_CYCLES,
+    N_ROBOTS,
+    plain,
+    played,
+    without_fixed_agents,
+)
 from interop.mpe2_swarm import FewerAgents
 from interop.results import fails_on_mpe2_too, passes, runs_with, same_line
 from swarm_logistics_env import swarm_logistics_v0
@@ -32,7 +39,7 @@ def main() -> None:
     passes(f"AEC, use_mask: {checked(aec)}")
     passes(f"GymEnv, all robots as one agent: {checked(GymEnv('SwarmLogistics-v0', **fields))}")
     proof = same_line(
-        lambda: checked(PettingZooWrapper(SwarmSize(plain(), [3, N_ROBOTS]), use_mask=True)),
+        lambda: checked(PettingZooWrapper(without_fixed_agents(N_ROBOTS), use_mask=True)),
         lambda: checked(PettingZooWrapper(FewerAgents(), use_mask=True)),
     )
     fails_on_mpe2_too("parallel, sizes that change, without FixedAgents", proof)

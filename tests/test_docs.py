@@ -40,6 +40,13 @@ def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
     assert comparable(said) == comparable(text), f"stale: run `python docs/blocks.py {page}`"
 
 
+@pytest.mark.parametrize("name", sorted(path.name for path in (DOCS / "notebooks").glob("*.ipynb")))
+def test_notebook_runs_and_prints_what_it_shows(name: str) -> None:
+    text = (DOCS / "notebooks" / name).read_text(encoding="utf-8")
+    recorded = runpy.run_path(str(DOCS / "notebooks.py"))["recorded"](text)
+    assert recorded == text, "stale: run `python docs/notebooks.py`"
+
+
 def test_every_block_has_a_language_that_is_checked() -> None:
     for name, text in PAGES.items():
         for block in BLOCKS["blocks"](text):
@@ -133,8 +140,10 @@ def test_site_builds_without_warnings(tmp_path: Path) -> None:
     index = json.loads((out / "searchindex.js").read_text("utf-8")[len("Search.setIndex(") : -1])
     for stems, page in ((("custom", "polici"), "extending"), (("csv", "import"), "trials")):
         for stem in stems:
-            places = index["terms"].get(stem, [])
-            found = [places] if isinstance(places, int) else places
+            found: list[int] = []
+            for part in ("terms", "titleterms"):
+                places = index[part].get(stem, [])
+                found += [places] if isinstance(places, int) else places
             assert index["docnames"].index(page) in found, f"{page}: {stem}"
     for built in out.glob("*.html"):
         loads = re.findall(r'(?:src|<link[^>]* href)="(https?:[^"]+)"', built.read_text("utf-8"))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from swarm_logistics_env.studies.engines import Engine
     from swarm_logistics_env.studies.plan import Plan
     from swarm_logistics_env.studies.results import StudyResults
-    from swarm_logistics_env.studies.shards import Shard
+    from swarm_logistics_env.studies.runs import Shard
     from swarm_logistics_env.studies.study import Tally
 
 StudyArgument = Annotated[
@@ -125,7 +125,7 @@ def run_command(
     import os
 
     from swarm_logistics_env.studies.engines import engine_named
-    from swarm_logistics_env.studies.shards import Shard
+    from swarm_logistics_env.studies.runs import Shard
 
     part = Shard.parse(shard) if shard else None
     chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed)
@@ -185,7 +185,7 @@ def merge_command(
     out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
 ) -> None:
     """Make one store of those that shards or machines have filled."""
-    from swarm_logistics_env.studies.shards import merge
+    from swarm_logistics_env.studies.metadata import merge
 
     typer.echo(f"{merge(directories, out)} runs in {out}")
 

@@ -187,6 +187,8 @@ function timesOf(gaps) {
 function drawCurves() {
   const place = at("curves"), width = Math.max(280, place.clientWidth), height = 220;
   const curves = chosen.arms.map((arm) => data.conditions[arm[2]].curves.map((gaps) => gaps && timesOf(gaps)));
+  place.parentElement.hidden = !curves.flat().some(Boolean);  // no times were recorded
+  if (place.parentElement.hidden) return;
   const end = Math.max(...chosen.arms.map((arm) => data.conditions[arm[2]].end));
   const most = Math.max(1, ...curves.flat().filter(Boolean).map((times) => times.length));
   const box = { left: 42, right: width - 12, top: 20, bottom: height - 24, low: 0, high: most * 1.05 };
@@ -215,7 +217,7 @@ function showRun() {
   });
   const found = data.replays.findIndex((one) => one.seed === seed && chosen.arms.some((arm) => arm[2] === one.conditions[0]));
   const watch = found < 0 ? "" : `<button type="button" data-replay="${found}">Watch this run here</button>`;
-  place.innerHTML = `<b>Seed ${seed}</b> ${watch}<br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
+  place.innerHTML = `<b>${data.paired ? "Seed" : "Run"} ${seed}</b> ${watch}<br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
 }
 
 // Replays: a run beside its twin, from positions kept as changes

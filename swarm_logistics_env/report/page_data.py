@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _MOST_REPLAYS = 3
-_MOST_TIMES = 250_000  # deliveries in the curves of a page: about half a megabyte
+_MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
 _STEPS_A_METRE = 50  # of positions in a replay
 
 

@@ -1,25 +1,24 @@
-"""Metadata: what a store says of its study besides the runs."""
+"""Metadata: what a store says of its study besides the runs, and one study merged of several."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 from pydantic_core import to_json
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.equivalence import MARGIN
+from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.runs import seeds_in_words
 from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
 from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT, NAMES, refuse_untrusted
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.studies.plan import Plan
 
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
@@ -87,20 +86,21 @@ class Metadata(BaseModel):
     imported: Json[Origin] | None = None
 
     @classmethod
-    def read(cls, notes: Mapping[str, object], path: Path | None) -> Self | None:
-        """Return what the rows of the store at `path` say; None: not all that is needed yet.
+    def of(cls, store: Store) -> Self | None:
+        """Return what a store notes; None: nothing yet, or not all that is needed.
 
         Raises:
             StudyError: a row does not read.
         """
-        if missing_in(notes):
+        notes = store.notes()
+        if _missing_in(notes):
             return None
         try:
             return cls.model_validate(notes, strict=True)
         except ValidationError as error:
             name = error.errors()[0]["loc"][0]
             raise StudyError(
-                f"the store {path} is damaged: its note {name!r} does not read"
+                f"the store {store.path} is damaged: its note {name!r} does not read"
             ) from None
 
     @property
@@ -111,8 +111,23 @@ class Metadata(BaseModel):
         return Declaration(seeds, self.declared_looks, self.declared_margin)
 
 
-def missing_in(notes: Mapping[str, object]) -> str | None:
-    """Return the name of a row that is missing; None: all that are needed are there."""
+def of_existing(directory: Path) -> Metadata:
+    """Return what the store of a study that was run or imported notes.
+
+    Raises:
+        StudyError: there is none, something is missing in it, or does not read.
+    """
+    with Store.existing(directory) as store:
+        found = Metadata.of(store)
+        if found is None:
+            raise StudyError(
+                f"the store in {directory} does not note its {_missing_in(store.notes())}: run the "
+                "study once more there (finished runs are kept), then it will"
+            )
+        return found
+
+
+def _missing_in(notes: Mapping[str, object]) -> str | None:
     needed = (name for name, field in Metadata.model_fields.items() if field.is_required())
     return next((name for name in needed if name not in notes), None)
 
@@ -120,7 +135,7 @@ def missing_in(notes: Mapping[str, object]) -> str | None:
 def rows_of(
     specification: object, code: str, identities: Mapping[str, str], declared: Declaration
 ) -> dict[str, str]:
-    """Return the rows that `Metadata.read` reads, of a study that is played."""
+    """Return the rows that `Metadata.of` reads, of a study that is played."""
     notes = {
         "specification": specification,
         "identities": dict(identities),
@@ -187,3 +202,86 @@ class Declaration:
 def _counted(seeds: Sequence[int]) -> str:
     count = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
     return f"{count} ({seeds_in_words(seeds)})"
+
+
+def merge(directories: Sequence[Path], out: Path) -> int:
+    """Write the runs of several stores into a new one; return how many runs it holds.
+
+    The studies must be one but for their seeds and their policies, of which the merged one has
+    all. A run that failed in one store and succeeded in another succeeded. Only the seeds that
+    every study declared count as declared, so verdicts over more of them are exploratory.
+
+    Args:
+        directories: of the studies.
+        out: directory of the merged one; it may hold theirs, but no study of its own.
+
+    Raises:
+        StudyError: a store cannot be read, the studies differ, seeds lie between theirs that none
+            has, two stores have different results of one run, or `out` holds a study.
+    """
+    refuse_study_in(out, "merge")
+    stored = {directory: of_existing(directory) for directory in directories}
+    for directory, found in stored.items():
+        if found.imported is not None:
+            raise StudyError(f"{directory} was imported: only studies that were run are merged")
+    merged = _united(stored)
+    with new_store(out) as store:
+        for directory in directories:
+            store.absorb(directory / FILE_NAME)
+        store.note(merged)
+        return len(store)
+
+
+def _united(stored: dict[Path, Metadata]) -> dict[str, str]:
+    """Return the metadata of studies as that of one."""
+    # Sort by seeds, so that each study joins the seeds of those before it.
+    first, *others = sorted(
+        stored, key=lambda directory: stored[directory].specification.first_seed
+    )
+    one = stored[first]
+    fields, identities, declared = one.specification.model_dump(), one.identities, one.declared
+    for directory in others:
+        other = stored[directory]
+        if other.code != one.code:
+            raise StudyError(
+                f"{first} was played under code version {one.code}, {directory} under "
+                f"{other.code}: a verdict never mixes two versions"
+            )
+        for name in ("looks", "margin"):
+            if getattr(other.declared, name) != getattr(declared, name):
+                raise StudyError(f"{first} and {directory} declared different {name}")
+        fields = _joined(fields, other.specification, first, directory)
+        for part in identities.keys() & other.identities.keys():
+            if identities[part] != other.identities[part]:
+                raise StudyError(
+                    f"the {part} of {first} is not the one of {directory}: its code differs"
+                )
+        identities = {**identities, **other.identities}
+        mine, theirs = declared.seeds, other.declared.seeds
+        both = range(max(mine.start, theirs.start), min(mine.stop, theirs.stop))
+        # Without a common seed any part will do: nobody declared the whole.
+        declared = replace(declared, seeds=both or mine)
+    return rows_of(fields, one.code, identities, declared)
+
+
+def _joined(
+    fields: dict[str, Any], other: StoredSpecification, first: Path, directory: Path
+) -> dict[str, Any]:
+    """Return the fields of a specification, with the seeds and the policies of another as well."""
+    theirs = other.model_dump()
+    free = ("first_seed", "seeds", "policies")
+    names = [name for name in {**fields, **theirs} if name not in free]
+    differing = [name for name in names if fields.get(name) != theirs.get(name)]
+    if differing:
+        raise StudyError(f"{first} and {directory} differ in {', '.join(differing)}: not one study")
+    stop = fields["first_seed"] + fields["seeds"]
+    if other.first_seed > stop:
+        raise StudyError(
+            f"{directory} has the seeds from {other.first_seed} on, the studies before it end with "
+            f"seed {stop - 1}: seeds lie between them that no study has, and to judge them as one "
+            "study each seed is needed"
+        )
+    seeds = max(stop, other.seed_numbers.stop) - fields["first_seed"]
+    policies = [*fields["policies"], *theirs["policies"]]
+    distinct = [policy for n, policy in enumerate(policies) if policy not in policies[:n]]
+    return {**fields, "seeds": seeds, "policies": distinct}

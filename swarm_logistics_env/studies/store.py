@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies.database import Database
-from swarm_logistics_env.studies.metadata import Metadata, missing_in
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -165,32 +164,14 @@ class Store:
                     row["delivery_times"] = _times(row["delivery_times"], row["delivered"]).tolist()
                 yield row
 
-    def metadata(self) -> Metadata | None:
-        """Return what was noted about the study; None: nothing yet, or not all that is needed."""
-        return Metadata.read(self._notes(), self.path)
-
-    def needed_metadata(self) -> Metadata:
-        """Return what was noted about the study.
-
-        Raises:
-            StudyError: something is missing or does not read.
-        """
-        notes = self._notes()
-        found = Metadata.read(notes, self.path)
-        if found is None:
-            raise StudyError(
-                f"the store {self.path} does not note its {missing_in(notes)}: run the study once "
-                "more there (finished runs are kept), then it will"
-            )
-        return found
-
     def note(self, notes: Mapping[str, str]) -> None:
         """Note facts about the study, by name; earlier ones of these names are replaced."""
         with self._database.transaction() as write:
             for row in notes.items():
                 write("INSERT OR REPLACE INTO notes VALUES (?, ?)", row)
 
-    def _notes(self) -> dict[str, object]:
+    def notes(self) -> dict[str, object]:
+        """Return what was noted about the study, by name."""
         rows = self._database.read("SELECT name, value FROM notes")
         return {row["name"]: row["value"] for row in rows}
 

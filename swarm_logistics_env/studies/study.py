@@ -14,11 +14,11 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import imported_plan
-from swarm_logistics_env.studies.metadata import Declaration, Metadata, rows_of
+from swarm_logistics_env.studies.metadata import Declaration, Metadata, of_existing, rows_of
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.shards import Shard
+from swarm_logistics_env.studies.runs import Shard
 from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.tasks.task import Task
@@ -113,8 +113,7 @@ class Study:
                 found.
         """
         out = Path(out)
-        with Store.existing(out) as store:
-            noted = store.needed_metadata()
+        noted = of_existing(out)
         specification = noted.specification.read(out, task=task, trust_code=trust_code)
         study = cls._of(specification, out)
         if noted.imported is not None:
@@ -224,7 +223,7 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            noted = store.metadata()
+            noted = Metadata.of(store)
             return judge(plan, store.outcomes(plan.runs()), noted.declared if noted else None)
 
     def results(self) -> pd.DataFrame:
@@ -267,7 +266,7 @@ class Study:
 
     def _own_metadata(self, store: Store) -> Metadata | None:
         """Return what the store says of this study; raise StudyError if it is another one's."""
-        noted = store.metadata()
+        noted = Metadata.of(store)
         if noted is None:
             return None
         if noted.imported is not None:

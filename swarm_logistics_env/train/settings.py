@@ -1,4 +1,4 @@
-"""The tables of a training file: worlds, conditions, imitation, PPO and what is measured."""
+"""The tables of a training file: worlds, conditions, PPO and what is measured."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
 
-Share = Annotated[float, Field(ge=0, le=1)]
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 
@@ -134,33 +133,6 @@ class Indicators(Part):
     initial: PositiveFloat = 30.0
     credit: Literal["team", "deliverer", "carriers"] = "team"
     constant: bool = True
-
-
-class Imitation(Part):
-    """A start from imitating the scripted policy `homing`, the expert, by DAgger.
-
-    Args:
-        rounds: of play and fit.
-        seconds: of play in a round [s].
-        sizes: swarm sizes that play side by side.
-        beta: the share of decisions that the expert takes, round by round; 0 in later rounds.
-        noise: standard deviation of what is added to the outputs played, one for each.
-        common_share: the share that is kept of the moments in which nothing rare happens.
-        fit, last_fit: gradient steps after a round, and after the last.
-        batch: samples in each.
-        learning_rate: of Adam; a fifth of it in the last 30 % of the steps.
-    """
-
-    rounds: PositiveInt = 6
-    seconds: PositiveFloat = 60.0
-    sizes: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (25, 10, 50, 5, 25, 15, 40)
-    beta: tuple[Share, ...] = (1.0, 0.3)
-    noise: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat] = (0.15, 0.15, 0.05)
-    common_share: Share = 0.12
-    fit: PositiveInt = 1200
-    last_fit: PositiveInt = 3000
-    batch: PositiveInt = 1024
-    learning_rate: PositiveFloat = 2e-3
 
 
 class PPOSettings(Part):

@@ -15,7 +15,6 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
-    Imitation,
     Indicators,
     Part,
     PPOSettings,
@@ -53,7 +52,6 @@ class Training(Part):
             added to them. Potentials are discounted by `ppo.gamma`.
         indicators: pays them instead of the task.
         conditions: kinds of episodes that are mixed; none: nobody fails.
-        imitation: what comes before PPO; none: it begins from nothing, or from `start`.
         network: what the policy reads and commands.
         ppo, evaluation, scores: see there.
 
@@ -74,7 +72,6 @@ class Training(Part):
     rewards: dict[str, float] = Field(default_factory=lambda: {"delivery": 1.0})
     indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
-    imitation: Annotated[Imitation | None, BeforeValidator(one_of(Imitation))] = None
     network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
     ppo: Annotated[PPOSettings, BeforeValidator(one_of(PPOSettings))] = PPOSettings()
     evaluation: Annotated[Evaluation, BeforeValidator(one_of(Evaluation))] = Evaluation()
@@ -101,15 +98,6 @@ class Training(Part):
         if any(scenario.message_size for scenario in scenarios):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         played = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
-        if self.imitation is not None:
-            played |= set(self.imitation.sizes)
-            if self.imitation.seconds < self.scenario.control_period:
-                raise ValueError(
-                    f"imitation.seconds = {self.imitation.seconds}: should be at least the "
-                    f"control period, {self.scenario.control_period} s"
-                )
-            if self.start is not None:
-                raise ValueError(f"start = {self.start!r}: should be left out beside `imitation`")
         for size in sorted(played):
             self.scenario.replace(n_robots=size)
         for world in self.worlds:

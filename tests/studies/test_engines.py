@@ -14,8 +14,8 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT, identity
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.engines import engine_named, execute, expected_seconds
-from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
-from swarm_logistics_env.studies.shards import Shard, merge
+from swarm_logistics_env.studies.metadata import merge
+from swarm_logistics_env.studies.runs import Condition, Shard, StudiedPolicy
 from swarm_logistics_env.studies.store import Store, export
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE

@@ -11,7 +11,8 @@ import pytest
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.shards import Shard, merge
+from swarm_logistics_env.studies.metadata import merge, of_existing
+from swarm_logistics_env.studies.runs import Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 
@@ -87,8 +88,7 @@ def test_shards_of_one_declared_study_stay_as_declared(tmp_path: Path) -> None:
 def test_merged_study_keeps_its_declared_margin(tmp_path: Path) -> None:
     parts = [played(tmp_path / name, margin=0.2) for name in ("one", "other")]
     merge(parts, tmp_path / "both")
-    with Store.existing(tmp_path / "both") as store:
-        assert store.needed_metadata().declared.margin == 0.2
+    assert of_existing(tmp_path / "both").declared.margin == 0.2
     assert not Study.stored(tmp_path / "both").findings().late_margin
 
 

@@ -137,7 +137,7 @@ def test_store_that_may_not_be_written_is_read_and_left_as_it_is(
     monkeypatch.setattr(os, "access", lambda *_: False)
     with Store.existing(directory) as store:
         assert store.succeeded() == {run(0).key}
-        assert store.metadata() is None
+        assert store.notes() == {}
         with pytest.raises(StudyError, match="readonly database"):
             store.add(run(1), outcome(run(1), [1.0]))
         assert list(directory.iterdir()) == [path]
@@ -191,7 +191,7 @@ def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
                 assert maker.stdout is not None
                 assert maker.stdout.readline() == "made\n"
             with Store.existing(directory) as store:
-                assert store._notes() == {"0": "here", "1": "here"}
+                assert store.notes() == {"0": "here", "1": "here"}
 
 
 def test_store_is_there_once_it_is_whole(tmp_path: Path) -> None:
@@ -199,7 +199,7 @@ def test_store_is_there_once_it_is_whole(tmp_path: Path) -> None:
         store.note({"name": "value"})
         refuse_study_in(tmp_path / "new", "merge")
     with Store.existing(tmp_path / "new") as store:
-        assert store._notes() == {"name": "value"}
+        assert store.notes() == {"name": "value"}
     assert [path.name for path in (tmp_path / "new").iterdir()] == [FILE_NAME]
     with pytest.raises(StudyError, match="holds a study already: merge into a new directory"):
         refuse_study_in(tmp_path / "new", "merge")

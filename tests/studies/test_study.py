@@ -24,8 +24,7 @@ from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.indicator_table import INDICATORS
 from swarm_logistics_env.studies.performance_table import PERFORMANCE
-from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.studies.shards import Shard
+from swarm_logistics_env.studies.runs import Run, Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store, export
 from swarm_logistics_env.tasks.task import Outcome
 

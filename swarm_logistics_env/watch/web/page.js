@@ -119,7 +119,7 @@ function trailsUntil(nth, number) {
 function showNow(now) {
   drawn = now;
   element("clock").textContent = `${now.time.toFixed(1)} s`;
-  drawStrip(element("strip"), now, now.time, fixed.curves);
+  drawStrip(element("strip"), now, now.time, recorded ? frames.at(-1).time : now.scenario.duration, fixed.curves);
   const total = now.scenario.restock ? "" : ` of ${now.scenario.n_items}`;
   for (const number of [0, 1]) element(`delivered${number}`).textContent = `${now[`deliveries${number}`].length}${total} delivered`;
 }
@@ -251,7 +251,7 @@ function listen() {
   element("help_button").addEventListener("click", help);
   element("help").addEventListener("click", () => element("help").close());
   element("strip").addEventListener("click", ({ offsetX, target }) => {
-    if (recorded) playhead = ((offsetX - 30) / (target.clientWidth - 46)) * latest.scenario.duration;
+    if (recorded) playhead = ((offsetX - 30) / (target.clientWidth - 46)) * frames.at(-1).time;
   });
   for (const [, label, meaning] of KEYS) {
     const row = element("keys").insertRow();

@@ -2,17 +2,17 @@
 
 // Draws the panels: deliveries over time, R and FT with their intervals, what a robot senses.
 
-function drawStrip(canvas, now, time, curves) {
+function drawStrip(canvas, now, time, end, curves) {
   const { pen, width, height } = prepared(canvas), [left, right, bottom, top] = [30, width - 16, height - 20, 6];
   const counts = [0, 1].map((number) => now[`deliveries${number}`]);
   const most = [5, 10, 20, 50, 100, 200, 500, 1000, 1e4, 1e5].find((limit) => Math.max(...counts.map((times) => times.length)) <= limit);
-  const at = (moment, count) => [left + (right - left) * Math.min(1, moment / now.scenario.duration), bottom - ((bottom - top) * count) / most];
+  const at = (moment, count) => [left + (right - left) * Math.min(1, moment / end), bottom - ((bottom - top) * count) / most];
   pen.font = "12px system-ui, sans-serif";
   pen.fillStyle = colours.FLOOR;
   pen.fillRect(left, top, right - left, bottom - top);
   pen.textBaseline = "middle";
   for (let nth = 0; nth <= 4; nth++) {
-    const moment = (nth / 4) * now.scenario.duration;
+    const moment = (nth / 4) * end;
     line(pen, [at(moment, 0), at(moment, most)], 1, colours.FLOOR_LINE);
     pen.fillStyle = colours.INK;
     pen.textAlign = nth === 4 ? "right" : "center";

@@ -46,25 +46,7 @@ class Recording:
         self.note()
         frames = ",".join(self._messages)
         text = f'{{"fixed":{encode(fixed_data(self._session))},"frames":[{frames}]}}'
-        packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode()
-        page, css, *scripts = (
-            resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-            for name in ("page.html", "page.css", "draw.js", "panel.js", "page.js")
-        )
-        script = "\n".join(scripts)
-        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-        policy = (
-            f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
-            "img-src data:; base-uri 'none'; form-action 'none'"
-        )
-        head, tail = page.split("<!-- files -->")[0], page.split("<!-- /files -->")[1]
-        body, end = tail.split("<!-- scripts -->")[0], tail.split("<!-- /scripts -->")[1]
-        return (
-            f'{head}<meta http-equiv="Content-Security-Policy" content="{policy}">'
-            f"<style>{css}</style>{body}"
-            f'<script type="application/octet-stream" id="recording">{packed}</script>'
-            f"<script>{script}</script>{end}"
-        )
+        return _page_around(text)
 
 
 def recorded_page(session: Session, until: float) -> str:
@@ -75,3 +57,25 @@ def recorded_page(session: Session, until: float) -> str:
         session.advance()
         recording.note()
     return recording.page()
+
+
+def _page_around(text: str) -> str:
+    packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode()
+    page, css, *scripts = (
+        resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+        for name in ("page.html", "page.css", "draw.js", "panel.js", "page.js")
+    )
+    script = "\n".join(scripts)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+    head, tail = page.split("<!-- files -->")[0], page.split("<!-- /files -->")[1]
+    body, end = tail.split("<!-- scripts -->")[0], tail.split("<!-- /scripts -->")[1]
+    return (
+        f'{head}<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        f"<style>{css}</style>{body}"
+        f'<script type="application/octet-stream" id="recording">{packed}</script>'
+        f"<script>{script}</script>{end}"
+    )

@@ -79,13 +79,19 @@ class WatchServer:
         self.recording, self.replicas = Recording(session), Replicas()
         self.address = ""
         self._pages: dict[web.WebSocketResponse, dict[str, Any]] = {}
-        app = web.Application(middlewares=[web.middleware(self._guard)])
+
+        @web.middleware
+        async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+            self._check(request)
+            return await handler(request)
+
+        app = web.Application(middlewares=[guard])
         app.router.add_get("/{token}/live", self._live)
         app.router.add_get("/{token}/recording.html", self._save)
         app.router.add_get("/{token}/{name:.*}", self._file)
         app.on_response_prepare.append(_add_headers)
-        # Requests that are no HTTP are the sender's affair; our own errors are shown.
         logger = logging.getLogger(__name__)
+        logger.addFilter(_is_own_error)
         self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
 
     async def start(self) -> None:
@@ -172,7 +178,7 @@ class WatchServer:
         page = await asyncio.to_thread(self.recording.page)
         return self._web.Response(text=page, content_type="text/html", headers=headers)
 
-    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+    def _check(self, request: web.Request) -> None:
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
         own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0])
         token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
@@ -180,7 +186,13 @@ class WatchServer:
         if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
             raise self._web.HTTPForbidden(text=text)
-        return await handler(request)
+
+
+def _is_own_error(record: logging.LogRecord) -> bool:
+    """Return whether an error is ours: requests that are no HTTP are answered and not shown."""
+    from aiohttp.http_exceptions import HttpProcessingError
+
+    return not (record.exc_info and isinstance(record.exc_info[1], HttpProcessingError))
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
