@@ -29,7 +29,8 @@ def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone(
     names = {"name": same_mix.name, "about": same_mix.about}
     assert indicator.replace(**reward, **names) == same_mix
     names = {"name": deliveries.name, "about": deliveries.about}
-    assert same_mix.replace(conditions=(), **names) == deliveries
+    worlds = tuple(world.replace(conditions=()) for world in same_mix.worlds)
+    assert same_mix.replace(conditions=(), worlds=worlds, **names) == deliveries
 
 
 def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
