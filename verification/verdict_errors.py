@@ -24,7 +24,7 @@ FAMILY = 12
 EDGE = 0.1
 _CHUNK = 300  # studies whose resamples fit into memory at once
 
-Floats = NDArray[np.floating[Any]]
+Floats = NDArray[Any]
 Draw = Callable[[np.random.Generator, tuple[int, ...], float], tuple[Floats, Floats]]
 
 
