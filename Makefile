@@ -23,22 +23,22 @@ MINARI    := .venvs/minari
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist format clean
+.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
-	@echo "make tables          play the studies behind the README's tables (a quarter of an hour) and write the tables"
+	@echo "make tables          play the studies behind docs/results.md (half an hour), write its tables, the README's numbers and the score cards"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make check           lint and types only"
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
 	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
-	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; equal parameters from equal seeds"
+	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"
 	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, AgileRL, SuperSuit, Minari and two plain loops on the environment; see interop/"
 	@echo "make tasks           studies of RWARE, simple_spread and VMAS, with their tests; checks the numbers of their pages"
 	@echo "make docs            the documentation site, site/index.html"
-	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them"
+	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -80,18 +80,11 @@ benchmark: $(BENCHMARK)/installed $(PEERS)/installed
 
 benchmark-learning: $(SUPERSUIT)/installed
 	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
+	$(SUPERSUIT)/bin/python -m benchmarks.learning_speed
 
-interop: $(addsuffix /installed,$(TORCHRL) $(BENCHMARL) $(SKRL) $(RLLIB) $(SUPERSUIT) $(AGILERL) $(MINARI))
-	$(TORCHRL)/bin/python -m interop.torchrl_specs
-	$(TORCHRL)/bin/python -m interop.torchrl_collector
-	$(TORCHRL)/bin/python -m interop.plain_ppo
-	$(TORCHRL)/bin/python -m interop.discrete_loop
-	$(BENCHMARL)/bin/python -m interop.benchmarl_mappo
-	$(SKRL)/bin/python -m interop.skrl_ippo
-	$(SUPERSUIT)/bin/python -m interop.supersuit_wrappers
-	$(RLLIB)/bin/python -m interop.rllib_ppo
-	$(AGILERL)/bin/python -m interop.agilerl_ippo
-	$(MINARI)/bin/python -m interop.minari_dataset
+# Makes the environment of each library by the rule below, and runs its scripts there.
+interop:
+	$(PYTHON) -m interop
 
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks
@@ -104,10 +97,21 @@ docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate_training_files.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
 
+# Each distribution is installed in an environment of its own and plays an episode, away from this tree.
 dist: $(DEV)/installed
-	rm -rf dist
+	rm -rf dist build/dist
 	$(DEV)/bin/python -m build
 	$(DEV)/bin/python -m twine check --strict dist/*
+	for file in dist/*; do \
+		$(PYTHON) -m venv --clear build/dist && \
+		build/dist/bin/python -m pip install --quiet $$file && \
+		(cd build/dist && bin/swarm-logistics run --seed 0 --set duration=20) || exit 1; \
+	done
+
+# For the page on the package index; it changes README.md and pyproject.toml, so only a release calls it, which knows the address.
+absolute-links: $(DEV)/installed
+	sed -i 's|^\[project.urls\]$$|&\nRepository = "$(REPOSITORY)"|' pyproject.toml
+	$(DEV)/bin/python docs/front_page.py
 
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .
@@ -117,24 +121,24 @@ clean:
 	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,docs,study,render,train
+$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
-$(TORCHRL)/installed: OTHERS := torch torchrl
+$(TORCHRL)/installed: OTHERS := torch torchrl mpe2
 $(BENCHMARL)/installed: OTHERS := torch benchmarl
 $(SKRL)/installed: OTHERS := torch skrl
-$(RLLIB)/installed: OTHERS := torch "ray[rllib]"
+$(RLLIB)/installed: OTHERS := torch "ray[rllib]" mpe2
 $(TASKS)/installed: EXTRAS := study,tasks
 $(TASKS)/installed: OTHERS := hypothesis pytest
 $(AGILERL)/installed: OTHERS := torch agilerl peft
 $(MINARI)/installed: OTHERS := "minari[create,hdf5]"
 $(SUPERSUIT)/installed: EXTRAS := train
-$(SUPERSUIT)/installed: OTHERS := supersuit
+$(SUPERSUIT)/installed: OTHERS := supersuit mpe2
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
 .venvs/lowest.txt: pyproject.toml verification/lowest.py
 	@mkdir -p $(@D)
-	$(PYTHON) verification/lowest.py study render > $@
+	$(PYTHON) verification/lowest.py study render watch > $@
 
 .venvs/lowest/wheel: BOUNDS := --constraint .venvs/lowest.txt
 .venvs/newest/wheel: BOUNDS := --upgrade --upgrade-strategy eager
@@ -146,7 +150,7 @@ $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(@D)/bin/python -m pip wheel --no-deps --wheel-dir build/wheels .
 	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
 	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
-		"$$(echo build/wheels/*.whl)[study,render]" build hypothesis pytest pytest-xdist setuptools
+		"$$(echo build/wheels/*.whl)[study,render,watch]" build hypothesis pytest pytest-xdist setuptools
 
 # What is measured beside this package: an environment of their own, as their requirements clash
 # with ours. One that cannot be installed is named in the benchmark's table.

@@ -25,10 +25,22 @@ INFOS = [
     ("`active`", "0 or 1", "with `FixedAgents` only: 1 if the agent's robot is there"),
 ]
 
+# What -1, 0 and 1 do.
+COMMANDS = {
+    "forward": ("back at top speed", "no motion", "ahead at top speed"),
+    "left": ("to the right at top speed", "no motion", "to the left at top speed"),
+    "turn": ("right at the top turn rate", "no turn", "left at the top turn rate"),
+    "gripper": ("below -0.5: opens", "keeps its state", "above 0.5: holds"),
+}
+
 TEXT = """\
 # Swarm logistics
 
 <!-- Written by docs/generate.py from the code; change that, not this. -->
+
+```{{figure}} media/warehouse.png
+:alt: A swarm of 16 robots in a warehouse seen from above
+```
 
 A swarm fetches requested items from the storage of a warehouse to its delivery area. Each robot uses only its own sensors.
 
@@ -70,9 +82,9 @@ With `message_size` M above 0, `neighbour_message` follows: M numbers in [-1, 1]
 
 ## Action space
 
-The space is `Box(-1, 1, (4,), float32)` with the columns {commands}. Forward and left are fractions of the top speed; turn is a fraction of
-the top turn rate, to the left. The gripper holds above 0.5, opens below -0.5 and keeps its state between these. Values beyond the bounds are
-clipped. With `message_size` M, M numbers to broadcast follow.
+The space is `Box(-1, 1, (4,), float32)`. Values beyond the bounds are clipped. With `message_size` M, M numbers to broadcast follow.
+
+{commands}
 
 ## State
 
@@ -84,6 +96,11 @@ item it has {item_features}; the last number is the time [s].
 The reward is the weighted sum of these terms, for example `parallel_env(rewards={{"own_delivery": 1.0, "contact": -0.1}})`.
 
 {rewards}
+
+The difference of a potential $\\Phi$ is paid as $\\gamma \\Phi(s') - \\Phi(s)$, which leaves the best behaviour as it is (Ng et al. 1999): what a lift pays is
+taken back by the delivery. It needs the learner's discount $\\gamma$ among the weights, as `{{"own_delivery": 1.0, "carrying": 0.5, "discount": 0.99}}`; in
+a training file it is `ppo.gamma`. `approach` can be earned in circles: a robot that puts the item down, steps back and lifts it from there has
+brought it back unpaid.
 
 ## Episode end
 
@@ -157,7 +174,10 @@ def page() -> str:
         ),
         last=scenario.n_robots - 1,
         observations=observation_table(scenario),
-        commands=", ".join(COMMAND_COLUMNS),
+        commands=table(
+            ("column", "name", "-1", "0", "1"),
+            [(place, f"`{name}`", *COMMANDS[name]) for place, name in enumerate(COMMAND_COLUMNS)],
+        ),
         state_length=env.state_space.shape[0],
         robot_features=", ".join(ROBOT_FEATURES),
         item_features=", ".join(ITEM_FEATURES),

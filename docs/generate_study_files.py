@@ -28,6 +28,10 @@ TEXT = """\
 
 <!-- Written by docs/generate_study_files.py from the code; change that, not this. -->
 
+```{{figure}} media/flow-study_files.svg
+:alt: From a study file over its plan and its runs to a report
+```
+
 A study is a TOML file, or the same fields in Python: `Study(policies=[...], seeds=20, faults=[{{"modes": ["FM1"]}}])`. An unknown field is an
 error, which suggests the nearest known field. Each factor that the study varies is a table, and each table may come several times:
 
@@ -44,7 +48,8 @@ error, which suggests the nearest known field. Each factor that the study varies
 
 ## Presets
 
-`swarm-logistics study run NAME` knows these without a file:
+`swarm-logistics study run NAME` knows these by name. Each is a study file in `swarm_logistics_env/studies/preset_studies/`, from which a study of
+your own may start:
 
 {presets}
 

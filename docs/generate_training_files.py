@@ -12,7 +12,6 @@ from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
-    Imitation,
     Indicators,
     PPOSettings,
     Scores,
@@ -26,7 +25,6 @@ TABLES = {
     "[[worlds]]": WorldKind,
     "[[conditions]]": Conditions,
     "[indicators]": Indicators,
-    "[imitation]": Imitation,
     "[ppo]": PPOSettings,
     "[evaluation]": Evaluation,
     "[scores]": Scores,
@@ -36,6 +34,10 @@ TEXT = """\
 # Training files
 
 <!-- Written by docs/generate_training_files.py from the code; change that, not this. -->
+
+```{{figure}} media/flow-training_files.svg
+:alt: From a training file over the training to a policy file
+```
 
 A training is a TOML file. An unknown field is an error, which suggests the nearest known field. [Training](training.md) explains how
 trainings work.

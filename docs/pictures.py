@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +16,7 @@ from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import film_colours
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web import WatchServer
+from swarm_logistics_env.watch.web import recorded_page
 from verification.browser import Browser
 
 MEDIA = Path(__file__).parent / "media"
@@ -40,33 +38,21 @@ def scene(seconds: float, faults: tuple[Fault, ...] = ()) -> NDArray[np.uint8]:
 
 
 def browser_view(name: str) -> None:
-    """Photograph the page that `swarm-logistics watch` serves, with a headless Chromium."""
-    session = Session(Scenario(), lambda: policies.load("swarm-dt"), seed=1)
-    for seconds, broken in ((60.0, (2, 7, 9)), (90.0, (12, 20)), (240.0, ())):
-        while session.run.world.state.time < seconds:
-            session.play(0.1)
-        for robot in broken:
-            session.break_robot(robot)
-    session.select(9)
-    session.pause()
-    with (
-        WatchServer(session, "swarm-dt", port=0) as server,
-        tempfile.TemporaryDirectory() as folder,
-    ):
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        browser = Browser(Path(folder), (1280, 960))
+    """Keep a recording of a run, and photograph it with a headless Chromium."""
+    faults = [Fault("FM4", [2, 7, 9], onset=60.0), Fault("FM4", [12, 20], onset=90.0)]
+    session = Session(Scenario(), seed=1, faults=faults, speed=8.0)
+    page = MEDIA / "run.html"
+    page.write_text(recorded_page(session, 150.0), encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        browser = Browser(Path(folder), (1280, 860))
         try:
-            browser.open(server.address)
-            browser.wait_for("document.querySelectorAll('#row tr').length")
-            browser.click_on("#trails")
-            browser.wait_for("view.trails.length")
-            time.sleep(0.5)  # until they are drawn
+            browser.open(page.as_uri())
+            browser.wait_for("latest && playhead > 0")
+            browser.value("latest.paused = true, playhead = 149")
+            browser.wait_for("drawn && drawn.time >= 148")
             (MEDIA / name).write_bytes(browser.screenshot())
         finally:
             browser.close()
-            server.shutdown()
-            thread.join()
     Image.open(MEDIA / name).convert("RGB").save(MEDIA / name, optimize=True)
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from play_tables import OUT, ROOT, play, rewritten
+from front_page import rewritten
+from play_tables import OUT, ROOT, play
 from record_tables import table
 
 from swarm_logistics_env.report import wording

@@ -1,4 +1,6 @@
-"""Plays the studies behind the README's tables and writes the tables: `python docs/play_tables.py`.
+"""Plays the studies behind docs/results.md and writes its tables: `python docs/play_tables.py`.
+
+From these tables follow the README's numbers and picture, and `judge` gets its score cards.
 
 What is played is kept, so that a second call plays nothing, and one after an interruption the rest.
 Costs are not measured here: their table is written from what `make benchmark` left, if it did.
@@ -8,16 +10,19 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
+import front_page
+import score_cards
+from front_page import rewritten
 from table_blocks import costs_block, paper_block, policies_block
 
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
 
 ROOT = Path(__file__).parents[1]
-README = ROOT / "README.md"
+PAGE = ROOT / "docs" / "results.md"
 OUT = ROOT / "results" / "tables"
 BENCHMARK = ROOT / "results" / "benchmark" / "benchmark.json"
 # No seed from here on was used to fit, train, tune or choose anything: defaults were fitted on the
@@ -25,9 +30,6 @@ BENCHMARK = ROOT / "results" / "benchmark" / "benchmark.json"
 FIRST_SEED = 20_000
 SEEDS, SEEDS_WHERE_SKEWED = 20, 100
 PROCESSES = os.cpu_count() or 1
-
-_BLOCK = "<!-- tables: {name} -->"
-_END = "<!-- end of tables -->"
 
 
 def paper_studies(out: Path) -> tuple[Study, ...]:
@@ -72,31 +74,17 @@ def play(studies: Iterable[Study]) -> list[StudyResults]:
     return found
 
 
-def rewritten(text: str, blocks: Mapping[str, str]) -> str:
-    """Return a page with other text between the markers of each block.
-
-    Raises:
-        SystemExit: a block has no pair of markers.
-    """
-    for name, block in blocks.items():
-        start = _BLOCK.format(name=name)
-        before, found, rest = text.partition(start)
-        _, ended, after = rest.partition(_END)
-        if not found or not ended:
-            raise SystemExit(f"the page has no {start} followed by {_END}")
-        text = f"{before}{start}\n\n{block}\n\n{_END}{after}"
-    return text
-
-
 def main() -> None:
-    """Play, and rewrite the README."""
+    """Play, rewrite the page of results, then the README, and record the score cards."""
     blocks = {
         "paper": paper_block(play(paper_studies(OUT))),
         "policies": policies_block(*play(policy_studies(OUT))),
     }
     if BENCHMARK.exists():
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
-    README.write_text(rewritten(README.read_text(encoding="utf-8"), blocks), encoding="utf-8")
+    PAGE.write_text(rewritten(PAGE.read_text(encoding="utf-8"), blocks), encoding="utf-8")
+    front_page.main()
+    score_cards.main()
 
 
 if __name__ == "__main__":

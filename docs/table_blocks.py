@@ -1,4 +1,4 @@
-"""The README's tables as Markdown, with the sentences that quote the same numbers."""
+"""The tables of docs/results.md as Markdown, with the sentences that quote the same numbers."""
 
 from __future__ import annotations
 

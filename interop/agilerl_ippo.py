@@ -11,23 +11,23 @@ from agilerl.training.train_multi_agent_on_policy import train_multi_agent_on_po
 from agilerl.vector.pz_async_vec_env import AsyncPettingZooVecEnv
 
 from interop.conditions import CONDITIONS, MAX_CYCLES, played
-from interop.versions import versions
+from interop.results import passes, runs_with
 
 STEPS = 4 * MAX_CYCLES
 
 
 def main() -> None:
     """Train in every condition, in one environment and in two processes."""
-    print(versions("agilerl", "torch", "pettingzoo", "gymnasium"))
+    runs_with("agilerl", "torch", "pettingzoo", "gymnasium")
     warnings.simplefilter("ignore", DeprecationWarning)
     for name, make in CONDITIONS.items():
         env = make()
         train(env, env)
-        print(f"IPPO, {STEPS} steps, {played(name, env)}")
+        passes(f"IPPO, {STEPS} steps, {played(name, env)}")
         vector = AsyncPettingZooVecEnv([make, make])
         train(vector, make())
         vector.close()
-        print(f"IPPO, {STEPS} steps in two processes, {name}")
+        passes(f"IPPO, {STEPS} steps in two processes, {name}")
 
 
 def train(env: Any, like: Any) -> None:

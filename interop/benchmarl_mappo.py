@@ -13,17 +13,20 @@ from benchmarl.models.mlp import MlpConfig
 from torchrl.envs import PettingZooWrapper
 
 from interop.conditions import CONDITIONS, MAX_CYCLES, played
-from interop.versions import versions
+from interop.results import passes, runs_with
 
 FRAMES = 200
 ITERATIONS = 2
 
 
 class SwarmTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in the gate
-    """The environment as a task of BenchMARL's, with `state` for the critic."""
+    """The environment in a condition as a task of BenchMARL's, with `state` for the critic.
+
+    Its `config` is {"condition": a name, "made": a list that gets the environments}.
+    """
 
     def get_env_fun(self, num_envs: int, continuous_actions: bool, seed: Any, device: Any) -> Any:
-        """Return a maker of the environment that `config` names."""
+        """Return a maker of the environment."""
 
         def make() -> PettingZooWrapper:
             env = CONDITIONS[self.config["condition"]]()
@@ -63,7 +66,7 @@ class SwarmTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in t
 
 def main() -> None:
     """Train in every condition for two iterations, each with an evaluation."""
-    print(versions("benchmarl", "torchrl", "tensordict", "torch", "pettingzoo", "gymnasium"))
+    runs_with("benchmarl", "torchrl", "tensordict", "torch", "pettingzoo", "gymnasium")
     for name in CONDITIONS:
         with tempfile.TemporaryDirectory() as folder:
             train(name, folder)
@@ -93,7 +96,7 @@ def train(name: str, folder: str) -> None:
     assert torch.isfinite(after).all()
     assert not torch.equal(after, before)
     assert experiment.total_frames == ITERATIONS * FRAMES, experiment.total_frames
-    print(f"MAPPO, {ITERATIONS * FRAMES} frames, {ITERATIONS} updates, {played(name, *made)}")
+    passes(f"MAPPO, {ITERATIONS * FRAMES} frames, {ITERATIONS} updates, {played(name, *made)}")
 
 
 def parameters(policy: Any) -> torch.Tensor:

@@ -58,6 +58,16 @@ def with_both(inner: Wrap = lambda env: env) -> Wrapper:
     return FixedAgents(Noted(FaultInjection(sizes, "FM1", robots=2, onset=0.0)))
 
 
+def without_fixed_agents(first: int) -> Wrapper:
+    """Return one of 3 or 5 robots, by the episode, whose next episode has `first`."""
+    env = SwarmSize(plain(), [3, N_ROBOTS])
+    seed = 0
+    while len(env.reset_arrays(seed)) != first:
+        seed += 1
+    env.unwrapped.next_seed = seed
+    return env
+
+
 CONDITIONS: dict[str, Callable[..., Any]] = {
     "2 of 5 robots fail at 0 s": with_faults,
     "FixedAgents, 3 or 5 robots, 1 leaves": with_sizes,

@@ -9,7 +9,7 @@ import torch
 from torch import nn
 
 from interop.conditions import CONDITIONS, MAX_CYCLES, played
-from interop.versions import versions
+from interop.results import passes, runs_with
 from swarm_logistics_env.wrappers import DiscreteActions
 
 EPISODES = 12
@@ -48,12 +48,12 @@ class TupleEnv:
 
 def main() -> None:
     """Learn for a few episodes in every condition."""
-    print(versions("torch", "pettingzoo", "gymnasium"))
+    runs_with("torch", "pettingzoo", "gymnasium")
     for name, make in CONDITIONS.items():
         env = make(DiscreteActions)
         steps, loss = learn(TupleEnv(env))
         assert np.isfinite(loss), loss
-        print(f"VDN by numbers, {steps} steps, loss {loss:.4f}, {played(name, env)}")
+        passes(f"VDN as in EPyMARL, actions by number, {steps} steps, {played(name, env)}")
 
 
 def learn(env: TupleEnv) -> tuple[int, float]:

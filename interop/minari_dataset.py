@@ -11,7 +11,7 @@ import numpy as np
 from minari import DataCollector, load_dataset
 
 from interop.conditions import MAX_CYCLES, N_ROBOTS, plain
-from interop.versions import versions
+from interop.results import passes, runs_with
 from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.environment.registration import GYMNASIUM_ID
 from swarm_logistics_env.wrappers import FaultInjection, SwarmSize
@@ -22,7 +22,7 @@ FAULTS = [{"mode": "FM1", "robots": 2}]
 
 def main() -> None:
     """Record episodes with faults from 0 s, by name, and with sizes that change."""
-    print(versions("minari", "gymnasium"))
+    runs_with("minari", "gymnasium")
     with tempfile.TemporaryDirectory() as folder:
         os.environ["MINARI_DATASETS_PATH"] = folder
         fields: dict[str, Any] = {"n_robots": N_ROBOTS, "max_cycles": MAX_CYCLES, "flat": True}
@@ -32,7 +32,7 @@ def main() -> None:
         first, info = again.reset(seed=0)
         assert info["failed"].sum() == 2, info
         assert first.tobytes() == named.reset(seed=0)[0].tobytes()
-        print("the environment that the data set names begins with the same rows")
+        passes("recover_environment: the same first rows, 2 failed at 0 s")
 
         sizes = SwarmSize(plain(), [3, N_ROBOTS], leave=[(1, 1.0)])
         both = CentralEnv(FaultInjection(sizes, "FM1", robots=2), flat=True)
@@ -63,7 +63,7 @@ def recorded(name: str, dataset: str, env: Any, n_failed: set[int], **arguments:
         rows += len(episode.observations)
         told += episode.rewards.tolist()
     assert told == paid
-    print(f"{name}: {EPISODES} episodes, {rows} rows of {env.observation_space.shape[0]} numbers")
+    passes(f"CentralEnv, flat, DataCollector, {EPISODES} episodes, {rows} rows read again: {name}")
 
 
 if __name__ == "__main__":

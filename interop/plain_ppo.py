@@ -9,21 +9,27 @@ import numpy as np
 import torch
 from torch import nn
 
-from interop.versions import versions
-from swarm_logistics_env import swarm_logistics_v0
+from interop.conditions import CONDITIONS, MAX_CYCLES, played
+from interop.results import passes, runs_with
 
-EPISODES = 4
-STEPS = 128  # of an episode
+EPISODES = 6
 EPOCHS = 2
-BATCH = 128
+BATCH = 50
 DISCOUNT, TRACE, CLIP = 0.99, 0.95, 0.2
 
 
 def main() -> None:
-    """Collect an episode, update on it, four times over."""
-    print(versions("torch", "pettingzoo", "gymnasium"))
+    """Learn in every condition."""
+    runs_with("torch", "pettingzoo", "gymnasium")
+    for name, make in CONDITIONS.items():
+        env = make()
+        learn(env)
+        passes(f"PPO over the dicts, {EPISODES} updates, {played(name, env)}")
+
+
+def learn(env: Any) -> None:
+    """Collect an episode, update on it, several times over."""
     torch.manual_seed(0)
-    env = swarm_logistics_v0.parallel_env(n_robots=5, max_cycles=STEPS)
     agents = env.possible_agents
     n_inputs = env.observation_space(agents[0]).shape[0]
     n_outputs = env.action_space(agents[0]).shape[0]
@@ -56,13 +62,13 @@ def main() -> None:
         assert not any(terminations.values()), terminations
         assert all(truncations.values()), truncations
         taken = {name: torch.stack(steps) for name, steps in rows.items()}
-        assert taken["reward"].shape == (STEPS, len(agents)), taken["reward"].shape
+        assert taken["reward"].shape == (MAX_CYCLES, len(agents)), taken["reward"].shape
 
         with torch.no_grad():  # cut by time, so the last value counts on
             following = critic(batch(observations, agents)).squeeze(-1)
         advantages = torch.zeros_like(taken["reward"])
         ahead = torch.zeros(len(agents))
-        for step in reversed(range(STEPS)):
+        for step in reversed(range(MAX_CYCLES)):
             error = taken["reward"][step] + DISCOUNT * following - taken["value"][step]
             ahead = error + DISCOUNT * TRACE * ahead
             advantages[step] = ahead
@@ -86,8 +92,6 @@ def main() -> None:
                 nn.utils.clip_grad_norm_(learned, 0.5)
                 optimizer.step()
         assert torch.isfinite(loss), loss
-        reward = float(taken["reward"].sum()) / len(agents)
-        print(f"episode {episode}: {STEPS} steps, return per robot {reward:g}, loss {loss:.4f}")
 
 
 def batch(parts: Mapping[str, Any], agents: Sequence[str]) -> torch.Tensor:

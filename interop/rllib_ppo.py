@@ -9,8 +9,9 @@ from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
 from ray.tune.registry import register_env
 
-from interop.conditions import CONDITIONS, MAX_CYCLES, plain
-from interop.versions import versions
+from interop.conditions import CONDITIONS, MAX_CYCLES, plain, without_fixed_agents
+from interop.mpe2_swarm import FewerAgents
+from interop.results import fails_on_mpe2_too, passes, runs_with, same_line
 from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.wrappers import SwarmSize
 
@@ -33,7 +34,7 @@ def make_central(config: Any) -> CentralEnv:
 
 def main() -> None:
     """Train in every condition, with agents that leave, and as one agent."""
-    print(versions("ray", "torch", "pettingzoo", "gymnasium"))
+    runs_with("ray", "torch", "pettingzoo", "gymnasium")
     ray.init(num_cpus=1, include_dashboard=False)
     register_env("swarm_logistics_v0", make)
     register_env(CENTRAL, make_central)
@@ -41,7 +42,23 @@ def main() -> None:
         train(name, "swarm_logistics_v0")
     for name in CONDITIONS:
         train(name, CENTRAL)
+    proof = same_line(
+        lambda: rollout(ParallelPettingZooEnv(without_fixed_agents(3))),
+        lambda: rollout(ParallelPettingZooEnv(FewerAgents(first=2, then=3))),
+    )
+    fails_on_mpe2_too("ParallelPettingZooEnv, sizes that change, without FixedAgents", proof)
     ray.shutdown()
+
+
+def rollout(env: Any) -> None:
+    """Play a few episodes with random actions, as Ray's wrapper offers them."""
+    for seed in range(8):
+        observations, _ = env.reset(seed=seed)
+        is_over = False
+        while not is_over:
+            actions = {agent: env.get_action_space(agent).sample() for agent in observations}
+            observations, _, terminated, truncated, _ = env.step(actions)
+            is_over = terminated["__all__"] or truncated["__all__"]
 
 
 def train(name: str, env: str) -> None:
@@ -55,13 +72,14 @@ def train(name: str, env: str) -> None:
     if env != CENTRAL:
         config = config.multi_agent(policies={"robot"}, policy_mapping_fn=lambda *_, **__: "robot")
     algorithm = config.build_algo()
-    for iteration in range(1, ITERATIONS + 1):
+    for _ in range(ITERATIONS):
         runners = algorithm.train()["env_runners"]
         length = runners["episode_len_mean"]
         assert length == MAX_CYCLES, length
-        taken = runners["num_env_steps_sampled_lifetime"]
-        print(f"{env}, {name}, iteration {iteration}: {taken:.0f} steps, episodes of {length:.0f}")
     algorithm.stop()
+    taken = runners["num_env_steps_sampled_lifetime"]
+    form = "CentralEnv, flat" if env == CENTRAL else "ParallelPettingZooEnv"
+    passes(f"{form}, PPO, {ITERATIONS} iterations, {taken:.0f} steps: {name}")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from skrl.utils import set_seed
 from torch import nn
 
 from interop.conditions import CONDITIONS, played
-from interop.versions import versions
+from interop.results import passes, runs_with
 
 ROLLOUTS = 32
 STEPS = 128
@@ -56,7 +56,7 @@ class Value(DeterministicMixin, Model):  # type: ignore[misc]  # as above
 
 def main() -> None:
     """Train in every condition for a few updates."""
-    print(versions("skrl", "torch", "pettingzoo", "gymnasium"))
+    runs_with("skrl", "torch", "pettingzoo", "gymnasium")
     set_seed(0)
     for name, make in CONDITIONS.items():
         with tempfile.TemporaryDirectory() as folder:
@@ -96,7 +96,7 @@ def train(name: str, env: Any, folder: str) -> None:
         after = parameters(models[agent]["policy"])
         assert torch.isfinite(after).all(), agent
         assert not torch.equal(after, before[agent]), agent
-    print(f"IPPO, {STEPS} steps, {STEPS // ROLLOUTS} updates, {played(name, env)}")
+    passes(f"IPPO, {STEPS} steps, {STEPS // ROLLOUTS} updates, {played(name, env)}")
 
 
 def parameters(model: Any) -> torch.Tensor:

@@ -11,7 +11,7 @@ from torchrl.envs import PettingZooWrapper
 from torchrl.modules import MultiAgentMLP
 
 from interop.conditions import CONDITIONS, played
-from interop.versions import versions
+from interop.results import passes, runs_with
 
 BATCH = 100
 FRAMES = 300
@@ -19,7 +19,7 @@ FRAMES = 300
 
 def main() -> None:
     """Collect in every condition."""
-    print(versions("torchrl", "tensordict", "torch", "pettingzoo", "gymnasium"))
+    runs_with("torchrl", "tensordict", "torch", "pettingzoo", "gymnasium")
     torch.manual_seed(0)
     for name, make in CONDITIONS.items():
         collect(name, make())
@@ -53,7 +53,7 @@ def collect(name: str, env: Any) -> None:
     collector.shutdown()
     assert steps == FRAMES, steps
     assert ended, "no episode ended"
-    print(f"collector, {steps} steps, {ended} episodes ended, {played(name, env)}")
+    passes(f"collector, {steps} steps, {ended} episodes ended, {played(name, env)}")
 
 
 if __name__ == "__main__":

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
-from rich.console import Console
-
-if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar as Bar
+from rich.table import Table
+from rich.text import Text
 
 LINE_EVERY = 30.0  # seconds between plain lines
 _NOTHING: Mapping[str, int] = {}
@@ -44,29 +45,27 @@ class ProgressBar:
         self._parts_done: Mapping[str, int] = {}
         self._note = ""
         self._console = console or Console(stderr=True, highlight=False)
-        self._bars: Progress | None = None
-        self._tasks: list[TaskID] = []
+        self._live: Live | None = None
         self._start = self._last_line = time.monotonic()
+        self._stopped_at: float | None = None
 
     def __enter__(self) -> Self:
         self._start = self._last_line = time.monotonic()
         if self._total and self._console.is_terminal:
-            self._bars = _bars(self._console)
-            self._tasks = [
-                self._bars.add_task(name, total=total, completed=done, note="")
-                for name, done, total in self._shown()
-            ]
-            self._bars.start()
+            # It draws itself anew twice a second, also while one piece of the work takes long.
+            self._live = Live(self, console=self._console, refresh_per_second=2)
+            self._live.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._bars:
-            self._bars.stop()
+        self._stopped_at = time.monotonic()
+        if self._live:
+            self._live.stop()
 
     @property
     def seconds(self) -> float:
-        """Time since it was entered [s]."""
-        return time.monotonic() - self._start
+        """Time since it was entered, or until it was left [s]."""
+        return (self._stopped_at or time.monotonic()) - self._start
 
     def reach(self, done: int, note: str = "", parts: Mapping[str, int] = _NOTHING) -> None:
         """Show that so much is done.
@@ -76,10 +75,7 @@ class ProgressBar:
             parts: how much is done of each part.
         """
         self._done, self._note, self._parts_done = done, note, parts
-        if self._bars:
-            for task, (_, part, total) in zip(self._tasks, self._shown()):
-                self._bars.update(task, completed=part, note=self._pace(part, total))
-        elif time.monotonic() - self._last_line >= LINE_EVERY:
+        if not self._live and time.monotonic() - self._last_line >= LINE_EVERY:
             self.say()
 
     def say(self, what: str = "") -> None:
@@ -90,20 +86,31 @@ class ProgressBar:
         if parts:
             each = (f"{name} {done:,} of {total:,}" for name, done, total in parts)
             reached += f" ({', '.join(each)})"
-        told = (reached, self._note, self._pace(self._done, self._total), what)
+        told = (reached, self._note, self._pace(), what)
         line = f"{self._label}: {', '.join(part for part in told if part)}"
         self._console.print(line, soft_wrap=True, markup=False)
+
+    def __rich__(self) -> RenderableType:
+        """Return the bars as they are now; they take 80 columns."""
+        bars = Table.grid(padding=(0, 1))
+        for name, done, total in self._shown():
+            reached = f"{done:,} of {total:,} {self._unit}"
+            bars.add_row(Text(name), Bar(total=total, completed=done, width=20), reached)
+        return Group(bars, f"{self._pace()}, {clock(self.seconds)} so far")
 
     def _shown(self) -> list[tuple[str, int, int]]:
         """Return name, what is done and what there is to do: of the whole, then of each part."""
         parts = [(name, self._parts_done.get(name, 0), n) for name, n in self._parts.items()]
         return [(self._label, self._done, self._total), *parts]
 
-    def _pace(self, done: int, total: int) -> str:
-        rate = (done - self._first) / max(self.seconds, 1e-9)
+    def _pace(self) -> str:
+        rate = (self._done - self._first) / max(self.seconds, 1e-9)
+        if not rate:
+            return "just begun"
         shown = f"{rate:,.2f}" if rate < 10 else f"{rate:,.0f}"
-        left = f", {clock((total - done) / rate)} left" if rate > 0 and done < total else ""
-        return f"{shown} {self._unit}/s{left}"
+        left = self._total - self._done
+        until_end = f", {clock(left / rate)} left" if left else ""
+        return f"{shown} {self._unit}/s{until_end}"
 
 
 def clock(seconds: float) -> str:
@@ -111,23 +118,3 @@ def clock(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
-
-
-def _bars(console: Console) -> Progress:
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-    )
-
-    return Progress(
-        # Names are not Rich's markup.
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[note]}", markup=False),
-        console=console,
-    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import runpy
 from pathlib import Path
@@ -37,6 +38,13 @@ def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
     said = BLOCKS["recorded"](text)
     comparable = BLOCKS["comparable"]
     assert comparable(said) == comparable(text), f"stale: run `python docs/blocks.py {page}`"
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in (DOCS / "notebooks").glob("*.ipynb")))
+def test_notebook_runs_and_prints_what_it_shows(name: str) -> None:
+    text = (DOCS / "notebooks" / name).read_text(encoding="utf-8")
+    recorded = runpy.run_path(str(DOCS / "notebooks.py"))["recorded"](text)
+    assert recorded == text, "stale: run `python docs/notebooks.py`"
 
 
 def test_every_block_has_a_language_that_is_checked() -> None:
@@ -86,6 +94,29 @@ def test_links_and_pictures_exist(name: str) -> None:
             assert (DOCS / (link or picture)).exists(), f"{name}: {link or picture}"
 
 
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_a_page_begins_with_a_picture(name: str) -> None:
+    assert "{figure} media/" in "\n".join(PAGES[name].splitlines()[:20])
+
+
+def test_diagrams_are_those_of_the_script() -> None:
+    for name, drawing in runpy.run_path(str(DOCS / "diagrams.py"))["drawings"]().items():
+        assert (DOCS / "media" / name).read_text("utf-8") == drawing, (
+            "run `python docs/diagrams.py`"
+        )
+
+
+def test_the_caption_of_the_front_page_tells_what_the_picture_shows() -> None:
+    drawn = (DOCS / "pictures.py").read_text(encoding="utf-8")
+    assert 'save(scene(30.0), "warehouse.png")' in drawn
+    assert "n_robots=16" in drawn
+    assert "show_beams_of=3" in drawn
+    assert "trails=True" in drawn
+    caption = PAGES["index.md"].partition("media/warehouse.png")[2].partition("```")[0]
+    for words in ("Sixteen robots", "thirty seconds", "crosshairs", "orange beams", "grey lines"):
+        assert words in caption
+
+
 @pytest.mark.filterwarnings("ignore")  # the libraries that build the site warn about each other
 def test_site_builds_without_warnings(tmp_path: Path) -> None:
     sphinx = pytest.importorskip("sphinx.application", reason="needs the extra docs")
@@ -104,6 +135,16 @@ def test_site_builds_without_warnings(tmp_path: Path) -> None:
     assert "".join(warnings) == ""
     html = (out / "indicators.html").read_text(encoding="utf-8")
     assert "<math" in html
-    for page in out.glob("*.html"):
-        loads = re.findall(r'(?:src|<link[^>]* href)="(https?:[^"]+)"', page.read_text("utf-8"))
-        assert not loads, f"{page.name} loads {loads[0]}"
+    assert "copybutton.js" in html
+    # What the page's search looks in: a stem, and the numbers of the pages that have it.
+    index = json.loads((out / "searchindex.js").read_text("utf-8")[len("Search.setIndex(") : -1])
+    for stems, page in ((("custom", "polici"), "extending"), (("csv", "import"), "trials")):
+        for stem in stems:
+            found: list[int] = []
+            for part in ("terms", "titleterms"):
+                places = index[part].get(stem, [])
+                found += [places] if isinstance(places, int) else places
+            assert index["docnames"].index(page) in found, f"{page}: {stem}"
+    for built in out.glob("*.html"):
+        loads = re.findall(r'(?:src|<link[^>]* href)="(https?:[^"]+)"', built.read_text("utf-8"))
+        assert not loads, f"{built.name} loads {loads[0]}"

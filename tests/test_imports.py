@@ -40,19 +40,19 @@ MAY_IMPORT: dict[str, set[str]] = {
     "adapters": ENVIRONMENT | {"motion", "policies", "wrappers"},
     "episode": WORLD | {"policies"},
     "spi": set(),
-    "watch": RUNS | {"rendering"},
+    "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
     "studies": {"errors", "records", "streams", "spi", "tasks"},
     "report": {"errors", "spi", "tasks", "studies"},
+    "fault_analysis": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS
-    | {"progress_bar"}
     | ENVIRONMENT
     | {"progress_bar", "wrappers", "adapters", "spi", "tasks", "studies"},
     "testing": RUNS | ENVIRONMENT | {"wrappers", "adapters"},
 }
 # A Study offers its report, so it stands above both; the other modules of studies stand below.
 MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report", "progress_bar"}
-MAY_IMPORT["train"] |= {"Study", "report"}
+MAY_IMPORT["train"] |= {"Study", "report", "progress_bar"}
 # The front doors import whatever they offer.
 MAY_IMPORT["cli"] = set(MAY_IMPORT)
 MAY_IMPORT["__init__"] = set(MAY_IMPORT)

@@ -39,7 +39,8 @@ def package_files() -> set[str]:
 def environments_and_output(folder: str, names: list[str]) -> set[str]:
     """What a copy of the tree leaves out, in the form `shutil.copytree` asks for."""
     at_top = {"build", "dist", "results"} if Path(folder) == ROOT else set()
-    return {n for n in names if n in at_top or n.startswith(".") or n.endswith(".egg-info")}
+    hidden = {n for n in names if n.startswith(".")} - {".github"}
+    return hidden | {n for n in names if n in at_top or n.endswith(".egg-info")}
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +79,12 @@ def test_wheel_and_sdist_hold_every_file_of_the_package(built: Built) -> None:
 
 def test_sdist_is_enough_to_run_the_gate(built: Built) -> None:
     assert {"Makefile", "constraints.txt", "pyproject.toml", "LICENSE"} <= built.sdist
+    assert {
+        "SECURITY.md",
+        "CITATION.cff",
+        "CHANGELOG.md",
+        ".github/workflows/test.yml",
+    } <= built.sdist
     tests = {path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("*.py")}
     assert tests <= built.sdist
 

@@ -40,7 +40,7 @@ def test_lines_are_sparse_but_for_what_is_said() -> None:
 
 def test_bars_of_the_whole_and_of_each_part() -> None:
     text = shown(TWO, TWO, terminal=True)
-    for name, count in (("mine", "8/8"), ("swarm-dt", "4/4"), ("central", "4/4")):
+    for name, count in (("mine", "8 of 8"), ("swarm-dt", "4 of 4"), ("central", "4 of 4")):
         assert any(name in line and count in line for line in text.splitlines())
     assert "swarm-dt" not in shown({"swarm-dt": 4}, {"swarm-dt": 4}, terminal=True)
 
@@ -49,7 +49,7 @@ def test_what_was_done_before_is_no_part_of_the_pace() -> None:
     told = io.StringIO()
     with ProgressBar("mine", 100, "rounds", done=99, console=Console(file=told)) as progress:
         progress.say()
-    assert told.getvalue() == "mine: 99 of 100 rounds, 0.00 rounds/s\n"
+    assert told.getvalue() == "mine: 99 of 100 rounds, just begun\n"
 
 
 def test_nothing_to_do_shows_nothing() -> None:

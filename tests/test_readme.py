@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from swarm_logistics_env import Scenario, run_episode
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
 
@@ -19,9 +23,20 @@ def run(block: str) -> dict[str, Any]:
 
 
 def test_the_environment_in_ten_lines_runs_as_written() -> None:
-    names = run(next(block for block in BLOCKS if "parallel_env" in block))
+    block = next(block for block in BLOCKS if "parallel_env" in block)
+    names = run(block.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
-    assert names["delivered"] >= 0.0
+    assert all(names["truncations"].values())
+
+
+def test_the_first_lines_show_what_the_findings_say(capsys: pytest.CaptureFixture[str]) -> None:
+    run(BLOCKS[0])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 6
+    delivered = [int(line.split(": ")[1].split()[0]) for line in lines]
+    by_name = {line.split(":")[0] for line in lines}
+    assert len(by_name) == 3
+    assert min(delivered[1:3]) > 2 * delivered[0]
 
 
 def test_the_policy_of_ones_own_runs_as_written() -> None:
@@ -30,7 +45,72 @@ def test_the_policy_of_ones_own_runs_as_written() -> None:
 
 
 def test_every_block_of_code_is_run_here() -> None:
-    assert len(BLOCKS) == 2
+    assert len(BLOCKS) == 3
+
+
+def test_what_it_says_of_results_is_what_the_page_of_results_says(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    script = importlib.import_module("front_page")
+    assert script.rewritten(README, script.blocks()) == README, (
+        "stale: run `python docs/front_page.py`"
+    )
+    # Every number with an interval there stands in a table of that page.
+    results = script.RESULTS.read_text(encoding="utf-8")
+    told = re.findall(r"-?[\d.]+ \[-?[\d.]+, -?[\d.]+\]", script.findings(results))
+    assert len(told) >= 6
+    assert all(number in results for number in told)
+    pytest.importorskip("matplotlib", reason="needs the extra study")
+    script.draw(script.rows_of(script.block_of(results, "policies")), tmp_path / "anew.svg")
+    assert (tmp_path / "anew.svg").stat().st_size > 10_000
+
+
+def test_a_finding_is_a_rule_not_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    script = importlib.import_module("front_page")
+    rows = [
+        "|  | `swarm-dt` | `a` | `ppo-b` |", "| --- | --- | --- | --- |",
+        "| P, N = 25 | 10.0 [9.0, 11.0] | 80.0 [79.0, 81.0] | 25.0 [24.0, 26.0] |",
+        "| S, N 25 -> 100 | 0.1 [0.0, 0.2] | -0.2 [-0.3, -0.1] | 0.5 [0.4, 0.6] |",
+        "| R, FM1, m = 2 | -0.5 [-0.6, -0.4] | 0.0 [-0.1, 0.1] | 0.05 [0.01, 0.07] |",
+        "| R, FM2, m = 2 | 0.05 [0.02, 0.08] | 0.0 [-0.1, 0.1] | -0.2 [-0.3, -0.1] |",
+    ]  # fmt: skip
+    page = (
+        "<!-- tables: paper -->\nOf 9 claims (of it), adjusted after Holm: 9 supported.\n"
+        f"{script.END}\n<!-- tables: policies -->\n" + "\n".join(rows) + "\n\n30 seeds from 7 on.\n"
+        f"{script.END}\n"
+    )
+    said = script.findings(page)
+    assert "delivers 2.5 times as much**: 25 robots with `ppo-b` bring 25.0 [24.0, 26.0]" in said
+    # R = (P_F - P_o) / P_o + m/N, with m/N = 0.08.
+    assert "in mode FM1 (tells a false timer) `swarm-dt` delivers 58 % less" in said
+    assert "while `ppo-b` withstands it (0.05 [0.01, 0.07])" in said
+    assert "with FM2 (lifts nothing), R of `ppo-b` is -0.2 [-0.3, -0.1], of `swarm-dt`" in said
+    assert "`ppo-b` scales best (S = 0.5 [0.4, 0.6]), and `a` delivers less" in said
+    assert "over 30 seeds" in said
+
+
+@pytest.mark.parametrize("address", [None, "https://forge.example/swarm"])
+def test_links_lead_to_files_or_the_page_says_where_they_do_not(
+    address: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    script = importlib.import_module("front_page")
+    page = script.rewritten(README, script.pictures_and_links(address))
+    targets = re.findall(r'^\[[^]]+\]: (\S+)|src="([^"]+)"|\]\(([^)]+)\)', page, flags=re.MULTILINE)
+    found = {target for group in targets for target in group if target}
+    assert {"docs/media/fm4.gif", "docs/training.md"} <= {t.removeprefix(f"{address}/raw/main/")
+        .removeprefix(f"{address}/blob/main/") for t in found}  # fmt: skip
+    relative = {target for target in found if "://" not in target}
+    assert all((ROOT / target).is_file() for target in relative)
+    assert bool(relative) == ("A package index does not show them" in page) == (address is None)
+
+
+def test_no_line_of_code_is_wider_than_the_page() -> None:
+    for block in re.findall(r"```\w*\n(.*?)```", README, flags=re.DOTALL):
+        assert max(map(len, block.splitlines())) <= 104
+    assert not [line for line in README.splitlines() if line.startswith("|")]
 
 
 def test_every_command_and_target_that_it_names_exists() -> None:

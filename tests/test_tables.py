@@ -1,4 +1,4 @@
-"""The README's tables: written from studies, the same at every call, none typed by hand."""
+"""The tables of docs/results.md: written from studies, none typed by hand."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
 ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"<!-- tables: (\w+) -->\n(.*?)\n<!-- end of tables -->", re.DOTALL)
 
@@ -54,7 +55,9 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             Study(out=out / "4", policies=policies[:1], **{**small, "seeds": 3}),
         )
 
-    monkeypatch.setattr(tables, "README", page)
+    monkeypatch.setattr(tables, "PAGE", page)
+    monkeypatch.setattr(tables.front_page, "main", lambda: None)
+    monkeypatch.setattr(tables.score_cards, "main", lambda: None)
     monkeypatch.setattr(tables, "OUT", tmp_path / "out")
     monkeypatch.setattr(tables, "BENCHMARK", tmp_path / "benchmark.json")
     monkeypatch.setattr(tables, "PROCESSES", 1)
@@ -147,9 +150,10 @@ def test_its_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -
     assert [len(study.plan().seeds) for study in studies] == [20, 100, 20, 100]
 
 
-def test_no_table_of_the_readme_is_typed_by_hand() -> None:
-    assert [name for name, _ in BLOCK.findall(README)] == ["paper", "policies", "costs"]
-    rest = BLOCK.sub("", re.sub(r"```.*?```", "", README, flags=re.DOTALL))
+@pytest.mark.parametrize("page", [PAGE, README], ids=["results.md", "README.md"])
+def test_no_table_is_typed_by_hand(page: str) -> None:
+    assert [name for name, _ in BLOCK.findall(PAGE)] == ["paper", "policies", "costs"]
+    rest = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
     assert not [line for line in rest.splitlines() if line.startswith("|")]
     # Nor is a value with its interval: "9.2 [8.3, 10.1]".
     assert not re.findall(r"\d \[-?\d", rest)

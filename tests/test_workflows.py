@@ -126,7 +126,29 @@ def test_links_of_the_readme_exist() -> None:
     assert defined - used == set()
 
 
+def test_a_release_has_links_with_the_repositorys_address_before_it_is_built() -> None:
+    lines = lines_of(WORKFLOWS["release.yml"]["jobs"]["build"])
+    made = re.findall(r"make ([\w-]+)", "\n".join(lines))
+    assert made == ["test", "absolute-links", "dist"]
+    # What the target does: the address goes into the table of which docs/front_page.py reads it.
+    told = re.search(r"sed -i 's\|(.*?)\|&\\n(.*?)\|'", MAKEFILE)
+    assert told
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    line = told[2].replace("$(REPOSITORY)", "https://forge.example/swarm")
+    changed = re.sub(told[1].replace("$$", "$"), rf"\g<0>\n{line}", project, flags=re.MULTILINE)
+    urls = tomllib.loads(changed)["project"]["urls"]
+    assert urls == {**PROJECT["urls"], "Repository": "https://forge.example/swarm"}
+
+
 def test_the_project_and_the_citation_name_the_same_paper() -> None:
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     [paper] = cited["references"]
     assert paper["url"] == PROJECT["urls"]["Paper"]
+
+
+def test_version_and_date_are_those_of_the_changelog() -> None:
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    head = f"## [{PROJECT['version']}] - {cited['date-released']}"
+    assert head == re.findall(r"^## \[\d.*$", changelog, re.MULTILINE)[0]
+    assert cited["version"] == PROJECT["version"]

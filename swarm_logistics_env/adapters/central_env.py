@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -14,10 +14,7 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reset_options import checked_seed
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.policies.policy import mask_unreachable_commands
-from swarm_logistics_env.wrappers import FixedAgents
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.wrappers import Wrapper
+from swarm_logistics_env.wrappers import FixedAgents, Wrapper
 
 
 class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from swarm_logistics_env.cli.application import Application
+from swarm_logistics_env.cli.fault_commands import attack_command, blame_command
 from swarm_logistics_env.cli.film_command import film_command
 from swarm_logistics_env.cli.judging import judge_command
 from swarm_logistics_env.cli.options import (
@@ -36,6 +37,8 @@ app.command("train")(train_command)
 app.command("film")(film_command)
 app.command("watch")(watch_command)
 app.command("judge")(judge_command)
+app.command("attack")(attack_command)
+app.command("blame")(blame_command)
 
 
 def _print_version(wanted: bool) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm_logistics_env.cli.judge_policy import judge_policy, names_policy
+from swarm_logistics_env.cli.options import TrustPolicyOption
 from swarm_logistics_env.cli.study_commands import (
     FullOption,
     PolicyOption,
@@ -16,6 +18,7 @@ from swarm_logistics_env.cli.study_commands import (
     study,
     study_of,
 )
+from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 
 if TYPE_CHECKING:
@@ -30,11 +33,20 @@ AtOption = Annotated[
 
 @study.command("import")
 def judge_command(
-    file: Annotated[
-        Path, typer.Argument(metavar="TRIALS.csv", help="CSV file, one trial or delivery a row.")
+    asked: Annotated[
+        str,
+        typer.Argument(
+            metavar="TRIALS.csv|POLICY",
+            help="CSV file, one trial or delivery a row; or a policy: name, path of a policy file, "
+            "or package.module:Class.",
+        ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Directory to keep the study, report and tables.tex in.")
+        Path | None,
+        typer.Option(
+            help="Directory to keep the study, report and tables.tex in; of a policy "
+            "results/scorecards/NAME if not given."
+        ),
     ] = None,
     columns: Annotated[
         list[str] | None,
@@ -67,23 +79,33 @@ def judge_command(
             help="A condition for the report to state, or a TOML file of some; may be repeated.",
         ),
     ] = None,
+    processes: ProcessesOption = None,
     full: FullOption = False,
+    trust_code: TrustPolicyOption = False,
 ) -> None:
-    """Judge trials of real robots or of another simulator, or a paper's tables.
+    """Judge trials of real robots or of another simulator; or a policy, by a score card.
 
     Columns: robots, fault, faulty, delivered (or performance), and where they apply seed, policy,
     onset, and any parameter; or time, one delivery a row. Without seeds the study is unpaired.
+    A policy is played in the fixed study `scorecard`, in a minute or a few.
     """
     from tempfile import TemporaryDirectory
 
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.document import document
-    from swarm_logistics_env.report.latex import latex_tables
-    from swarm_logistics_env.report.report_files import write_text
-    from swarm_logistics_env.report.with_simulation import with_simulation
+    from swarm_logistics_env.report.document import document, with_simulation
+    from swarm_logistics_env.report.report_files import latex_tables, write_text
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.importing import import_results
 
+    if names_policy(asked):
+        of_trials = {
+            "--column": columns, "--ignore": ignore, "--duration": duration,
+            "--simulated": simulated, "--setup": setup,
+        }  # fmt: skip
+        for option, given in of_trials.items():
+            if given:
+                raise StudyError(f"{option} is for a file of trials, and {asked!r} is a policy")
+        raise typer.Exit(1 if judge_policy(asked, out, processes, trust_code, full=full) else 0)
     with TemporaryDirectory() as elsewhere:
 
         def results_of(trials: Path, directory: Path) -> StudyResults:
@@ -98,7 +120,7 @@ def judge_command(
             typer.echo(f"{count} runs in {trials}\n")
             return Study.stored(directory).findings()
 
-        results = results_of(file, out or Path(elsewhere) / "study")
+        results = results_of(Path(asked), out or Path(elsewhere) / "study")
         whole = document(results)
         if simulated is not None:
             if simulated.is_dir():
@@ -118,8 +140,6 @@ def _stated(texts: list[str]) -> dict[str, str]:
     """Return the conditions that --setup states."""
     import tomllib
 
-    from swarm_logistics_env.errors import StudyError
-
     stated: dict[str, str] = {}
     for text in texts:
         if "=" in text:
@@ -138,8 +158,6 @@ def _stated(texts: list[str]) -> dict[str, str]:
 
 
 def _pair(option: str, text: str) -> tuple[str, str]:
-    from swarm_logistics_env.errors import StudyError
-
     name, equals, value = (part.strip() for part in text.partition("="))
     if not (name and equals and value):
         raise StudyError(f"{option} {text}: should be NAME=VALUE")
@@ -171,9 +189,8 @@ def power_command(
 ) -> None:
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.report.result_tables import Section
-    from swarm_logistics_env.studies.effort import demands
+    from swarm_logistics_env.studies.results import demands
 
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
@@ -262,7 +279,6 @@ def _pilot(
 ) -> StudyResults:
     import os
 
-    from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.studies import Study
 
     if Path(asked).is_dir():

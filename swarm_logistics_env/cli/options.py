@@ -46,7 +46,7 @@ TrustPolicyOption = Annotated[
     bool, typer.Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
 ]
 
-_FAULT = re.compile(r"(?P<mode>\w+)(:(?P<robots>\d+))?(@(?P<onset>\d+\.?\d*|\.\d+))?")
+_FAULT = re.compile(r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+))?(@(?P<onset>\d+\.?\d*|\.\d+))?")
 
 
 def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:

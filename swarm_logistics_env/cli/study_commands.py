@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from swarm_logistics_env.studies.engines import Engine
     from swarm_logistics_env.studies.plan import Plan
     from swarm_logistics_env.studies.results import StudyResults
-    from swarm_logistics_env.studies.shards import Shard
+    from swarm_logistics_env.studies.runs import Shard
     from swarm_logistics_env.studies.study import Tally
 
 StudyArgument = Annotated[
@@ -22,7 +22,7 @@ StudyArgument = Annotated[
     typer.Argument(
         metavar="FILE|PRESET",
         # Literal, as to import the presets would slow every command.
-        help="TOML file of a study, or a preset: paper, quick, resilience (`study list`).",
+        help="TOML file of a study, or a preset: paper, quick, resilience, scorecard.",
     ),
 ]
 SeedsOption = Annotated[
@@ -86,7 +86,7 @@ def plan_command(
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
     from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.studies.effort import expected_seconds
+    from swarm_logistics_env.studies.engines import expected_seconds
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     seconds = expected_seconds(plan)
@@ -140,7 +140,7 @@ def run_command(
     import os
 
     from swarm_logistics_env.studies.engines import engine_named
-    from swarm_logistics_env.studies.shards import Shard
+    from swarm_logistics_env.studies.runs import Shard
 
     part = Shard.parse(shard) if shard else None
     looks: dict[str, object] = {}
@@ -154,7 +154,7 @@ def run_command(
     typer.echo(f"{chosen.plan()}\n")
     if warning := chosen.exploratory_because():
         typer.echo(f"{warning}\n")
-    tally = _run(chosen, player, part)
+    tally = run_study(chosen, player, part)
     if part is None:
         _show(chosen, full=full)
     else:
@@ -166,7 +166,7 @@ def run_command(
         engine, f"{processes or os.cpu_count() or 1} processes"
     )
     # The last line: where it is looked for after a report of many pages.
-    typer.echo(_in_one_line(tally, players))
+    typer.echo(in_one_line(tally, players))
     raise typer.Exit(1 if tally.failed else 0)
 
 
@@ -203,7 +203,7 @@ def merge_command(
     out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
 ) -> None:
     """Make one store of those that shards or machines have filled."""
-    from swarm_logistics_env.studies.shards import merge
+    from swarm_logistics_env.studies.metadata import merge
 
     typer.echo(f"{merge(directories, out)} runs in {out}")
 
@@ -281,7 +281,7 @@ def _conditions(plan: Plan) -> Section:
     return Section("Conditions", ("policy", "N", "stands in"), tuple(rows))
 
 
-def _run(asked: Study, engine: Engine, shard: Shard | None) -> Tally:
+def run_study(asked: Study, engine: Engine, shard: Shard | None = None) -> Tally:
     """Run a study; Ctrl-C ends the command and says how to go on."""
     try:
         return asked.run(engine, shard=shard)
@@ -295,7 +295,8 @@ def _run(asked: Study, engine: Engine, shard: Shard | None) -> Tally:
         raise typer.Exit(130) from None
 
 
-def _in_one_line(tally: Tally, players: str) -> str:
+def in_one_line(tally: Tally, players: str) -> str:
+    """Return how many runs `players` have played, in which time."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     why = f", the first with {tally.error}; study export has each traceback" if tally.error else ""
     return (

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from swarm_logistics_env.report.answer import DIGEST_LINES, Answer, digest
-from swarm_logistics_env.report.markup import section_markdown
+from swarm_logistics_env.report.report_files import section_markdown
 from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.report.verdict_matrix import NOT_ASKED
 from swarm_logistics_env.spi.verdict_signs import SIGNS

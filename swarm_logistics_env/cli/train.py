@@ -15,6 +15,7 @@ from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train.training import preset_names
 
 if TYPE_CHECKING:
+    from swarm_logistics_env.train.training import Training
     from swarm_logistics_env.train.tuning import Trial, Tuning
 
 
@@ -42,7 +43,13 @@ def train_command(
         list[str] | None,
         typer.Option("--objective", help="With --tune: P, R or FT; may be repeated."),
     ] = None,
-    trials: Annotated[int | None, typer.Option(help="With --tune: parameters to try.")] = None,
+    trials: Annotated[
+        int | None,
+        typer.Option(
+            help="Parameters to try; with a training: weights of its rewards to try, for P and the "
+            "worst R."
+        ),
+    ] = None,
     seeds: Annotated[int | None, typer.Option(help="With --tune: episodes a condition.")] = None,
 ) -> None:
     """Train a policy, or tune a scripted one; the same command goes on where it was stopped."""
@@ -52,9 +59,8 @@ def train_command(
         )
     wrong = {
         "--steps": (steps, tune),
-        "--device": (device, tune),
+        "--device": (device, tune if trials is None else tune or "--trials"),
         "--objective": (objectives, preset),
-        "--trials": (trials, preset),
         "--seeds": (seeds, preset),
     }
     for option, (value, other) in wrong.items():
@@ -63,8 +69,12 @@ def train_command(
     try:
         if tune is None:
             assert preset is not None
-            path = train_as_asked(preset, out, seed, steps, device)
-            _show_training(path)
+            if trials is None:
+                path = train_as_asked(preset, out, seed, steps, device)
+                _show_training(path)
+            else:
+                tried, path = search_as_asked(preset, trials, out, seed, steps)
+                _show_trials(f"{preset}, factors of its weights", ("P", "worst R"), tried, ())
         else:
             fields = {
                 "objectives": tuple(objectives) if objectives else None,
@@ -79,28 +89,35 @@ def train_command(
 
 
 def _show_search(asked: Tuning, trials: list[Trial], path: Path) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies.tuned import read_tuned
-    from swarm_logistics_env.report.result_tables import Section
 
-    names = list(trials[0].parameters)
-    shown = [trial for trial in trials if trial.is_best or trial.number == 0]
-    rows = tuple(
-        (
-            "own" if trial.number == 0 else f"trial {trial.number}",
-            *(f"{value:.3g}" for value in trial.values),
-            *(f"{trial.parameters[name]:.3g}" for name in names),
-        )
-        for trial in sorted(shown, key=lambda trial: -trial.values[0])
-    )
-    title = f"{asked.policy}: best of {len(trials)} trials (Pareto front) and its own parameters"
     lines = tuple(
         f"{score.measure} ({score.condition}, {score.seeds} other seeds) = {score.value:.3g}, "
         f"95 % interval {score.low:.3g} to {score.high:.3g}"
         for score in read_tuned(path).scores
         if score.low is not None and score.high is not None
     )
-    show(Section(title, ("parameters", *asked.objectives, *names), rows, lines))
+    _show_trials(asked.policy, asked.objectives, trials, lines)
+
+
+def _show_trials(
+    what: str, objectives: tuple[str, ...], trials: list[Trial], lines: tuple[str, ...]
+) -> None:
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.result_tables import Section
+
+    names = list(trials[0].parameters)
+    shown = [trial for place, trial in enumerate(trials) if trial.is_best or place == 0]
+    rows = tuple(
+        (
+            "own" if trial is trials[0] else f"trial {trial.number}",
+            *(f"{value:.3g}" for value in trial.values),
+            *(f"{trial.parameters[name]:.3g}" for name in names),
+        )
+        for trial in sorted(shown, key=lambda trial: -trial.values[0])
+    )
+    title = f"{what}: best of {len(trials)} trials (Pareto front) and its own parameters"
+    show(Section(title, ("parameters", *objectives, *names), rows, lines))
 
 
 def _show_training(path: Path) -> None:
@@ -146,21 +163,49 @@ def train_as_asked(
     Raises:
         TrainingError: there is no such training, it cannot be, or its libraries are missing.
     """
-    given = {"seed": seed, "agent_steps": agent_steps}
-    changes = {name: value for name, value in given.items() if value is not None}
-    from swarm_logistics_env.train.training import load_training
-
-    training = load_training(asked, **changes)
+    training = _asked_training(asked, seed, agent_steps)
     out = Path("results/train") / training.name if out is None else out
-    words = ["swarm-logistics", "train", asked, "--out", str(out)]
-    for option, value in (("--seed", seed), ("--steps", agent_steps), ("--device", device)):
-        if value is not None:
-            words += [option, str(value)]
+    words = _words(asked, out, {"--seed": seed, "--steps": agent_steps, "--device": device})
     with _explained():
         import_module("tensorboard")  # missed before anything is written
 
         from swarm_logistics_env.train.trainer import train
-    return train(training, out, command=shlex.join(words), device=device)
+    return train(training, out, command=words, device=device)
+
+
+def search_as_asked(
+    asked: str, trials: int, out: Path | None, seed: int | None, agent_steps: int | None
+) -> tuple[list[Trial], Path]:
+    """Search the weights of a training's rewards; returns the trials and the table of them.
+
+    Raises:
+        TrainingError: as `train_as_asked`, or the training measures no R.
+    """
+    from swarm_logistics_env.train.reward_search import FRONT, RewardSearch, search_rewards
+
+    training = _asked_training(asked, seed, agent_steps)
+    search = RewardSearch(training=training, trials=trials)
+    out = Path("results/tune") / training.name if out is None else out
+    words = _words(asked, out, {"--seed": seed, "--steps": agent_steps, "--trials": trials})
+    with _explained():
+        for package in ("optuna", "tensorboard", "stable_baselines3"):
+            import_module(package)  # as above
+    return search_rewards(search, out, command=words), out / FRONT
+
+
+def _asked_training(asked: str, seed: int | None, agent_steps: int | None) -> Training:
+    from swarm_logistics_env.train.training import load_training
+
+    given = {"seed": seed, "agent_steps": agent_steps}
+    return load_training(asked, **{n: value for n, value in given.items() if value is not None})
+
+
+def _words(asked: str, out: Path, options: dict[str, object]) -> str:
+    words = ["swarm-logistics", "train", asked, "--out", str(out)]
+    for option, value in options.items():
+        if value is not None:
+            words += [option, str(value)]
+    return shlex.join(words)
 
 
 def tune_as_asked(

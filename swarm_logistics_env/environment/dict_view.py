@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Space
@@ -12,9 +12,7 @@ from pettingzoo import ParallelEnv
 
 from swarm_logistics_env.environment.commands import gathered
 from swarm_logistics_env.errors import SetupError
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.warehouse import Warehouse
+from swarm_logistics_env.warehouse import Warehouse
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, float]]

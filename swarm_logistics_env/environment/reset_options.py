@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from swarm_logistics_env.errors import FaultError, SetupError, suggest
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
+from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse.faults import GRACE, failed_robots, failure_mode
 
 OPTIONS = ("faults", "scenario")
 
@@ -111,7 +111,7 @@ def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -
     """
     gone = set[int]()
     for fault in faults:
-        if fault.onset <= GRACE and not FAILURE_MODES[fault.mode].present:
+        if fault.onset <= GRACE and not failure_mode(fault.mode).present:
             gone.update(failed_robots(fault, seed, n_robots).tolist())
     if len(gone) == n_robots:
         raise SetupError(

@@ -18,13 +18,15 @@ class RewardTerms:
     """The weighted sum of named terms, one value per robot and step.
 
     Args:
-        weights: term -> weight; see `REWARD_TERMS` for the terms.
+        weights: term -> weight; see `REWARD_TERMS` for the terms. With terms that pay the change of
+            a potential, "discount" as well: the discount of the learner, above 0, at most 1.
 
     Attributes:
         pays_steadily: whether a step without a delivery may pay.
 
     Raises:
-        SetupError: `weights` is not a dict, a term is unknown, or a weight is not a finite number.
+        SetupError: `weights` is not a dict, a term is unknown, a weight is not a finite number, or
+            the discount is missing, goes with no term, or is out of range.
     """
 
     def __init__(self, weights: Mapping[str, float] | None = None) -> None:
@@ -33,6 +35,7 @@ class RewardTerms:
                 f'rewards = {weights!r}: should be None or a dict, as {{"delivery": 1.0}}'
             )
         self.weights = dict(DEFAULT_WEIGHTS if weights is None else weights)
+        self._discount = _discount_of(self.weights)
         for name, weight in self.weights.items():
             if name not in REWARD_TERMS:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
@@ -43,7 +46,7 @@ class RewardTerms:
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""
-        self._before = Before()
+        self._before = Before(self._discount)
         self._before.note(world, self._follows_carrier)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
@@ -60,7 +63,10 @@ class RewardTerms:
 class Before:
     """The state before a step, with which the terms compare the state after it."""
 
-    __slots__ = ("carrier", "carrier_x", "delivered", "requested")
+    __slots__ = ("carrier", "carrier_x", "delivered", "discount", "requested")
+
+    def __init__(self, discount: float) -> None:
+        self.discount = discount
 
     def note(self, world: Warehouse, follows_carrier: bool) -> None:
         """Store the state; the carrier of the requested item only if a term reads it."""
@@ -119,6 +125,39 @@ def approach(world: Warehouse, before: Before) -> Earned:
     return paid
 
 
+def carrying(world: Warehouse, before: Before) -> Earned:
+    """Potential: 1 of the robot that carries the requested item, 0 of the others."""
+    return _change_of_potential(world, before, 1.0, 1.0)
+
+
+def carried_way(world: Warehouse, before: Before) -> Earned:
+    """Potential: metres from the far wall to the requested item's carrier; at most the storage.
+
+    Privileged: as `approach`.
+    """
+    edge = world.scenario.storage_width
+    carrier = carrier_of_requested(world)
+    x = 0.0 if carrier == NOBODY else float(world.state.robot_position[carrier, 0])
+    return _change_of_potential(world, before, min(before.carrier_x, edge), min(x, edge))
+
+
+def _change_of_potential(world: Warehouse, before: Before, earlier: float, later: float) -> Earned:
+    """Return discount x potential after the step - potential before it, of both carriers.
+
+    Whatever is paid so changes no optimum (Ng et al. 1999): from one state to the same again it
+    adds up to nothing, and what was paid for a lift is taken back by the delivery.
+    """
+    carrier = carrier_of_requested(world)
+    if carrier == before.carrier == NOBODY:
+        return None
+    paid = np.zeros(world.state.n_robots)
+    if before.carrier != NOBODY:
+        paid[before.carrier] -= earlier
+    if carrier != NOBODY:
+        paid[carrier] += before.discount * later
+    return paid
+
+
 def contact(world: Warehouse, before: Before) -> Earned:
     """Seconds that the robot touched a robot, a wall or an obstacle; weigh it negatively."""
     return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
@@ -129,10 +168,30 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "own_delivery": own_delivery,
     "lift_requested": lift_requested,
     "approach": approach,
+    "carrying": carrying,
+    "carried_way": carried_way,
     "contact": contact,
 }
+POTENTIALS = frozenset({"carrying", "carried_way"})
 _AT_DELIVERIES = {"delivery", "own_delivery"}
-_OF_CARRIER = {"lift_requested", "approach"}
+_OF_CARRIER = {"lift_requested", "approach"} | POTENTIALS
+
+
+def _discount_of(weights: dict[str, float]) -> float:
+    """Take the discount out of the weights; 1 where none is needed."""
+    used = sorted(POTENTIALS.intersection(weights))
+    if "discount" not in weights:
+        if used:
+            raise SetupError(
+                f"rewards[{used[0]!r}] pays the change of a potential: rewards['discount'] should "
+                "be given, the discount of the learner"
+            )
+        return 1.0
+    discount = finite_number("rewards['discount']", weights.pop("discount"))
+    if not used or not 0.0 < discount <= 1.0:
+        what = "above 0, at most 1" if used else f"left out, or stand beside {sorted(POTENTIALS)}"
+        raise SetupError(f"rewards['discount'] = {discount}: should be {what}")
+    return discount
 
 
 def finite_number(name: str, value: float) -> float:

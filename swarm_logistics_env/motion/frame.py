@@ -15,11 +15,13 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
 from swarm_logistics_env.motion.clearing import clear_the_way
+from swarm_logistics_env.motion.steering import steer
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
 WALL_REACH, FAR, NEAR = 0.7, 2.0, 0.5  # [m], where nearness 1 .. 0 ends
 RANDOM_HEADING_TIME = 0.8  # [s] that a random direction lasts
+FARTHEST = 8.0  # [m] from the delivery area, as far as a network is told
 FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
 
 OUTPUTS = ("along", "aside", "gripper")
@@ -39,10 +41,12 @@ def _names() -> tuple[str, ...]:
         "velocity_along", "velocity_aside", "heading_along", "heading_aside",
         "home_along", "home_aside", "home_certainty", "failed", "stuck",
         "whim_along", "whim_aside",
+        "kept_home_along", "kept_home_aside", "kept_home_distance", "cannot_deliver",
     )  # fmt: skip
 
 
 INPUTS = _names()
+N_FIRST_INPUTS = INPUTS.index("kept_home_along")  # networks of the first version read no more
 LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 
 
@@ -52,7 +56,7 @@ class MotionFrame:
     Each row has a memory of its own (see `memory`), begun anew by `begin`.
 
     Args:
-        scenario: for its control period.
+        scenario: for its control period, its drive and the top rate of turning.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
 
     Attributes:
@@ -61,6 +65,8 @@ class MotionFrame:
 
     def __init__(self, scenario: Scenario, listens: bool = True) -> None:
         self._period = scenario.control_period
+        self._turns = scenario.drive == "differential"
+        self._widest_turn = scenario.max_turn_rate * scenario.control_period
         self._listens = listens
         self.begin(np.empty(0, np.uint64))
 
@@ -114,12 +120,15 @@ class MotionFrame:
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
 
-        A robot that is caged by items clears its way instead.
+        A robot that is caged by items clears its way instead. A differential robot turns its body
+        to where it wants to drive.
         """
         commands = np.zeros((len(outputs), 4))
         turn_outputs(outputs.astype(np.float64), self.turned, commands)
         clear_the_way(self._rows, self.memory, commands)
         known.note_commands(self._rows, commands, self.memory)
+        if self._turns:
+            steer(self._widest_turn, self.memory, commands)
         return commands
 
     def outputs_for(self, commands: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -178,6 +187,12 @@ def read_rows(
         at += 2
         angle = random_heading(keys[robot], random_headings[robot]) - turned[robot]
         read[at], read[at + 1] = math.cos(angle), math.sin(angle)
+        at += 2
+        x, y, sure = known.kept_home(own)
+        sure = math.tanh(sure)
+        read[at], read[at + 1] = sure * (cos * x + sin * y), sure * (cos * y - sin * x)
+        read[at + 2] = sure * min(max(own[known.AWAY], -FARTHEST), FARTHEST) / FARTHEST
+        read[at + 3] = own[known.CANNOT_DELIVER]
 
 
 @kernel

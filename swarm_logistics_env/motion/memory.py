@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.motion.walls import LEAST_GAIN, QUARTER, SETTLING_TIME, wall_angle
 
 # Columns of a memory array (N, N_COLUMNS).
 HEADING_X, HEADING_Y = 0, 1  # of its last motion, length 1
@@ -22,10 +23,17 @@ STUCK = 6  # 1: it just stood still with the requested item; falls to 0 in STUCK
 HELD = 7  # the last gripper command: 0 open, 1 hold, 2 hold the requested item it carries
 STANDING = 8  # [s] that it stood still with the requested item, less those that it moved
 CLEARING = 9  # [s] that are left to clear its way out of a cage of items; see `clearing`
-N_COLUMNS = 10
+WALL = 10  # direction of a wall in its frame [rad], always the same one of the four
+SIGHTINGS, WATCHED = 11, 12  # number of times it saw how a wall stands, and for how long [s]
+TURNED, DRIFT = 13, 14  # of that direction since the first sighting [rad], and per second [rad/s]
+KEPT_X, KEPT_Y = 15, 16  # as HOME, from WALL on and fading in KEPT_TIME
+AWAY = 17  # from the border of the delivery area as far as it reckons, negative inside [m]
+CANNOT_DELIVER = 18  # 1: it has carried the requested item inside the area, and nothing happened
+N_COLUMNS = 19
 
 FAILURE_TIME = 60.0  # [s]
 HOME_TIME = 10.0  # [s], in which a remembered direction fades: by then a gyro may have drifted
+KEPT_TIME = 60.0  # [s], in which a direction fades that is held against the walls
 STUCK_TIME = 1.5  # [s]
 CAGED_TIME = 5.0  # [s] of standing, after which a robot takes itself for caged
 CLEARING_TIME = 6.0  # [s]
@@ -62,6 +70,7 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
                     known[FAILED] = 1.0
         if is_inside and delivers:
             known[FAILED] = 1.0
+            known[CANNOT_DELIVER] = 1.0
 
         known[STUCK] = max(0.0, known[STUCK] - period / STUCK_TIME)
         stands = delivers and known[HELD] > 1.5 and speed < STANDS
@@ -79,7 +88,60 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
             way = 1.0 if is_inside else -1.0
             known[HOME_X] += way * x / speed
             known[HOME_Y] += way * y / speed
+        reckon(sensed, period, known)
         known[WAS_INSIDE] = 1.0 if is_inside else 0.0
+
+
+@kernel
+def reckon(sensed: NDArray[np.float32], period: float, known: NDArray[np.float64]) -> None:
+    """Take one robot's row into the columns from WALL to AWAY of its memory."""
+    if known[SIGHTINGS] > 0.0:
+        known[WATCHED] += period
+        known[TURNED] += known[DRIFT] * period
+        known[WALL] += known[DRIFT] * period
+    seen = wall_angle(sensed)
+    if seen >= 0.0:
+        off = seen - known[WALL]
+        off -= QUARTER * round(off / QUARTER)
+        if known[SIGHTINGS] > 0.0:
+            off *= max(1.0 / known[SIGHTINGS], LEAST_GAIN)
+            known[TURNED] += off
+        known[SIGHTINGS] += 1.0
+        known[WALL] += off
+        known[DRIFT] = known[TURNED] / (known[WATCHED] + SETTLING_TIME)
+    known[WALL] -= 2.0 * math.pi * round(known[WALL] / (2.0 * math.pi))
+
+    x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
+    speed = math.sqrt(x * x + y * y)
+    is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
+    kept = math.exp(-period / KEPT_TIME)
+    known[KEPT_X] *= kept
+    known[KEPT_Y] *= kept
+    if is_inside != (known[WAS_INSIDE] > 0.5) and speed > MOVES:
+        way = (1.0 if is_inside else -1.0) / speed
+        cos, sin = math.cos(known[WALL]), math.sin(known[WALL])
+        known[KEPT_X] += way * (cos * x + sin * y)
+        known[KEPT_Y] += way * (cos * y - sin * x)
+        known[AWAY] = 0.0
+    home_x, home_y, sure = kept_home(known)
+    if sure > 0.0:
+        known[AWAY] -= period * (home_x * x + home_y * y)
+
+
+@kernel
+def kept_home(known: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Return the direction home, of length 1, and how often it was taken lately; 0: never.
+
+    The area has a straight border along a wall, so a robot that saw one goes at a right angle.
+    """
+    sure = math.sqrt(known[KEPT_X] ** 2 + known[KEPT_Y] ** 2)
+    if sure == 0.0:
+        return 0.0, 0.0, 0.0
+    angle = math.atan2(known[KEPT_Y], known[KEPT_X])
+    if known[SIGHTINGS] > 0.0:
+        angle = QUARTER * round(angle / QUARTER)
+    angle += known[WALL]
+    return math.cos(angle), math.sin(angle), sure
 
 
 @kernel

@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
+from swarm_logistics_env.motion.frame import INPUTS, N_FIRST_INPUTS, OUTPUTS
 from swarm_logistics_env.records import Record
 
 Width = Annotated[int, Field(ge=1, le=4096)]
@@ -55,7 +55,9 @@ class Network(_Part):
         for place, (name, wanted) in enumerate(zip(names, right)):
             if name != wanted:
                 raise ValueError(f"column {place} is {name!r}: should be {wanted!r}")
-        if len(names) != len(right):
+        # Inputs that came later stand behind those that older networks read.
+        allowed = (N_FIRST_INPUTS, len(right)) if right is INPUTS else (len(right),)
+        if len(names) not in allowed:
             raise ValueError(f"has {len(names)} columns: should have {len(right)}")
         return names
 

@@ -84,10 +84,7 @@ class Homing:
 def homing_commands(
     frame: MotionFrame, observations: NDArray[np.float32], period: float
 ) -> NDArray[np.float64]:
-    """Return the policy's commands (N, 4) for the rows that `frame` read last; period in s.
-
-    Imitation asks this of the frame of the network that plays.
-    """
+    """Return the policy's commands (N, 4) for the rows that `frame` read last; period in s."""
     numbers = ((frame.counts - 1) * period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
     commands = np.zeros((len(observations), 4))
     decide_homing(observations, frame.memory, frame.keys, numbers, period, commands)

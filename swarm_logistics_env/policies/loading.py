@@ -25,6 +25,7 @@ from swarm_logistics_env.policies.tuned import SUFFIX as TUNED
 from swarm_logistics_env.policies.tuned import read_tuned
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
+SUFFIXES = (SUFFIX, TUNED, SB3_SUFFIX)  # of policy files
 WEIGHTS = Path(__file__).parent / "weights"
 
 
@@ -166,7 +167,7 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
         return functools.partial(load_tuned, path)
     if path.is_file() and path.suffix != ".py":
         raise PolicyError(
-            f"{name} is no policy file: should end in {SUFFIX}, {TUNED} or {SB3_SUFFIX}"
+            f"{name} is no policy file: should end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         )
     return None
 
@@ -206,9 +207,10 @@ def _imported(name: str) -> Callable[..., Policy] | None:
         for part in attribute.split("."):
             found = getattr(found, part)
     except (ImportError, AttributeError, ValueError) as error:
-        raise PolicyError(
-            f"policy {name!r} cannot be imported: {error}{_classes_of(module)}"
-        ) from None
+        hint = _classes_of(module)
+        if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
+            hint = ": should lie in this folder, on PYTHONPATH, or be installed"
+        raise PolicyError(f"policy {name!r} cannot be imported: {error}{hint}") from None
     except Exception as error:  # of code that is not ours
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error

@@ -36,7 +36,7 @@ class FeedForward:
         self._rectify = rectify
 
     def __call__(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the outputs (N, outputs) for rows (N, inputs)."""
+        """Return the outputs (N, outputs) for rows of at least `inputs` columns; it reads these."""
         outputs = np.empty((inputs.shape[0], self._widths[-1]), np.float32)
         run_network(inputs, self._weights, self._biases, self._widths, self._rectify, outputs)
         return outputs
@@ -78,7 +78,7 @@ def run_network(
     widest = widths.max()
     here, there = np.empty(widest, np.float32), np.empty(widest, np.float32)
     for row in range(inputs.shape[0]):
-        here[: widths[0]] = inputs[row]
+        here[: widths[0]] = inputs[row, : widths[0]]
         weight, bias = 0, 0
         for layer in range(n_layers):
             n_in, n_out = widths[layer], widths[layer + 1]

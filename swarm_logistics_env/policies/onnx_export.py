@@ -7,22 +7,24 @@ from pathlib import Path
 import numpy as np
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion.frame import INPUTS, LEAD, OUTPUTS
+from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
 from swarm_logistics_env.policies.files import CARD
 from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.policy import Policy
 
 # Both are old enough for the runtimes of 2022.
 OPERATORS, FORMAT = 17, 8
+DEVIATIONS = "deviations"  # in the metadata
 
 
 def write_onnx(policy: Policy, path: Path | str) -> None:
     """Write the network of a trained policy as an ONNX file.
 
-    Its input "inputs" is float32 (robots, 84), `motion.INPUTS` in this order; its output "outputs"
+    Its input "inputs" is float32 (robots, inputs), in the order of its card; its output "outputs"
     is float32 (robots, 3), `motion.OUTPUTS`. What makes inputs of observations and a memory, and
-    commands of outputs, is `motion.MotionFrame`; docs/onnx.md has it in words. The noise of a
-    policy that explores is not in the file; the card is, in its metadata.
+    commands of outputs, is `motion.MotionFrame`; docs/onnx.md has it in words. The metadata hold
+    the card, and as "deviations" three numbers: the standard deviations of the noise that is added
+    to the outputs at each step, zeros for a policy that does not explore.
 
     Args:
         policy: a trained one, as `policies.load("ppo-delivery")`.
@@ -49,7 +51,7 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
         # Such a policy reads zeros there. Without their weights it may be given anything.
         tensors["layers.0.weight"] = tensors["layers.0.weight"].copy()
         tensors["layers.0.weight"][:, LEAD] = 0.0
-    nodes, last = [], len(network.hidden)
+    nodes, last, real = [], len(network.hidden), TensorProto.FLOAT
     kind = {"tanh": "Tanh", "relu": "Relu"}[network.activation]
     at = "inputs"
     for layer in range(last + 1):
@@ -65,15 +67,17 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
         helper.make_graph(
             nodes,
             policy.card.name,
-            [helper.make_tensor_value_info("inputs", TensorProto.FLOAT, ["robots", len(INPUTS)])],
-            [helper.make_tensor_value_info("outputs", TensorProto.FLOAT, ["robots", len(OUTPUTS)])],
+            [helper.make_tensor_value_info("inputs", real, ["robots", len(network.inputs)])],
+            [helper.make_tensor_value_info("outputs", real, ["robots", len(OUTPUTS)])],
             [numpy_helper.from_array(tensor, name) for name, tensor in kept.items()],
         ),
         opset_imports=[helper.make_opsetid("", OPERATORS)],
         ir_version=FORMAT,
         producer_name="swarm-logistics-env",
     )
-    helper.set_model_props(model, {CARD: policy.card.to_json()})
+    noise = tensors["deviations"] * np.float32(network.exploration)
+    props = {CARD: policy.card.to_json(), DEVIATIONS: " ".join(map(str, noise.tolist()))}
+    helper.set_model_props(model, props)
     checker.check_model(model)
     path = Path(path)
     try:

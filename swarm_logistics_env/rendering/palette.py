@@ -39,12 +39,19 @@ COLOURS: dict[str, RGB] = {
     "LINK": LINK, "BEAM": BEAM, "ITEM": ITEM, "ITEM_EDGE": ITEM_EDGE, "TRAIL": TRAIL,
 }  # fmt: skip
 
+# The same for a page on a dark screen: what lies behind is dark, what moves keeps its hue.
+DARK_COLOURS: dict[str, RGB] = {
+    **COLOURS, "INK": (236, 236, 236), "SURROUNDINGS": (22, 24, 27), "FLOOR": (34, 37, 41),
+    "FLOOR_LINE": (46, 50, 55), "DELIVERY_AREA": (28, 54, 47), "DELIVERY_HATCH": (40, 74, 64),
+    "DELIVERY_WORD": (128, 170, 156), "OBSTACLE": (120, 124, 130), "SHUFFLING": (38, 134, 204),
+    "LINK": (214, 120, 172), "ITEM": (96, 101, 108), "ITEM_EDGE": (160, 164, 170),
+    "TRAIL": (120, 124, 130),
+}  # fmt: skip
+
 # Curves of runs side by side, and how thick they are [px].
-RUNS: tuple[tuple[RGB, float], ...] = (
-    (REQUESTED, 3.0),
-    (SHUFFLING, 1.5),
-    (TIMER, 4.0),
-    (LINK, 2.0),
+RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5), ("TIMER", 4.0), ("LINK", 2.0))
+RUNS: tuple[tuple[RGB, float], ...] = tuple(
+    (COLOURS[name], thickness) for name, thickness in RUN_NAMES
 )
 
 # The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.

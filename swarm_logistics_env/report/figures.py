@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.drawing import Panel
 from swarm_logistics_env.report.wording import DECIDED, listed, percent, seeds_text
@@ -61,21 +59,23 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
 
 
 def _faults(results: StudyResults) -> Iterator[Figure]:
-    asked = _asked(results, "fault")
-    groups = groups_of(asked, "policy", "table", "onset", "n_robots")
-    for (policy, table, onset, swarm), tests in groups:
+    for (table, onset, swarm), tests in groups_of(
+        _asked(results, "fault"), "table", "onset", "n_robots"
+    ):
         start = f", faults from {onset:g} s" if onset else ""
-        points = tests.assign(
-            series=tests["after"].map("m = {:g}".format), category=tests["factor"]
-        )
-        if policy != asked["policy"].iloc[0]:
-            points["published"] = np.nan  # crosses for one policy are enough
+        numbers = tests["after"].map("{:g}".format)
+        x_label = "failure mode and number m of faulty robots"
+        if len(tests["policy"].unique()) > 1:
+            points = _by_policy(tests, tests["factor"] + " " + numbers)
+        else:
+            points = tests.assign(series="m = " + numbers, category=tests["factor"])
+            x_label = "failure mode"
         title = (
-            f"{policy}, {table}, N = {swarm}{start}: "
+            f"{_policies(tests)}, {table}, N = {swarm}{start}: "
             f"{_caption(tests, 'per failure mode and number m of faulty robots')}"
         )
-        names = policy, table, f"{onset:g}s" if onset else ""
-        yield _interval_figure(results, names, title, tests, _panels(points, "failure mode"))
+        names = table, f"{onset:g}s" if onset else ""
+        yield _interval_figure(results, names, title, tests, _panels(points, x_label))
 
 
 def _ablations(results: StudyResults) -> Iterator[Figure]:

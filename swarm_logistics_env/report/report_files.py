@@ -1,21 +1,29 @@
-"""The report as files: HTML and Markdown to read, drawings, CSV to compute with.
+r"""The report as files: HTML, Markdown, LaTeX (\usepackage{booktabs}), drawings, and CSV.
 
 Equal rows give equal bytes.
 """
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.report.answer import digest
 from swarm_logistics_env.report.document import Document, document
 from swarm_logistics_env.report.drawing import INK, PAPER, images
-from swarm_logistics_env.report.markup import html, markdown
+from swarm_logistics_env.report.page_data import page_data
+from swarm_logistics_env.report.result_tables import Section
+from swarm_logistics_env.report.verdict_matrix import matrix_lines
+from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
+
+WIDTH = 100  # of the answer [characters]
 
 
 def write_report(
@@ -28,30 +36,30 @@ def write_report(
         StudyError: a file cannot be written.
     """
     whole = whole or document(results)
-    files = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
+    paths = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
     pictures, page = directory / "figures", directory / "report.html"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
-        write_csv(files[1], results.performance.drop(columns=["arm", "by_seed", "digests"]))
+        write_csv(paths[1], results.performance.drop(columns=["arm", "by_seed", "digests"]))
         write_csv(
-            files[2], results.indicators.drop(columns=["compared", "estimate", "equivalence_test"])
+            paths[2], results.indicators.drop(columns=["compared", "estimate", "equivalence_test"])
         )
         for figure in whole.figures():
             write_csv(pictures / f"{figure.name}.csv", figure.data)
         if missing := missing_packages():
-            write_text(files[0], markdown(whole, note=how_to_get_figures(missing)))
-            return files
+            write_text(paths[0], markdown(whole, note=how_to_get_figures(missing)))
+            return paths
         drawings = {}
         for figure in whole.figures():
             svg, png = images(figure.draw, figure.height)
             write_text(pictures / f"{figure.name}.svg", svg)
             (pictures / f"{figure.name}.png").write_bytes(png)
             drawings[figure.name] = _inline_svg(figure.name, svg)
-        write_text(files[0], markdown(whole, pictures=pictures.name))
-        write_text(page, html(whole, drawings))
+        write_text(paths[0], markdown(whole, pictures=pictures.name))
+        write_text(page, html(results, whole, drawings))
     except OSError as error:
         raise StudyError(f"cannot write {error.filename}: {error.strerror}") from error
-    return page, *files
+    return page, *paths
 
 
 def write_text(path: Path, text: str) -> None:
@@ -90,3 +98,150 @@ def how_to_get_figures(missing: Sequence[str]) -> str:
         f"report.html and the drawings of figures need {' and '.join(missing)}: "
         "pip install 'swarm-logistics-env[study]', then ask for the report again."
     )
+
+
+def markdown(document: Document, *, pictures: str | None = None, note: str = "") -> str:
+    """Return the whole report.
+
+    Args:
+        document: the report.
+        pictures: folder of the drawings beside the report; None: there are none.
+        note: a sentence to put below the title.
+    """
+    lines = [f"# {document.title}", ""]
+    for paragraph in (*document.text, note):
+        lines += [paragraph, ""] if paragraph else []
+    shown = digest(document.answer, WIDTH, None, most=None)
+    lines += ["## Answer", "", "```text", shown, "```", ""]
+    for chapter in document.chapters:
+        lines += [f"## {chapter.title}", ""]
+        lines += [chapter.text, ""] if chapter.text else []
+        for section in chapter.sections:
+            lines += [section_markdown(section, level=3, pictures=pictures)]
+    return "\n".join(lines)
+
+
+def section_markdown(section: Section, *, level: int = 2, pictures: str | None = None) -> str:
+    """Return one section, its heading of the given level."""
+    lines = [f"{'#' * level} {section.title}", ""] if section.title else []
+    lines += _figures(section, pictures)
+    if section.sentences:
+        lines += [f"* **{one.head}** {one.text}" for one in section.sentences] + [""]
+    if section.columns:
+        lines += [_row(section.columns), _row(["---"] * len(section.columns))]
+        lines += [_row(row) for row in section.rows] + [""]
+    for line in section.lines:
+        lines += [line, ""]
+    return "\n".join(lines)
+
+
+def _figures(section: Section, pictures: str | None) -> Iterator[str]:
+    for figure in section.figures:
+        if pictures is not None:
+            yield from (f"![{figure.name}]({pictures}/{figure.name}.png)", "")
+        yield from (figure.caption, "")
+
+
+def _row(values: Sequence[str]) -> str:
+    escaped = (value.replace("|", r"\|") for value in values)
+    return f"| {' | '.join(escaped)} |"
+
+
+def html(results: StudyResults, document: Document, drawings: Mapping[str, str]) -> str:
+    """Return the whole report as one page that loads nothing.
+
+    Args:
+        results: what its script draws.
+        document: the report.
+        drawings: inline SVG of every figure, by name.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("swarm_logistics_env", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["unbroken"] = _unbroken
+    environment.filters["arrows"] = _arrows
+    matrix = document.answer.matrix
+    data = page_data(results, matrix)
+    return environment.get_template("page.html.jinja").render(
+        document=document,
+        answer=document.answer,
+        lines=tuple(matrix_lines(matrix)),
+        found={cell.verdict for cell in matrix.cells()},
+        contradicted=any(cell.contradicts for cell in matrix.cells()),
+        signs=SIGNS,
+        questions=data["questions"],
+        drawings=drawings,
+        latex=latex_tables(document.summary),
+        # A text must not end the script that it stands in.
+        data=json.dumps(data, separators=(",", ":")).replace("</", "<\\/"),
+        script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
+    )
+
+
+def _unbroken(text: str) -> str:
+    """Return text whose numbers keep their units, and equations their two sides, on one line."""
+    held = r"(?<=\d) (?=%|s\b)| (?=[=<→] )|(?<=[=<→]) "
+    return re.sub(held, "\N{NO-BREAK SPACE}", _arrows(text))
+
+
+def _arrows(text: str) -> str:
+    return text.replace("->", "→")
+
+
+_ESCAPES = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "->": r"$\to$",
+    "–": "--",
+    "∞": r"$\infty$",
+    "†": r"\dag{}",
+    "<": "$<$",
+    ">": "$>$",
+}
+_FOUND = re.compile("|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True))))
+
+
+def latex_tables(sections: Iterable[Section]) -> str:
+    """Return the tables of sections, each a table environment with its title as caption."""
+    return "\n".join(_latex_table(section) for section in sections if section.rows)
+
+
+def _latex_table(section: Section) -> str:
+    lines = [
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{_escaped(section.title)}}}",
+        rf"\begin{{tabular}}{{{'l' * len(section.columns)}}}",
+        r"\toprule",
+        _latex_row(section.columns),
+        r"\midrule",
+        *map(_latex_row, section.rows),
+        r"\bottomrule",
+        r"\end{tabular}",
+        r"\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _latex_row(cells: Iterable[str]) -> str:
+    # In braces: a row that starts with "[" would be read as an option of the line break before it.
+    return " & ".join(f"{{{_escaped(cell)}}}" for cell in cells) + r" \\"
+
+
+def _escaped(text: str) -> str:
+    return _FOUND.sub(lambda found: _ESCAPES[found[0]], text)

@@ -6,16 +6,17 @@ import json
 from collections.abc import Iterator
 from importlib.metadata import version
 
-from swarm_logistics_env.report.recorded_setup import recorded_setup
 from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.report.wording import NOTHING
+from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
 from swarm_logistics_env.studies.plan import Plan
 
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:
     """Return everything that was held fixed and everything that was varied."""
     if plan.imported_from is not None:
-        return recorded_setup(plan)
+        return _recorded_setup(plan)
     policies = {condition.policy.label: condition.policy.identity for condition in plan.conditions}
     return (
         Section("Study", lines=tuple(_study(plan))),
@@ -90,3 +91,82 @@ def _variations(plan: Plan) -> Iterator[str]:
         if differing:
             title = factor.title or type(factor).__name__
             yield f"{title} differs: {', '.join(differing)}."
+
+
+def _recorded_setup(plan: Plan) -> tuple[Section, ...]:
+    """Return what is known of the trials, the set-up that the user states, and the methods."""
+    shared = "Paired by the seeds that it names" if plan.paired else "Unpaired: it names no seeds"
+    known = (
+        f"Study {plan.specification.name!r}: {len(plan.conditions)} conditions, imported from "
+        f"{plan.imported_from}. {shared}. Of their conditions what varies is known, and what is "
+        "stated below."
+    )
+    unstated = () if plan.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
+    return (
+        Section("Study", lines=(known,)),
+        Section("Set-up as stated", ("condition", "value"), plan.setup, unstated),
+    )
+
+
+def methods(plan: Plan) -> str:
+    """Return a paragraph for a paper: what was measured, how it was estimated and tested."""
+    asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
+    names = [DEFINITIONS[symbol].heading for symbol in asked]
+    listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    n = len(plan.seeds)
+    if plan.paired:
+        what = "trials" if plan.imported_from else "simulated runs"
+        trials = f"{n} {what} of each of {len(plan.conditions)} conditions, paired by seed"
+        test = "the paired t-test (Fieller's interval)"
+        if n >= MIN_SEEDS:
+            test += " and its studentised bootstrap, whichever gives the larger p"
+    else:
+        trials = f"up to {n} independent trials of each of {len(plan.conditions)} conditions"
+        test = "Welch's t-test for independent samples"
+    return (
+        f"We measured performance P in {trials}. We report {listed}, each a ratio of mean "
+        f"performances, with the 95 % interval that inverts {test}. An indicator is called above "
+        "its threshold (supported) or below it (refuted) where this test rejects at 2.5 % on that "
+        "side, equivalent where it does not but two one-sided tests find that P changes by less "
+        f"than {100 * plan.specification.margin:.3g} % of P_o, else inconclusive; p is adjusted by "
+        "Holm's method over all comparisons of one indicator for one policy. Computed with "
+        "swarm-logistics-env "
+        f"{version('swarm-logistics-env')}."
+    )
+
+
+def glossary(plan: Plan) -> Section:
+    """Return what the words and letters of the report mean."""
+    asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
+    rows = [
+        ("P", f"performance: {plan.specification.played.performance}"),
+        ("P_o, P_new", "P in the original condition, and in the changed one"),
+        *((DEFINITIONS[symbol].heading, _meaning(DEFINITIONS[symbol])) for symbol in asked),
+        *_WORDS,
+    ]
+    return Section("", ("word", "meaning"), tuple(rows))
+
+
+def _meaning(definition: Definition) -> str:
+    """Return an indicator's formula, which its function's docstring begins with, and its words."""
+    formula, *_ = (definition.function.__doc__ or "").strip().splitlines()
+    formula = formula.partition(" (paper")[0].rstrip(".")
+    adjectives = (f"above {x:g} {adjective}" for x, adjective in definition.adjectives.items())
+    return "; ".join([formula, *adjectives])
+
+
+_WORDS = (
+    ("N, m", "number of robots of the swarm; number of those added, faulty or removed"),
+    ("seed", "number that decides the layout, the requests, which robots fail and the behaviour"),
+    ("paired", "all conditions are played over the same seeds, and compared seed by seed"),
+    ("twin", "the run of the same seed in the original condition"),
+    ("supported, refuted", "above, or below, the threshold beyond chance"),
+    ("equivalent", "the indicator is open, but P changes by less than the declared margin"),
+    ("open, inconclusive", "these seeds cannot tell"),
+    ("same runs, unaffected", "both conditions gave the same runs: exact, and no evidence"),
+    ("blocked", "runs failed or are missing"),
+    ("Holm", "adjustment of a family of verdicts so that any error among them has 5 % at most"),
+    ("provisional", "the verdict assumes normal differences: below ten seeds, or unpaired"),
+    ("claim", "what the reference says of an indicator"),
+    ("†", "P is capped: every item was delivered in at least one run"),
+)

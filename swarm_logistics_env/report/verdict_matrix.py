@@ -26,9 +26,15 @@ _GAP = "  "
 
 @dataclass(frozen=True)
 class Cell:
-    """One question asked of one policy; `test` is its row in the table of indicators."""
+    """One question asked of one policy: its row in the table of indicators, and that one's number.
+
+    Attributes:
+        test: the row.
+        number: its place in the table.
+    """
 
     test: Row
+    number: int
 
     @property
     def verdict(self) -> str:
@@ -66,7 +72,7 @@ class MatrixRow:
     def label(self) -> str:
         """What is asked, e.g. "FT FM4", "S superlinear" or "A delivery_width"."""
         if self.asked.startswith("P falls"):  # the factor is the policy in its place
-            return f"{self.asked}: {self.factor} instead"
+            return f"{self.asked.replace('by more than', '>')}: {self.factor}"
         return " ".join(filter(None, (self.indicator, self.factor, self.asked)))
 
 
@@ -121,6 +127,7 @@ def verdict_matrix(results: StudyResults) -> VerdictMatrix:
     # Faults of another swarm or onset, and other parameters, have other steps.
     apart = tests["n_robots"].where(tests["kind"] == "fault", 0)
     tests = tests.assign(
+        number=range(len(tests)),
         onset=tests["onset"].fillna(0.0),
         apart=apart.astype(object).where(tests["kind"] != "parameter", tests["factor"]),
     )
@@ -137,7 +144,7 @@ def _block(table: str, kind: str, onset: float, tests: pd.DataFrame) -> Block:
         cells: dict[str, list[Cell | None]] = {}
         for test in rows_of(here):
             line = cells.setdefault(test.policy, [None] * len(at))
-            line[at.index(_step(test))] = Cell(test)
+            line[at.index(_step(test))] = Cell(test, test.number)
         start = f" from {onset:g} s" if onset else ""
         rows.append(
             MatrixRow(
@@ -178,43 +185,49 @@ def _axis(kind: str, steps: Sequence[tuple[float, float]]) -> str:
 
 
 @dataclass(frozen=True)
-class TextRow:
-    """A line of the matrix in a terminal: rows of one factor that have equal steps, joined.
+class Line:
+    """A line of the matrix as it is shown: rows of one factor, which have equal steps.
 
     Attributes:
-        label: what is asked, and the steps where the line above has others.
-        signs: a text a policy, e.g. "✓✓? ✓✓✗".
+        label: what is asked.
+        axis: the steps in words; empty where the line above has the same.
+        rows: their signs stand one after the other; empty for a heading.
     """
 
     label: str
-    signs: tuple[str, ...]
+    axis: str
+    rows: tuple[MatrixRow, ...]
+
+    @property
+    def text(self) -> str:
+        """Label and steps."""
+        return f"{self.label}{_GAP}{self.axis}".rstrip()
+
+    def signs(self, policy: str) -> str:
+        """Return the signs of a policy, e.g. "✓✓? ✓✓✗"."""
+        return " ".join(
+            "".join(cell.mark if cell else NOT_ASKED for cell in row.cells.get(policy, ()))
+            for row in self.rows
+        )
 
 
-def text_rows(matrix: VerdictMatrix) -> Iterator[TextRow]:
-    """Yield the matrix as lines; FT and R of one failure mode share one."""
+def matrix_lines(matrix: VerdictMatrix) -> Iterator[Line]:
+    """Yield the matrix line by line; FT and R of one failure mode share one."""
     labels = [{row.label for row in block.rows} for block in matrix.blocks]
     for place, block in enumerate(matrix.blocks):
         others = set().union(*(found for other, found in enumerate(labels) if other != place))
         if others & labels[place]:
-            yield TextRow(f"{block.title}:", ("",) * len(matrix.policies))
+            yield Line(f"{block.title}:", "", ())
         joined: dict[str, list[MatrixRow]] = {}
         for row in block.rows:
             joined.setdefault(row.label if row.asked else row.factor, []).append(row)
-        axis = f"{_GAP}{block.axis}"
+        axis = block.axis
         for rows in joined.values():
             label = rows[0].label
             if len(rows) > 1:
                 label = f"{', '.join(row.indicator for row in rows)} {rows[0].factor}".strip()
-            signs = tuple(_signs(rows, policy) for policy in matrix.policies)
-            yield TextRow(label + axis, signs)
+            yield Line(label, axis, tuple(rows))
             axis = ""
-
-
-def _signs(rows: Sequence[MatrixRow], policy: str) -> str:
-    return " ".join(
-        "".join(cell.mark if cell else NOT_ASKED for cell in row.cells.get(policy, ()))
-        for row in rows
-    )
 
 
 def text_lines(matrix: VerdictMatrix, width: int, most: int | None = None) -> list[str]:
@@ -225,11 +238,11 @@ def text_lines(matrix: VerdictMatrix, width: int, most: int | None = None) -> li
         width: of the terminal; more policies than fit stand in further blocks of lines.
         most: lines at most, rows that do not fit are counted in the last one; None: all lines.
     """
-    rows = list(text_rows(matrix))
-    left = max(len(text) for text in (matrix.legend, *(row.label for row in rows)))
+    rows = list(matrix_lines(matrix))
+    left = max(len(text) for text in (matrix.legend, *(row.text for row in rows)))
     room = width - left
     names, key = list(matrix.policies), []
-    signs = [max(len(row.signs[i]) for row in rows) for i in range(len(names))]
+    signs = [max(len(row.signs(policy)) for row in rows) for policy in matrix.policies]
     if sum(len(_GAP) + max(len(name), n) for name, n in zip(names, signs)) > room:
         key = [f"({number}) {name}" for number, name in enumerate(names, start=1)]
         names = [f"({number})" for number in range(1, len(names) + 1)]
@@ -243,8 +256,8 @@ def text_lines(matrix: VerdictMatrix, width: int, most: int | None = None) -> li
     for part in shown:
         lines.append(_line(matrix.legend.ljust(left), [names[i].ljust(widths[i]) for i in part]))
         for row in rows:
-            cells = [row.signs[i].ljust(widths[i]) for i in part]
-            lines.append(_line(row.label.ljust(left), cells))
+            cells = [row.signs(matrix.policies[i]).ljust(widths[i]) for i in part]
+            lines.append(_line(row.text.ljust(left), cells))
     if most is not None and len(lines) > most:
         lines = [*lines[: most - 1], f"and {len(lines) - most + 1} lines more: --full"]
     return lines

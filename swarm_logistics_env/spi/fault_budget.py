@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
+from .estimate import Estimate
 from .inputs import IndicatorError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from .estimate import Estimate
 
 
 class FaultBudget(NamedTuple):

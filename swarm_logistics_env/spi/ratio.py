@@ -8,14 +8,12 @@ skewed would be a pretest, and err.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .bootstrap import MIN_SEEDS, critical_value, resampled_pivots, upper_p
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 # Differences this far below the numbers they are taken from are rounding, not spread between seeds.
 ROUNDING = 1e-12

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from .inputs import IndicatorError, between_0_and_1, performance
 from .scaling_laws import (
     CURVES,
+    Curve,
+    Law,
     peak_of,
     power_exponential_start,
     shapes_with_peak_at,
     sharpness_of,
     usl_start,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from .scaling_laws import Curve, Law
-
 
 Weighting = Literal["1/P", "none"]
 

@@ -9,18 +9,15 @@ that is unlike reality gains nothing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from .inputs import IndicatorError, between_0_and_1, performance, same_seeds
 from .ratio import ROUNDING, RatioTest, limits_from_moments, probability_of
 from .summaries import Interval
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import ArrayLike, NDArray
 
 LEAST_REAL_RUNS = 10  # below, the regression on so few runs is no control
 

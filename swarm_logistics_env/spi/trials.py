@@ -6,15 +6,12 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .inputs import IndicatorError
 from .trials_table import Table, read_table
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 NO_FAULT = "none"
 REMOVED = "removed"

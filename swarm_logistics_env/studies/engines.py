@@ -1,4 +1,7 @@
-"""Engines: what plays the runs. Whichever does, the outcomes are the same; their order is not."""
+"""Engines: what plays the runs. Whichever does, the outcomes are the same; their order is not.
+
+The process engine is here, that of Ray in `ray_cluster`.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,12 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.runs import Condition, Run
 from swarm_logistics_env.tasks.task import Outcome
+
+# Simulated seconds that are played to know how long a study takes.
+PILOT = 3.0
 
 Engine = Callable[[Iterable[Run]], Generator[tuple[Run, Outcome], None, None]]
 
@@ -101,7 +108,7 @@ class ProcessPool:
         waiting = deque(runs)
         while waiting:
             interrupted: list[Run] = []
-            with _workers(min(self.count, len(waiting))) as pool:
+            with workers(min(self.count, len(waiting))) as pool:
                 for run, outcome in _played(pool, waiting, self.count):
                     if outcome is None:
                         interrupted.append(run)
@@ -136,7 +143,7 @@ def _played(
 
 def _played_alone(run: Run) -> Outcome:
     others = set(multiprocessing.active_children())
-    with _workers(1) as pool:
+    with workers(1) as pool:
         (worker,) = set(multiprocessing.active_children()) - others
         try:
             return pool.submit(_play, run.key, _pickled(run)).result()
@@ -149,7 +156,7 @@ def _played_alone(run: Run) -> Outcome:
 
 
 @contextmanager
-def _workers(count: int) -> Iterator[ProcessPoolExecutor]:
+def workers(count: int) -> Iterator[ProcessPoolExecutor]:
     """Start worker processes, and end them at once with the block, or when this process dies."""
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)
@@ -225,3 +232,36 @@ def _interrupts_ignored() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def expected_seconds(plan: Plan) -> float:
+    """Return how long a study takes at most on one process of this machine [s].
+
+    The start of one condition is played for each policy and swarm size. Runs that deliver all items
+    end earlier than their duration, so this is an upper bound.
+
+    Raises:
+        StudyError: a policy fails in its first seconds.
+    """
+    shortened = {_kind(condition): condition for condition in plan.conditions}
+    pace = {kind: _pace(plan, condition) for kind, condition in shortened.items()}
+    return len(plan.seeds) * sum(pace[_kind(c)] * c.duration for c in plan.conditions)
+
+
+def _kind(condition: Condition) -> tuple[str, int]:
+    return condition.policy.identity, condition.size
+
+
+def _pace(plan: Plan, condition: Condition) -> float:
+    """Return the wall time of a simulated second [s]."""
+    duration = min(PILOT, condition.duration)
+    scenario = condition.task.vary(condition.scenario, {"duration": duration})
+    run = Condition(condition.policy, scenario, task=condition.task).run(plan.code, 0)
+    outcomes = [execute(run) for _ in range(2)]  # the first may compile
+    for outcome in outcomes:
+        if outcome.error is not None:
+            reason = outcome.error.strip().splitlines()[-1]
+            raise StudyError(
+                f"policy {condition.policy.label!r} fails in its first seconds: {reason}"
+            )
+    return min(outcome.wall_seconds for outcome in outcomes) / duration

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
 from swarm_logistics_env.studies import comparisons, metadata
 from swarm_logistics_env.studies.comparisons import Arm, Comparison, NullPair, Setting
+from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.studies.specification import Specification
@@ -86,11 +88,9 @@ def import_results(
             for number, row in enumerate(rows):
                 run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
                 store.add(run, _outcome(run.key, row))
-        store.set_note(metadata.SPECIFICATION, specification.to_json())
-        store.set_note(metadata.CODE, RECORDED.code())
-        store.set_note(metadata.IDENTITIES, "{}")
-        store.set_note(metadata.DECLARED_SEEDS, str(specification.seeds))
-        store.set_note(metadata.IMPORTED, origin.to_json())
+        declared = Declaration.of(specification)
+        notes = metadata.rows_of(specification, RECORDED.code(), {}, declared)
+        store.note({**notes, "imported": origin.to_json()})
     return len(trials.rows)
 
 
@@ -168,6 +168,10 @@ def _scenario(row: Trial) -> RecordedScenario:
     )
 
 
+_Cells = tuple[RecordedCell, ...]
+_Fixed = tuple[tuple[str, float], ...]  # name and value of what is the same in a table
+
+
 def _tables(file: Path, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
     """Yield what can be compared: all rows that differ in one thing alone, for each thing."""
     for policy in dict.fromkeys(row.policy for row in rows):
@@ -176,46 +180,69 @@ def _tables(file: Path, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
             here = [row for row in own if row.table == table]
             plain = [row for row in here if row.fault == NO_FAULT]
             if table in ("", "size"):
-                yield from _of_sizes(policy, plain)
+                sized = [row for row in plain if row.n_robots is not None]
+                yield from _split(
+                    policy, "Scalability", sized, lambda row: row.parameters, _size_cells
+                )
             if table in ("", "fault"):
-                yield from _of_faults(file, policy, here)
+                title = "Fault tolerance and robustness"
+                yield from _split(
+                    policy, title, here, _all_but(None), lambda group: _fault_cells(file, group)
+                )
             for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
-                yield from _of_parameter(file, policy, name, plain)
+                cells_of = partial(_parameter_cells, file, name, dict(plain[0].parameters)[name])
+                title = f"Adaptability to {name}"
+                yield from _split(policy, title, plain, _all_but(name), cells_of)
 
 
-def _of_sizes(policy: str, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
-    groups = _grouped((row.parameters, row) for row in rows if row.n_robots is not None)
-    groups = {key: group for key, group in groups.items() if len({r.n_robots for r in group}) > 1}
-    for parameters, group in groups.items():
-        scenarios = {scenario.n_robots: scenario for scenario in map(_scenario, group)}
-        yield RecordedTable(
-            policy=policy,
-            title=_title("Scalability", parameters, several=len(groups) > 1),
-            cells=tuple(
-                RecordedCell(kind="size", name="n_robots", value=n, scenario=scenarios[n])
-                for n in sorted(scenarios)
-            ),
+def _split(
+    policy: str,
+    general: str,
+    rows: Sequence[Trial],
+    fixed: Callable[[Trial], _Fixed],
+    cells_of: Callable[[Sequence[Trial]], _Cells],
+) -> Iterator[RecordedTable]:
+    """Yield a table for each group of rows that have the same fixed values and differ in a cell."""
+    groups: dict[_Fixed, list[Trial]] = {}
+    for row in rows:
+        groups.setdefault(fixed(row), []).append(row)
+    tables = {key: cells_of(group) for key, group in groups.items()}
+    tables = {key: cells for key, cells in tables.items() if len(cells) > 1}
+    for key, cells in tables.items():
+        told = ", ".join(f"{name} = {value:g}" for name, value in key)
+        title = f"{general} ({told})" if len(tables) > 1 else general
+        yield RecordedTable(policy=policy, title=title, cells=cells)
+
+
+def _all_but(varied: str | None) -> Callable[[Trial], _Fixed]:
+    """Return what gives a row's size and parameters, but for the one that is varied."""
+    return lambda row: (
+        ("N", float(row.n_robots or 0)),
+        *(pair for pair in row.parameters if pair[0] != varied),
+    )
+
+
+def _size_cells(group: Sequence[Trial]) -> _Cells:
+    scenarios = {scenario.n_robots: scenario for scenario in map(_scenario, group)}
+    return tuple(
+        RecordedCell(kind="size", name="n_robots", value=n, scenario=scenarios[n])
+        for n in sorted(scenarios)
+    )
+
+
+def _fault_cells(file: Path, group: Sequence[Trial]) -> _Cells:
+    broken = next((row for row in group if row.faulty), None)
+    if broken is None:
+        return ()
+    if not any(row.fault == NO_FAULT for row in group):
+        raise StudyError(
+            f"{file}, line {broken.line}: has the fault {broken.fault!r}, but no row without "
+            "one (fault none) of the same robots and parameters: R and FT are relative to it"
         )
-
-
-def _of_faults(file: Path, policy: str, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
-    groups = _grouped((((("N", float(row.n_robots or 0)), *row.parameters)), row) for row in rows)
-    groups = {key: group for key, group in groups.items() if any(row.faulty for row in group)}
-    for key, group in groups.items():
-        broken = next(row for row in group if row.faulty)
-        if not any(row.fault == NO_FAULT for row in group):
-            raise StudyError(
-                f"{file}, line {broken.line}: has the fault {broken.fault!r}, but no row without "
-                "one (fault none) of the same robots and parameters: R and FT are relative to it"
-            )
-        cells = [_fault_cell(row) for row in group]
-        # What faults are measured against stands first, then the pair that shows chance alone.
-        cells.sort(key=lambda cell: (cell.fault is not None, cell.repeated))
-        yield RecordedTable(
-            policy=policy,
-            title=_title("Fault tolerance and robustness", key, several=len(groups) > 1),
-            cells=tuple(dict.fromkeys(cells)),
-        )
+    cells = [_fault_cell(row) for row in group]
+    # What faults are measured against stands first, then the pair that shows chance alone.
+    cells.sort(key=lambda cell: (cell.fault is not None, cell.repeated))
+    return tuple(dict.fromkeys(cells))
 
 
 def _fault_cell(row: Trial) -> RecordedCell:
@@ -233,54 +260,18 @@ def _fault_cell(row: Trial) -> RecordedCell:
     )
 
 
-def _of_parameter(
-    file: Path, policy: str, name: str, rows: Sequence[Trial]
-) -> Iterator[RecordedTable]:
-    groups = _grouped(
-        (
-            (
-                ("N", float(row.n_robots or 0)),
-                *(pair for pair in row.parameters if pair[0] != name),
-            ),
-            row,
+def _parameter_cells(file: Path, name: str, x_o: float, group: Sequence[Trial]) -> _Cells:
+    by_value = {dict(row.parameters)[name]: row for row in group}
+    values = sorted(by_value, key=lambda x: x != x_o)  # a stable sort: x_o, then as in the file
+    if values[0] == 0.0 and len(values) > 1:
+        raise StudyError(
+            f"{file}, line {by_value[0.0].line}: {name} = 0 is x_o, as in the first row, "
+            "and A is relative to x_o: let a row with another value stand first"
         )
-        for row in rows
+    return tuple(
+        RecordedCell(kind="parameter", name=name, value=value, scenario=_scenario(by_value[value]))
+        for value in values
     )
-    groups = {key: g for key, g in groups.items() if len({dict(r.parameters)[name] for r in g}) > 1}
-    x_o = dict(rows[0].parameters)[name]
-    for key, group in groups.items():
-        by_value = {dict(row.parameters)[name]: row for row in group}
-        values = sorted(by_value, key=lambda x: x != x_o)  # a stable sort: x_o, then as in the file
-        if values[0] == 0.0:
-            raise StudyError(
-                f"{file}, line {by_value[0.0].line}: {name} = 0 is x_o, as in the first row, "
-                "and A is relative to x_o: let a row with another value stand first"
-            )
-        yield RecordedTable(
-            policy=policy,
-            title=_title(f"Adaptability to {name}", key, several=len(groups) > 1),
-            cells=tuple(
-                RecordedCell(
-                    kind="parameter", name=name, value=value, scenario=_scenario(by_value[value])
-                )
-                for value in values
-            ),
-        )
-
-
-_Fixed = tuple[tuple[str, float], ...]
-
-
-def _grouped(rows: Iterable[tuple[_Fixed, Trial]]) -> dict[_Fixed, list[Trial]]:
-    groups: dict[_Fixed, list[Trial]] = {}
-    for key, row in rows:
-        groups.setdefault(key, []).append(row)
-    return groups
-
-
-def _title(general: str, fixed: _Fixed, *, several: bool) -> str:
-    told = ", ".join(f"{name} = {value:g}" for name, value in fixed)
-    return f"{general} ({told})" if several else general
 
 
 def _refuse_unused(file: Path, rows: Sequence[Trial], used: Iterable[Sequence[Trial]]) -> None:

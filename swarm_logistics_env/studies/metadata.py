@@ -1,123 +1,150 @@
-"""Metadata: what a store says of its study besides the runs."""
+"""Metadata: what a store says of its study besides the runs, and one study merged of several."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
+from pydantic_core import to_json
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.equivalence import MARGIN
+from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.runs import seeds_in_words
 from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
 from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT, NAMES, refuse_untrusted
 
-if TYPE_CHECKING:
-    from swarm_logistics_env.studies.plan import Plan
-    from swarm_logistics_env.studies.specification import Specification
-    from swarm_logistics_env.studies.store import Store
-
-
-SPECIFICATION = "specification"  # JSON
-CODE = "code"  # version
-IDENTITIES = "identities"  # of policies, JSON
-DECLARED_SEEDS = "declared_seeds"  # how many, at the first run
-DECLARED_FIRST_SEED = "declared_first_seed"  # at the first run; absent: 0
-DECLARED_LOOKS = "declared_looks"  # JSON, at the first run
-DECLARED_MARGIN = "declared_margin"  # at the first run; absent: the default
-IMPORTED = "imported"  # the source of imported results; absent if the runs were played
-
-_NEEDED = (SPECIFICATION, CODE, IDENTITIES, DECLARED_SEEDS)
-
-
-# int() reads them back, so nothing but digits may stand there.
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
 _Share = Annotated[float, Field(gt=0, lt=1)]
 
 
-class _Specified(Record):
-    # What is read of a stored specification before its task is known.
-    model_config = ConfigDict(extra="ignore")
+class StoredSpecification(BaseModel):
+    """What a stored specification says before its task is known, and the fields that it holds."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
 
     name: str
     seeds: _Count
     policies: tuple[Any, ...]
-    first_seed: _Seed = 0
+    first_seed: _Seed = 0  # older stores say neither of these two
     task: str = DEFAULT
 
+    @property
+    def seed_numbers(self) -> range:
+        """The seeds of every condition."""
+        return range(self.first_seed, self.first_seed + self.seeds)
 
-# These are read as JSON.
-_FORMS: dict[str, TypeAdapter[Any]] = {
-    SPECIFICATION: TypeAdapter(_Specified),
-    IDENTITIES: TypeAdapter(dict[str, str]),
-    DECLARED_SEEDS: TypeAdapter(_Count),
-    DECLARED_FIRST_SEED: TypeAdapter(_Seed),
-    DECLARED_LOOKS: TypeAdapter(tuple[_Count, ...]),
-    DECLARED_MARGIN: TypeAdapter(_Share),
-    IMPORTED: TypeAdapter(Origin),
-}
+    def read(
+        self, place: Path, *, task: Task | None = None, trust_code: bool = False
+    ) -> Specification:
+        """Return the specification, of a store in `place`.
 
+        Args:
+            task: the task that it names; None: it is found by that name.
+            trust_code: whether it may be found by importing it, which runs its module.
 
-def reads(name: str, value: object) -> bool:
-    """Return whether a store's note is of the form that it should have."""
-    if not isinstance(value, str):
-        return False
-    try:
-        if name in _FORMS:
-            _FORMS[name].validate_json(value)
-    except ValidationError:
-        return False
-    return True
-
-
-def planned(store: Store, directory: Path) -> dict[str, str]:
-    """Return the notes from which the plan of a stored study follows.
-
-    Raises:
-        StudyError: one is missing.
-    """
-    found = {name: store.note(name) for name in (*_NEEDED, DECLARED_FIRST_SEED, DECLARED_LOOKS)}
-    for name in _NEEDED:
-        if found[name] is None:
+        Raises:
+            StudyError: it is damaged, or its task cannot be found.
+        """
+        if task is None and ":" not in self.task and self.task not in NAMES:
             raise StudyError(
-                f"the store in {directory} does not note its {name}: run the study once more "
-                "there (finished runs are kept), then it will"
+                f"{place}: was played on the task {self.task!r}, an object: should be handed over "
+                "again, as Study.stored(.., task=..)"
             )
-    return {name: value for name, value in found.items() if value is not None}
+        if task is None:
+            refuse_untrusted(self.task, place, trust_code=trust_code)
+        return Specification(**{**self.model_dump(), "task": task or self.task})
 
 
-def read_stored(
-    text: str, place: Path, *, task: Task | None = None, trust_code: bool = False
-) -> Specification:
-    """Return the specification that a store in `place` holds as JSON.
+class Metadata(BaseModel):
+    """What a store notes of its study; each field is a row of text, in JSON but for the code.
 
-    Args:
-        task: the task that it names; None: it is found by that name.
-        trust_code: whether it may be found by importing it, which runs its module.
+    Attributes:
+        specification: what the study asks.
+        code: version of the code that plays it.
+        identities: of the policies, by their names in the specification.
+        declared_seeds, declared_first_seed, declared_looks, declared_margin: at the first run.
+        imported: the source of imported results; None: the runs were played.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    specification: Json[StoredSpecification]
+    code: str
+    identities: Json[dict[str, str]]
+    declared_seeds: Json[_Count]
+    declared_first_seed: Json[_Seed] = 0
+    declared_looks: Json[tuple[_Count, ...]] = ()
+    declared_margin: Json[_Share] = MARGIN
+    imported: Json[Origin] | None = None
+
+    @classmethod
+    def of(cls, store: Store) -> Self | None:
+        """Return what a store notes; None: nothing yet, or not all that is needed.
+
+        Raises:
+            StudyError: a row does not read.
+        """
+        notes = store.notes()
+        if _missing_in(notes):
+            return None
+        try:
+            return cls.model_validate(notes, strict=True)
+        except ValidationError as error:
+            name = error.errors()[0]["loc"][0]
+            raise StudyError(
+                f"the store {store.path} is damaged: its note {name!r} does not read"
+            ) from None
+
+    @property
+    def declared(self) -> Declaration:
+        """What was declared before the first run."""
+        first = self.declared_first_seed
+        seeds = range(first, first + self.declared_seeds)
+        return Declaration(seeds, self.declared_looks, self.declared_margin)
+
+
+def of_existing(directory: Path) -> Metadata:
+    """Return what the store of a study that was run or imported notes.
 
     Raises:
-        StudyError: it is damaged, or its task cannot be found.
+        StudyError: there is none, something is missing in it, or does not read.
     """
-    fields = json.loads(text)
-    named = fields.get("task", DEFAULT)
-    if task is not None:
-        fields["task"] = task
-    elif ":" not in named and named not in NAMES:
-        raise StudyError(
-            f"{place}: was played on the task {named!r}, an object: should be handed over again, "
-            "as Study.stored(.., task=..)"
-        )
-    else:
-        refuse_untrusted(named, place, trust_code=trust_code)
-    return Specification(**fields)
+    with Store.existing(directory) as store:
+        found = Metadata.of(store)
+        if found is None:
+            raise StudyError(
+                f"the store in {directory} does not note its {_missing_in(store.notes())}: run the "
+                "study once more there (finished runs are kept), then it will"
+            )
+        return found
+
+
+def _missing_in(notes: Mapping[str, object]) -> str | None:
+    needed = (name for name, field in Metadata.model_fields.items() if field.is_required())
+    return next((name for name in needed if name not in notes), None)
+
+
+def rows_of(
+    specification: object, code: str, identities: Mapping[str, str], declared: Declaration
+) -> dict[str, str]:
+    """Return the rows that `Metadata.of` reads, of a study that is played."""
+    notes = {
+        "specification": specification,
+        "identities": dict(identities),
+        "declared_seeds": len(declared.seeds),
+        "declared_first_seed": declared.seeds.start,
+        "declared_looks": declared.looks,
+        "declared_margin": declared.margin,
+    }
+    return {"code": code, **{name: to_json(value).decode() for name, value in notes.items()}}
 
 
 # Below ten seeds a verdict rests on normal differences: no look is proposed there.
@@ -142,25 +169,6 @@ class Declaration:
     def of(cls, specification: Specification) -> Self:
         """Return what a study declares that is run for the first time."""
         return cls(specification.seed_numbers, specification.looks, specification.margin)
-
-    @classmethod
-    def noted(cls, store: Store) -> Self | None:
-        """Return what a store notes; None: nothing yet."""
-        count = store.note(DECLARED_SEEDS)
-        if count is None:
-            return None
-        first = int(store.note(DECLARED_FIRST_SEED) or 0)
-        looks = json.loads(store.note(DECLARED_LOOKS) or "[]")
-        margin = float(store.note(DECLARED_MARGIN) or MARGIN)
-        return cls(range(first, first + int(count)), tuple(looks), margin)
-
-    def note(self, store: Store) -> None:
-        """Write it into a store."""
-        store.set_note(DECLARED_FIRST_SEED, str(self.seeds.start))
-        store.set_note(DECLARED_LOOKS, json.dumps(self.looks))
-        store.set_note(DECLARED_MARGIN, str(self.margin))
-        # The number of seeds is written last, so a store that has it has the others as well.
-        store.set_note(DECLARED_SEEDS, str(len(self.seeds)))
 
     def covers(self, plan: Plan) -> bool:
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
@@ -194,3 +202,86 @@ class Declaration:
 def _counted(seeds: Sequence[int]) -> str:
     count = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
     return f"{count} ({seeds_in_words(seeds)})"
+
+
+def merge(directories: Sequence[Path], out: Path) -> int:
+    """Write the runs of several stores into a new one; return how many runs it holds.
+
+    The studies must be one but for their seeds and their policies, of which the merged one has
+    all. A run that failed in one store and succeeded in another succeeded. Only the seeds that
+    every study declared count as declared, so verdicts over more of them are exploratory.
+
+    Args:
+        directories: of the studies.
+        out: directory of the merged one; it may hold theirs, but no study of its own.
+
+    Raises:
+        StudyError: a store cannot be read, the studies differ, seeds lie between theirs that none
+            has, two stores have different results of one run, or `out` holds a study.
+    """
+    refuse_study_in(out, "merge")
+    stored = {directory: of_existing(directory) for directory in directories}
+    for directory, found in stored.items():
+        if found.imported is not None:
+            raise StudyError(f"{directory} was imported: only studies that were run are merged")
+    merged = _united(stored)
+    with new_store(out) as store:
+        for directory in directories:
+            store.absorb(directory / FILE_NAME)
+        store.note(merged)
+        return len(store)
+
+
+def _united(stored: dict[Path, Metadata]) -> dict[str, str]:
+    """Return the metadata of studies as that of one."""
+    # Sort by seeds, so that each study joins the seeds of those before it.
+    first, *others = sorted(
+        stored, key=lambda directory: stored[directory].specification.first_seed
+    )
+    one = stored[first]
+    fields, identities, declared = one.specification.model_dump(), one.identities, one.declared
+    for directory in others:
+        other = stored[directory]
+        if other.code != one.code:
+            raise StudyError(
+                f"{first} was played under code version {one.code}, {directory} under "
+                f"{other.code}: a verdict never mixes two versions"
+            )
+        for name in ("looks", "margin"):
+            if getattr(other.declared, name) != getattr(declared, name):
+                raise StudyError(f"{first} and {directory} declared different {name}")
+        fields = _joined(fields, other.specification, first, directory)
+        for part in identities.keys() & other.identities.keys():
+            if identities[part] != other.identities[part]:
+                raise StudyError(
+                    f"the {part} of {first} is not the one of {directory}: its code differs"
+                )
+        identities = {**identities, **other.identities}
+        mine, theirs = declared.seeds, other.declared.seeds
+        both = range(max(mine.start, theirs.start), min(mine.stop, theirs.stop))
+        # Without a common seed any part will do: nobody declared the whole.
+        declared = replace(declared, seeds=both or mine)
+    return rows_of(fields, one.code, identities, declared)
+
+
+def _joined(
+    fields: dict[str, Any], other: StoredSpecification, first: Path, directory: Path
+) -> dict[str, Any]:
+    """Return the fields of a specification, with the seeds and the policies of another as well."""
+    theirs = other.model_dump()
+    free = ("first_seed", "seeds", "policies")
+    names = [name for name in {**fields, **theirs} if name not in free]
+    differing = [name for name in names if fields.get(name) != theirs.get(name)]
+    if differing:
+        raise StudyError(f"{first} and {directory} differ in {', '.join(differing)}: not one study")
+    stop = fields["first_seed"] + fields["seeds"]
+    if other.first_seed > stop:
+        raise StudyError(
+            f"{directory} has the seeds from {other.first_seed} on, the studies before it end with "
+            f"seed {stop - 1}: seeds lie between them that no study has, and to judge them as one "
+            "study each seed is needed"
+        )
+    seeds = max(stop, other.seed_numbers.stop) - fields["first_seed"]
+    policies = [*fields["policies"], *theirs["policies"]]
+    distinct = [policy for n, policy in enumerate(policies) if policy not in policies[:n]]
+    return {**fields, "seeds": seeds, "policies": distinct}

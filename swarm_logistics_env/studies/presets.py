@@ -1,4 +1,4 @@
-"""The studies that come with the package, and the paper's tables and claims that one of them tests.
+"""The studies that come with the package, and the paper's tables and claims for one of them.
 
 Source: Milner, Sooriyabandara and Hauert, Swarm Performance Indicators: Metrics for Robustness,
 Fault Tolerance, Scalability and Adaptability; Tables I to III and the text around them.
@@ -7,16 +7,11 @@ Fault Tolerance, Scalability and Adaptability; Tables I to III and the text arou
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Question, Reference, Setting
-from swarm_logistics_env.studies.specification import (
-    Ablation,
-    Faults,
-    Parameter,
-    Sizes,
-    Specification,
-)
+from swarm_logistics_env.studies.specification import Specification, read_study_file
 
 
 def size(n: int) -> Setting:
@@ -102,73 +97,8 @@ PAPER = Reference(
     claims=_claims(),
 )
 
-# One set of defaults for all tables. Table I delivers 74 of its items, so it cannot have held 60.
-PAPER_STUDY = Specification(
-    name="paper",
-    reference="paper",
-    sizes=(
-        Sizes(
-            title="Table I: scalability",
-            values=tuple(PAPER_SIZES),
-            superlinear=((10, 20), (30, 40)),
-            scenario={"preset": "paper_scalability"},
-        ),
-    ),
-    faults=(
-        Faults(
-            title="Table II: fault tolerance and robustness",
-            modes=tuple(mode for mode in PAPER_FAULTS if mode != "removed"),
-        ),
-    ),
-    parameters=tuple(
-        Parameter(
-            title=f"Table III: adaptability to {name}",
-            name=name,
-            values=tuple(PAPER_PARAMETERS[name]),
-        )
-        for name in PAPER_PARAMETERS
-    ),
-    # Swarm D-T without its taxis, in the scenario of Tables II and III and at N = 100 of Table I.
-    ablations=(
-        Ablation(title="Ablation: without taxis", policy="random-walk"),
-        Ablation(
-            title="Ablation: without taxis",
-            policy="random-walk",
-            fall=1 / 3,
-            scenario={"preset": "paper_scalability", "n_robots": 100},
-        ),
-    ),
-)
-
-# Every indicator once, in under a minute on two cores at 4 seeds.
-QUICK = Specification(
-    name="quick",
-    seeds=4,
-    scenario={"duration": 300.0},
-    sizes=(Sizes(values=(10, 25)),),
-    faults=(
-        Faults(modes=("FM4",), robots=(2,)),
-        Faults(
-            title="Faults in mid-run",
-            modes=("FM4",),
-            robots=(2,),
-            onsets=(100.0,),
-            scenario={"restock": True},
-        ),
-    ),
-    parameters=(Parameter(name="delivery_width", values=(2.0, 1.0)),),
-    ablations=(Ablation(policy="random-walk"),),
-)
-
-# Restock: with a finite store the rate falls towards the end, faults or not.
-RESILIENCE = Specification(
-    name="resilience",
-    scenario={"duration": 2000.0, "restock": True},
-    faults=(Faults(title="Faults in mid-run", modes=("FM1", "FM4", "dead"), onsets=(666.7,)),),
-)
-
-
-PRESETS = {study.name: study for study in (PAPER_STUDY, QUICK, RESILIENCE)}
+_FOLDER = Path(__file__).parent / "preset_studies"
+PRESETS = {path.stem: read_study_file(path) for path in sorted(_FOLDER.glob("*.toml"))}
 
 
 def load_preset(name: str) -> Specification:

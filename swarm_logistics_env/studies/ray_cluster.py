@@ -5,15 +5,13 @@ from __future__ import annotations
 import os
 import traceback
 from collections.abc import Generator, Iterable
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import Any
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies.engines import execute
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 RETRIES = 1  # after a worker's death, as local processes do
 QUEUED_PER_CORE = 2  # so that no core waits for this process

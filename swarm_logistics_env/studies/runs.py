@@ -1,16 +1,18 @@
-"""Conditions, known by their content, and the runs that one condition needs."""
+"""Conditions, known by their content, the runs that one condition needs, and shards of runs."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
-from itertools import pairwise
-from typing import Any
+from itertools import islice, pairwise
+from typing import Any, Self
 
 from swarm_logistics_env import streams
+from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT
 
@@ -103,6 +105,43 @@ class Run:
             return self.seed
         # 31 bits: policies hand it to generators of all kinds.
         return streams.key(self.seed, "other behaviour", behaviour) & 0x7FFFFFFF
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Part `number` of `count`, counted from 1.
+
+    Raises:
+        StudyError: there is no such part.
+    """
+
+    number: int
+    count: int
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.number <= self.count:
+            raise StudyError(f"shard {self}: should be i/n with i from 1 to n")
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the shard that "i/n" means."""
+        match = re.fullmatch(r"(\d+)/(\d+)", text)
+        if match is None:
+            raise StudyError(f"shard {text}: should be i/n, e.g. 2/8")
+        return cls(int(match[1]), int(match[2]))
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    @property
+    def directory(self) -> str:
+        """Name of the directory of its store: shards on one disk never share a file."""
+        return f"shard-{self.number}-of-{self.count}"
+
+    def of(self, runs: Iterable[Run]) -> Iterator[Run]:
+        """Yield every n-th run from the i-th on."""
+        # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
+        return islice(runs, self.number - 1, None, self.count)
 
 
 def _canonical(value: object) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.database import Database
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
@@ -165,20 +164,16 @@ class Store:
                     row["delivery_times"] = _times(row["delivery_times"], row["delivered"]).tolist()
                 yield row
 
-    def note(self, name: str) -> str | None:
-        """Return what was noted under `name`."""
-        for row in self._database.read("SELECT value FROM notes WHERE name = ?", name):
-            if not metadata.reads(name, row["value"]):
-                raise StudyError(
-                    f"the store {self.path} is damaged: its note {name!r} does not read"
-                )
-            return str(row["value"])
-        return None
-
-    def set_note(self, name: str, value: str) -> None:
-        """Note a fact about the study."""
+    def note(self, notes: Mapping[str, str]) -> None:
+        """Note facts about the study, by name; earlier ones of these names are replaced."""
         with self._database.transaction() as write:
-            write("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
+            for row in notes.items():
+                write("INSERT OR REPLACE INTO notes VALUES (?, ?)", row)
+
+    def notes(self) -> dict[str, object]:
+        """Return what was noted about the study, by name."""
+        rows = self._database.read("SELECT name, value FROM notes")
+        return {row["name"]: row["value"] for row in rows}
 
     @contextmanager
     def _sound(self) -> Iterator[None]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
@@ -13,19 +12,16 @@ from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.studies import metadata
 from swarm_logistics_env.studies.engines import Engine, engine_named
 from swarm_logistics_env.studies.importing import imported_plan
-from swarm_logistics_env.studies.metadata import Declaration
+from swarm_logistics_env.studies.metadata import Declaration, Metadata, of_existing, rows_of
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.studies.shards import Shard
+from swarm_logistics_env.studies.runs import Run, Shard
 from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 from swarm_logistics_env.studies.until_clear import standing
-from swarm_logistics_env.tasks.recorded_trials import Origin
 from swarm_logistics_env.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -132,21 +128,13 @@ class Study:
                 found.
         """
         out = Path(out)
-        with Store.existing(out) as store:
-            noted = metadata.planned(store, out)
-            imported = store.note(metadata.IMPORTED)
-        specification = metadata.read_stored(
-            noted[metadata.SPECIFICATION], out, task=task, trust_code=trust_code
-        )
+        noted = of_existing(out)
+        specification = noted.specification.read(out, task=task, trust_code=trust_code)
         study = cls._of(specification, out)
-        if imported is not None:
-            study._plan = imported_plan(study.specification, Origin.from_json(imported))
-            return study
-        study._plan = make_plan(
-            study.specification,
-            code=noted[metadata.CODE],
-            identities=json.loads(noted[metadata.IDENTITIES]),
-        )
+        if noted.imported is not None:
+            study._plan = imported_plan(specification, noted.imported)
+        else:
+            study._plan = make_plan(specification, code=noted.code, identities=noted.identities)
         return study
 
     @classmethod
@@ -199,12 +187,9 @@ class Study:
             )
         whole = list(shard.of(plan.runs()) if shard else plan.runs())
         with self._store() as store:
-            self._refuse_another(store)
-            if Declaration.noted(store) is None:
-                Declaration.of(self.specification).note(store)
-            store.set_note(metadata.SPECIFICATION, self.specification.to_json())
-            store.set_note(metadata.CODE, plan.code)
-            store.set_note(metadata.IDENTITIES, json.dumps(dict(plan.identities)))
+            noted = self._own_metadata(store)
+            declared = noted.declared if noted else Declaration.of(self.specification)
+            store.note(rows_of(self.specification, plan.code, plan.identities, declared))
             done = store.succeeded()
             played = _Played(sum(run.key in done for run in whole))
             if not until_clear:
@@ -262,9 +247,8 @@ class Study:
             return None  # nothing has been run: what is asked now will be declared
         plan = self.plan()
         with self._store(existing=True) as store:
-            self._refuse_another(store)
-            declared = Declaration.noted(store)
-        return None if declared is None or declared.covers(plan) else declared.warning(plan)
+            noted = self._own_metadata(store)
+        return None if not noted or noted.declared.covers(plan) else noted.declared.warning(plan)
 
     def findings(self) -> StudyResults:
         """Return every cell and every verdict, from the runs that are there.
@@ -274,7 +258,8 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            return judge(plan, store.outcomes(plan.runs()), Declaration.noted(store))
+            noted = Metadata.of(store)
+            return judge(plan, store.outcomes(plan.runs()), noted.declared if noted else None)
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error."""
@@ -314,17 +299,21 @@ class Study:
             raise StudyError("report needs a path: the study is kept in memory")
         return write_report(self.findings(), directory)
 
-    def _refuse_another(self, store: Store) -> None:
-        if store.note(metadata.IMPORTED) is not None:
+    def _own_metadata(self, store: Store) -> Metadata | None:
+        """Return what the store says of this study; raise StudyError if it is another one's."""
+        noted = Metadata.of(store)
+        if noted is None:
+            return None
+        if noted.imported is not None:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         # The report and the declared seeds are one study's.
-        noted = store.note(metadata.SPECIFICATION)
-        name = self.specification.name
-        if noted is not None and (there := json.loads(noted)["name"]) != name:
+        name, there = self.specification.name, noted.specification.name
+        if there != name:
             raise StudyError(
                 f"{self.out} holds the study {there!r}: should be another directory for the study "
                 f"{name!r}, or, if it is the same under a new name, name = {there!r}"
             )
+        return noted
 
     @contextmanager
     def _store(self, *, existing: bool = False) -> Iterator[Store]:

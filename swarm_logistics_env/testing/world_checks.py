@@ -17,7 +17,7 @@ from swarm_logistics_env.testing.playing import (
     robot_of,
 )
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import FAILURE_MODES
+from swarm_logistics_env.warehouse.faults import failure_mode
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 
@@ -167,7 +167,7 @@ def check_faults(
         _check_gone(moment, gone)
         for robot, before in enumerate(held):
             # A mode that holds before and after a step held throughout it.
-            modes = [FAILURE_MODES[m] for m in before if m in state.failure_modes[robot]]
+            modes = [failure_mode(m) for m in before if m in state.failure_modes[robot]]
             took = state.robot_item[robot] not in (carried[robot], NOBODY)
             if took and not all(mode.lifts for mode in modes):
                 _complain(moment, robot, before, f"lifts item {state.robot_item[robot]}")

@@ -107,17 +107,6 @@ def linears(policy: Any) -> list[torch.nn.Linear]:
     return [*hidden, policy.action_net]
 
 
-def actor_parameters(policy: Any) -> list[torch.nn.Parameter]:
-    """Return what there is to learn between inputs and outputs."""
-    return [parameter for linear in linears(policy) for parameter in linear.parameters()]
-
-
-def outputs_of(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
-    """Return the most likely outputs (N, outputs) of PPO's policy, with their gradient."""
-    outputs: torch.Tensor = policy.action_net(policy.mlp_extractor.forward_actor(inputs))
-    return outputs
-
-
 def _array(tensor: torch.Tensor) -> NDArray[np.float32]:
     return tensor.detach().cpu().numpy().astype(np.float32).copy()
 

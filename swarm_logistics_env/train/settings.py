@@ -1,12 +1,14 @@
-"""The tables of a training file: worlds, conditions, imitation, PPO and what is measured."""
+"""The tables of a training file: worlds, conditions, PPO and what is measured."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     AfterValidator,
+    BeforeValidator,
     Field,
     NonNegativeFloat,
     NonNegativeInt,
@@ -21,7 +23,6 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
 
-Share = Annotated[float, Field(ge=0, le=1)]
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 
@@ -35,31 +36,24 @@ def _known(modes: tuple[str, ...]) -> tuple[str, ...]:
 Modes = Annotated[tuple[str, ...], AfterValidator(_known)]
 
 
+def one_of(record: type[Record]) -> Callable[[object], object]:
+    """Return what makes a record of a table, and leaves anything else as it is."""
+    # The record's own constructor raises errors that suggest the field that was meant.
+    return lambda value: record(**value) if isinstance(value, dict) else value
+
+
+def each_of(record: type[Record]) -> Callable[[object], object]:
+    """Return what makes a tuple of records of a list of tables."""
+    one = one_of(record)
+    return lambda values: (
+        tuple(one(value) for value in values) if isinstance(values, list | tuple) else values
+    )
+
+
 class Part(Record):
     """A table of a training, or all of it."""
 
     error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
-
-
-class WorldKind(Part):
-    """Worlds of one kind, among those that stand side by side.
-
-    Args:
-        count: how many.
-        n_robots: the swarm size.
-        scenario: fields in which they differ from the training's scenario.
-    """
-
-    count: PositiveInt = 1
-    n_robots: PositiveInt = 25
-    scenario: dict[str, Any] = Field(default_factory=dict)
-
-    @field_validator("scenario")
-    @classmethod
-    def _possible(cls, fields: dict[str, Any]) -> dict[str, Any]:
-        if "n_robots" in fields:
-            raise ValueError("the swarm size is a field of its own, `n_robots`")
-        return fields
 
 
 class Conditions(Part):
@@ -97,6 +91,29 @@ class Conditions(Part):
         return fields
 
 
+class WorldKind(Part):
+    """Worlds of one kind, among those that stand side by side.
+
+    Args:
+        count: how many.
+        n_robots: the swarm size.
+        scenario: fields in which they differ from the training's scenario.
+        conditions: kinds of episodes that are mixed in these worlds; none: the training's.
+    """
+
+    count: PositiveInt = 1
+    n_robots: PositiveInt = 25
+    scenario: dict[str, Any] = Field(default_factory=dict)
+    conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
+
+    @field_validator("scenario")
+    @classmethod
+    def _possible(cls, fields: dict[str, Any]) -> dict[str, Any]:
+        if "n_robots" in fields:
+            raise ValueError("the swarm size is a field of its own, `n_robots`")
+        return fields
+
+
 class Indicators(Part):
     """Indicators as the reward, see `wrappers.IndicatorReward`.
 
@@ -116,33 +133,6 @@ class Indicators(Part):
     initial: PositiveFloat = 30.0
     credit: Literal["team", "deliverer", "carriers"] = "team"
     constant: bool = True
-
-
-class Imitation(Part):
-    """A start from imitating the scripted policy `homing`, the expert, by DAgger.
-
-    Args:
-        rounds: of play and fit.
-        seconds: of play in a round [s].
-        sizes: swarm sizes that play side by side.
-        beta: the share of decisions that the expert takes, round by round; 0 in later rounds.
-        noise: standard deviation of what is added to the outputs played, one for each.
-        common_share: the share that is kept of the moments in which nothing rare happens.
-        fit, last_fit: gradient steps after a round, and after the last.
-        batch: samples in each.
-        learning_rate: of Adam; a fifth of it in the last 30 % of the steps.
-    """
-
-    rounds: PositiveInt = 6
-    seconds: PositiveFloat = 60.0
-    sizes: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (25, 10, 50, 5, 25, 15, 40)
-    beta: tuple[Share, ...] = (1.0, 0.3)
-    noise: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat] = (0.15, 0.15, 0.05)
-    common_share: Share = 0.12
-    fit: PositiveInt = 1200
-    last_fit: PositiveInt = 3000
-    batch: PositiveInt = 1024
-    learning_rate: PositiveFloat = 2e-3
 
 
 class PPOSettings(Part):

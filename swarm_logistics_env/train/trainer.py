@@ -20,7 +20,6 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.curve import BEST, PICTURE, TrainingLog
 from swarm_logistics_env.train.evaluation import evaluate, reference_means, score
-from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import (
     device_of,
     linears,
@@ -79,11 +78,6 @@ def train(
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
         restore(learner, state)
-    elif training.imitation is not None:
-        imitate(learner.policy, training, training.imitation)
-        # Seeded anew, so that PPO does not depend on how long the imitation took.
-        learner.set_random_seed(training.seed)
-        save_checkpoint(out, learner, view, log)
     elif first is not None:
         take_tensors(learner.policy, first.tensors)
     if learner.num_timesteps < training.agent_steps:
@@ -117,7 +111,8 @@ def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
     return LiveTable(
         training.name,
         training.agent_steps,
-        done,
+        "agent-steps",
+        done=done,
         about=f"N = {asked.n_robots}, {asked.seeds} seeds",
         references=log.references,
         before=[(int(row["agent_steps"]), log.measures(row)) for row in log.curve],

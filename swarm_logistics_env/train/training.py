@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
-from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
-from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
-    Imitation,
     Indicators,
     Part,
     PPOSettings,
     Scores,
     WorldKind,
+    each_of,
+    one_of,
 )
 
 PRESETS = Path(__file__).parent / "presets"
@@ -34,18 +33,6 @@ Seed = Annotated[int, Field(ge=0, lt=2**32)]
 def as_scenario(value: object) -> object:
     """Return the scenario of a table of fields; anything else as it is."""
     return Scenario(**value) if isinstance(value, dict) else value
-
-
-def _one(record: type[Record]) -> Callable[[object], object]:
-    # The record's own constructor raises errors that suggest the field that was meant.
-    return lambda value: record(**value) if isinstance(value, dict) else value
-
-
-def _each(record: type[Record]) -> Callable[[object], object]:
-    one = _one(record)
-    return lambda values: (
-        tuple(one(value) for value in values) if isinstance(values, list | tuple) else values
-    )
 
 
 class Training(Part):
@@ -62,10 +49,9 @@ class Training(Part):
         seed: decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
-            added to them.
+            added to them. Potentials are discounted by `ppo.gamma`.
         indicators: pays them instead of the task.
         conditions: kinds of episodes that are mixed; none: nobody fails.
-        imitation: what comes before PPO; none: it begins from nothing, or from `start`.
         network: what the policy reads and commands.
         ppo, evaluation, scores: see there.
 
@@ -78,19 +64,18 @@ class Training(Part):
     scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
     start: str | None = None
     worlds: Annotated[
-        tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(_each(WorldKind))
+        tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
     ] = (WorldKind(count=6),)
     threads: PositiveInt = 2
     seed: Seed = 0
     agent_steps: PositiveInt = 2_000_000
     rewards: dict[str, float] = Field(default_factory=lambda: {"delivery": 1.0})
-    indicators: Annotated[Indicators | None, BeforeValidator(_one(Indicators))] = None
-    conditions: Annotated[tuple[Conditions, ...], BeforeValidator(_each(Conditions))] = ()
-    imitation: Annotated[Imitation | None, BeforeValidator(_one(Imitation))] = None
-    network: Annotated[Network, BeforeValidator(_one(Network))] = Network()
-    ppo: Annotated[PPOSettings, BeforeValidator(_one(PPOSettings))] = PPOSettings()
-    evaluation: Annotated[Evaluation, BeforeValidator(_one(Evaluation))] = Evaluation()
-    scores: Annotated[Scores, BeforeValidator(_one(Scores))] = Scores()
+    indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
+    conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
+    network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
+    ppo: Annotated[PPOSettings, BeforeValidator(one_of(PPOSettings))] = PPOSettings()
+    evaluation: Annotated[Evaluation, BeforeValidator(one_of(Evaluation))] = Evaluation()
+    scores: Annotated[Scores, BeforeValidator(one_of(Scores))] = Scores()
 
     @field_validator("name")
     @classmethod
@@ -102,7 +87,9 @@ class Training(Part):
     @field_validator("rewards")
     @classmethod
     def _terms(cls, rewards: dict[str, float]) -> dict[str, float]:
-        RewardTerms(rewards)
+        if "discount" in rewards:
+            raise ValueError("discount: should be left out, it is `ppo.gamma`")
+        RewardTerms(_discounted(rewards, 1.0))
         return rewards
 
     @model_validator(mode="after")
@@ -111,24 +98,16 @@ class Training(Part):
         if any(scenario.message_size for scenario in scenarios):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         played = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
-        if self.imitation is not None:
-            played |= set(self.imitation.sizes)
-            if self.imitation.seconds < self.scenario.control_period:
-                raise ValueError(
-                    f"imitation.seconds = {self.imitation.seconds}: should be at least the "
-                    f"control period, {self.scenario.control_period} s"
-                )
-            if self.start is not None:
-                raise ValueError(f"start = {self.start!r}: should be left out beside `imitation`")
         for size in sorted(played):
             self.scenario.replace(n_robots=size)
-        smallest = min(scenario.n_robots for scenario in scenarios)
-        most = max((max(kind.robots) for kind in self.conditions if kind.modes), default=0)
-        if most > smallest:
-            raise ValueError(
-                f"conditions.robots = {most}: should be at most the smallest swarm, "
-                f"{smallest} robots"
-            )
+        for world in self.worlds:
+            mixed = world.conditions or self.conditions
+            most = max((max(kind.robots) for kind in mixed if kind.modes), default=0)
+            if most > world.n_robots:
+                raise ValueError(
+                    f"conditions.robots = {most}: should be at most the smallest swarm, "
+                    f"{world.n_robots} robots"
+                )
         rows = self.rows * self.ppo.n_steps
         if rows % self.ppo.n_minibatches:
             raise ValueError(
@@ -136,6 +115,11 @@ class Training(Part):
                 f"{self.rows} robots x {self.ppo.n_steps} steps"
             )
         return self
+
+    @property
+    def reward_weights(self) -> dict[str, float]:
+        """The rewards as the environment takes them: potentials with the learner's discount."""
+        return _discounted(self.rewards, self.ppo.gamma)
 
     @property
     def world_scenarios(self) -> tuple[Scenario, ...]:
@@ -147,9 +131,20 @@ class Training(Part):
         )
 
     @property
+    def world_conditions(self) -> tuple[tuple[Conditions, ...], ...]:
+        """The kinds of episodes that every world mixes."""
+        return tuple(
+            kind.conditions or self.conditions for kind in self.worlds for _ in range(kind.count)
+        )
+
+    @property
     def rows(self) -> int:
         """Robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
+
+
+def _discounted(rewards: dict[str, float], gamma: float) -> dict[str, float]:
+    return rewards if POTENTIALS.isdisjoint(rewards) else {**rewards, "discount": gamma}
 
 
 def preset_names() -> list[str]:

@@ -40,7 +40,10 @@ def make_worlds(training: Training) -> SwarmVecEnv:
 
 def _make_env(training: Training, references: References, world: int) -> Wrapper:
     scenario = training.world_scenarios[world]
-    env = EpisodeMix(SwarmLogisticsEnv(scenario, rewards=training.rewards), training.conditions)
+    env = EpisodeMix(
+        SwarmLogisticsEnv(scenario, rewards=training.reward_weights),
+        training.world_conditions[world],
+    )
     asked = training.indicators
     if asked is None:
         return env

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -26,6 +26,7 @@ from swarm_logistics_env.train.training import Seed, as_scenario
 
 if TYPE_CHECKING:
     import optuna
+    from rich.console import Console
 
 STORAGE = "trials.sqlite"
 RESULT = "result.json"
@@ -85,12 +86,13 @@ class Tuning(Record):
 
 @dataclass(frozen=True)
 class Trial:
-    """Parameters that were tried, and their value for each objective."""
+    """Parameters that were tried, their value for each objective, and what was kept of them."""
 
     number: int
     parameters: dict[str, float]
     values: tuple[float, ...]
     is_best: bool
+    kept: dict[str, Any]
 
 
 def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
@@ -102,29 +104,14 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
     Raises:
         TrainingError: the directory holds another search or cannot be used.
     """
-    import optuna
-
     out = Path(out)
     enter(out, asked, command)
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = optuna.create_study(
-        study_name=asked.policy,
-        storage=f"sqlite:///{(out / STORAGE).resolve()}",
-        directions=["maximize"] * len(asked.objectives),
-        load_if_exists=True,
-    )
-    for trial in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):
-        study.tell(trial.number, state=optuna.trial.TrialState.FAIL)  # it was cut short
-    if not study.get_trials():
-        study.enqueue_trial(_own_parameters(asked.policy))
-    done = len(_completed(study))
-    with LiveTable(f"tuning {asked.policy}", asked.trials, done, unit="trials") as table:
-        while done < asked.trials:
-            values = _try(study, asked, done)
-            done = len(_completed(study))
-            table.reach(done)
-            table.measured(dict(zip(asked.objectives, values)))
-    trials = _trials(study)
+
+    def try_one(trial: optuna.Trial, number: int) -> tuple[float, ...]:
+        return _try(trial, asked)
+
+    own = _own_parameters(asked.policy)
+    trials = search(out, asked.policy, asked.objectives, asked.trials, asked.seed, own, try_one)
     best = max(trials, key=lambda trial: trial.values[0])
     record = TunedPolicy(
         policy=asked.policy,
@@ -140,6 +127,57 @@ def tune(asked: Tuning, out: str | Path, *, command: str = "") -> list[Trial]:
     part.write_text(json.dumps(json.loads(record.to_json()), indent=2) + "\n", encoding="utf-8")
     part.replace(out / RESULT)
     return trials
+
+
+def search(
+    out: Path,
+    name: str,
+    objectives: Sequence[str],
+    n_trials: int,
+    seed: int,
+    own: dict[str, float],
+    try_one: Callable[[optuna.Trial, int], tuple[float, ...]],
+    console: Console | None = None,
+) -> list[Trial]:
+    """Try parameters until there are `n_trials`, and return them all; or go on with it.
+
+    Args:
+        out: the directory of the search's storage.
+        objectives: names of what is maximised.
+        own: the parameters that are tried first.
+        try_one: takes a trial to ask for its parameters, and the number of trials before it;
+            returns the values of the objectives.
+        console: the console that shows how far it is; None means standard error.
+    """
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(
+        study_name=name,
+        storage=f"sqlite:///{(out / STORAGE).resolve()}",
+        directions=["maximize"] * len(objectives),
+        load_if_exists=True,
+    )
+    for cut_short in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):
+        study.tell(cut_short.number, state=optuna.trial.TrialState.FAIL)
+    done = len(_completed(study))
+    if not done and not study.get_trials(states=[optuna.trial.TrialState.WAITING]):
+        study.enqueue_trial(own)
+    with LiveTable(f"tuning {name}", n_trials, "trials", done=done, console=console) as table:
+        while done < n_trials:
+            # Each has its own sampler, so that a search that was stopped goes on as it would have.
+            study.sampler = optuna.samplers.TPESampler(seed=(seed * 100_003 + done) % 2**32)
+            trial = study.ask()
+            values = try_one(trial, done)
+            study.tell(trial, values)
+            done += 1
+            table.reach(done)
+            table.measured(dict(zip(objectives, values)))
+    best = {trial.number for trial in study.best_trials}
+    return [
+        Trial(t.number, dict(t.params), tuple(t.values), t.number in best, dict(t.user_attrs))
+        for t in _completed(study)
+    ]
 
 
 def values_of(asked: Tuning, found: Evaluated) -> tuple[float, ...]:
@@ -185,20 +223,13 @@ def confirm(
     )
 
 
-def _try(study: optuna.Study, asked: Tuning, done: int) -> tuple[float, ...]:
-    import optuna
-
-    # Each trial has its own sampler, so that a search that was stopped goes on as it would have.
-    study.sampler = optuna.samplers.TPESampler(seed=(asked.seed * 100_003 + done) % 2**32)
-    trial = study.ask()
+def _try(trial: optuna.Trial, asked: Tuning) -> tuple[float, ...]:
     parameters: dict[str, Any] = {name: trial.suggest_float(name, *RANGES[name]) for name in RANGES}
     needs_faults = asked.objectives != ("P",)
     faults = dict.fromkeys((*asked.modes, "removed"), asked.robots) if needs_faults else {}
     evaluation = Evaluation(seeds=asked.seeds, n_robots=asked.scenario.n_robots, faults=faults)
     policy = policies.load(asked.policy, **parameters)
-    values = values_of(asked, evaluate(policy, asked.scenario, evaluation, asked.threads))
-    study.tell(trial, values)
-    return values
+    return values_of(asked, evaluate(policy, asked.scenario, evaluation, asked.threads))
 
 
 def _own_parameters(policy: str) -> dict[str, Any]:
@@ -213,11 +244,3 @@ def _completed(study: optuna.Study) -> list[Any]:
     import optuna
 
     return list(study.get_trials(states=[optuna.trial.TrialState.COMPLETE]))
-
-
-def _trials(study: optuna.Study) -> list[Trial]:
-    best = {trial.number for trial in study.best_trials}
-    return [
-        Trial(t.number, dict(t.params), tuple(t.values), t.number in best)
-        for t in _completed(study)
-    ]

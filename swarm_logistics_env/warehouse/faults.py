@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, ClassVar, Self
+from dataclasses import MISSING, dataclass, fields, replace
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+from pydantic import (
+    Field,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from swarm_logistics_env.errors import FaultError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
+from swarm_logistics_env.warehouse.roles import ROLES, robots_in_role
 from swarm_logistics_env.warehouse.state import WarehouseState
 from swarm_logistics_env.warehouse.structs import LONGEST_RADIO_DELAY
 
@@ -137,12 +148,74 @@ FAILURE_MODES: dict[str, FailureMode] = {
     ),
 }
 
+# What a mode can take, each with the fields of `FailureMode` that tell of it.
+CAPABILITIES: dict[str, tuple[str, ...]] = {
+    "move": ("speed", "wears", "obeys"),
+    "sense": ("view", "rangers", "ranger_bias", "rangers_refresh"),
+    "pick_up": ("lifts",),
+    "deliver": ("delivers", "releases_inside"),
+    "send": ("sends", "radio_delay"),
+    "hear": ("hears",),
+    "tell_the_truth": ("honest",),
+    "be_there": ("present",),
+}
+_SOUND = {each.name: each.default for each in fields(FailureMode) if each.default is not MISSING}
+_PARTIAL = re.compile(r"(?P<mode>\w+)\[(?P<lost>\w+(,\w+)*)\]")
+
+
+def lost_capabilities(mode: str) -> tuple[str, ...]:
+    """Return the capabilities of `CAPABILITIES` that a mode takes, whole or in part.
+
+    Raises:
+        FaultError: there is no such mode.
+    """
+    found = failure_mode(mode)
+    changed = {name for name, sound in _SOUND.items() if getattr(found, name) != sound}
+    if found.factor is not None:  # the fault's own factor may be less than the mode's
+        changed.add(found.factor)
+    return tuple(name for name, own in CAPABILITIES.items() if changed.intersection(own))
+
+
+@lru_cache
+def _partial(mode: FailureMode, lost: tuple[str, ...]) -> FailureMode:
+    kept: dict[str, Any] = {}
+    for name, own in CAPABILITIES.items():
+        if name not in lost:
+            kept |= {each: _SOUND[each] for each in own}
+            kept |= {"factor": None} if mode.factor in own else {}
+    return replace(mode, description=f"{mode.description}; of this: {', '.join(lost)}", **kept)
+
+
+def failure_mode(name: str) -> FailureMode:
+    """Return the failure mode of that name.
+
+    Args:
+        name: a key of `FAILURE_MODES`; or, as "dead[move,send]", a mode of which a robot loses
+            these capabilities alone, which tells what each of them costs.
+
+    Raises:
+        FaultError: there is no such mode, or it does not take such a capability.
+    """
+    if name in FAILURE_MODES:
+        return FAILURE_MODES[name]
+    match = _PARTIAL.fullmatch(name)
+    if match is None or match["mode"] not in FAILURE_MODES:
+        raise FaultError(f"no failure mode {name!r}{suggest(name, FAILURE_MODES)}")
+    lost, able = tuple(match["lost"].split(",")), lost_capabilities(match["mode"])
+    for capability in lost:
+        if capability not in able:
+            raise FaultError(
+                f"failure mode {name!r}: {match['mode']} takes {', '.join(able)}, not "
+                f"{capability!r}{suggest(capability, able)}"
+            )
+    return _partial(FAILURE_MODES[match["mode"]], lost)
+
 
 class Fault(Record):
     """A failure mode that affects some robots, from a time on.
 
     Args:
-        mode: a key of `FAILURE_MODES`.
+        mode: a key of `FAILURE_MODES`, or a part of one, see `failure_mode`.
         robots: how many robots fail (1..N), chosen by the seed alone, so that every mode hits the
             same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
         onset: when [s], from the start of the episode.
@@ -151,10 +224,12 @@ class Fault(Record):
         intermittent: for how long [s] it holds, and for how long not, both on average, in turn
             from its onset on; each robot's times are drawn from its own stream (exponential).
             None: it holds without a break.
+        role: a key of `ROLES`: the robots are chosen at the onset by what they are doing then, see
+            `robots_in_role`; None: by the seed.
 
     Raises:
-        FaultError: an unknown mode, a factor, a duration or breaks that the mode does not have, a
-            robot that is named twice.
+        FaultError: an unknown mode or role, a factor, a duration or breaks that the mode does not
+            have, a robot that is named twice, a role beside robots that are named.
 
     Example:
         >>> Fault("FM1", 2, onset=200.0).robots
@@ -169,6 +244,7 @@ class Fault(Record):
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
     intermittent: tuple[Seconds, Seconds] | None = None
+    role: str | None = None
 
     def __init__(
         self,
@@ -178,17 +254,25 @@ class Fault(Record):
         duration: float | None = None,
         factor: float | None = None,
         intermittent: tuple[float, float] | None = None,
+        role: str | None = None,
     ) -> None:
         if isinstance(robots, Sequence) and not isinstance(robots, str):
             robots = tuple(robots)
         given = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
-        super().__init__(**given, factor=factor, intermittent=intermittent)
+        super().__init__(**given, factor=factor, intermittent=intermittent, role=role)
+
+    @model_serializer(mode="wrap")
+    def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Without a role it is written as before there were roles, so that stored runs stay known.
+        written: dict[str, Any] = write(self)
+        if self.role is None:
+            del written["role"]
+        return written
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        if self.mode not in FAILURE_MODES:
-            raise ValueError(f"no failure mode {self.mode!r}{suggest(self.mode, FAILURE_MODES)}")
-        if self.factor is not None and FAILURE_MODES[self.mode].factor is None:
+        found = failure_mode(self.mode)
+        if self.factor is not None and found.factor is None:
             able = ", ".join(name for name, mode in FAILURE_MODES.items() if mode.factor)
             raise ValueError(f"{self.mode} takes no factor; modes that do: {able}")
         if self.mode == "removed" and self.duration is not None:
@@ -199,6 +283,10 @@ class Fault(Record):
             raise ValueError("robots = (): should name at least one robot")
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
             raise ValueError(f"robots = {self.robots}: should name each robot once")
+        if self.role is not None and self.role not in ROLES:
+            raise ValueError(f"no role {self.role!r}{suggest(self.role, ROLES)}")
+        if self.role is not None and isinstance(self.robots, tuple):
+            raise ValueError(f"role = {self.role!r}: robots should be a number, not {self.robots}")
         return self
 
     def is_active(self, time: float) -> bool:
@@ -217,7 +305,8 @@ class Occurrence:
         n_robots: how many there are.
 
     Attributes:
-        robots: the numbers of those affected, ascending.
+        robots: the numbers of those affected, ascending; none before the onset of a fault that
+            strikes by role.
 
     Raises:
         FaultError: as `failed_robots`.
@@ -225,11 +314,23 @@ class Occurrence:
 
     def __init__(self, fault: Fault, seed: int, n_robots: int) -> None:
         self.fault, self._seed = fault, seed
-        self.robots = failed_robots(fault, seed, n_robots)
         # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
+        chosen = failed_robots(fault, seed, n_robots)
+        self._affect(chosen if fault.role is None else chosen[:0])
+
+    def choose_by_role(self, state: WarehouseState) -> None:
+        """Choose the robots of a fault that strikes by role, once it holds."""
+        fault = self.fault
+        if fault.role is None or len(self.robots) or not fault.is_active(state.time):
+            return
+        assert isinstance(fault.robots, int)  # no numbers of robots stand beside a role
+        self._affect(robots_in_role(state, fault.role, fault.robots))
+
+    def _affect(self, robots: NDArray[np.int64]) -> None:
+        self.robots, fault = robots, self.fault
         if fault.intermittent is not None:
-            self._switches = {robot: [fault.onset] for robot in self.robots.tolist()}
+            self._switches = {robot: [fault.onset] for robot in robots.tolist()}
 
     def holds_for(self, time: float) -> NDArray[np.int64]:
         """Return the robots for which it holds at `time` [s], ascending."""
@@ -249,7 +350,7 @@ class Occurrence:
         if not fault.is_active(time):
             return fault.onset if fault.onset > time + GRACE else math.inf
         changes = [math.inf if fault.duration is None else fault.onset + fault.duration]
-        if FAILURE_MODES[fault.mode].wears:
+        if failure_mode(fault.mode).wears:
             changes.append(next_step)
         for robot, switches in self._switches.items():
             changes.append(switches[self._n_switches(robot, time)])
@@ -257,7 +358,7 @@ class Occurrence:
 
     def left(self, time: float, end: float) -> tuple[float, float]:
         """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
-        mode, fault = FAILURE_MODES[self.fault.mode], self.fault
+        mode, fault = failure_mode(self.fault.mode), self.fault
         speed, view = mode.speed, mode.view
         if fault.factor is not None:
             speed = fault.factor if mode.factor == "speed" else speed
@@ -320,7 +421,8 @@ def apply_faults(
     gone = np.zeros(state.n_robots, np.bool_)
     modes: list[tuple[str, ...]] = [()] * state.n_robots
     for occurrence in occurrences:
-        mode, robots = FAILURE_MODES[occurrence.fault.mode], occurrence.holds_for(state.time)
+        occurrence.choose_by_role(state)
+        mode, robots = failure_mode(occurrence.fault.mode), occurrence.holds_for(state.time)
         speed_left, view_left = occurrence.left(state.time, scenario.duration)
         able.max_speed[robots] *= speed_left
         able.max_turn_rate[robots] *= speed_left

@@ -1,4 +1,4 @@
-"""A session: a run, its fault-free twin on the same seed, and the actions on them."""
+"""Two runs on the same seed, side by side, and the actions on them."""
 
 from __future__ import annotations
 
@@ -6,59 +6,72 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
+from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, suggest
+from swarm_logistics_env.errors import (
+    FaultError,
+    ScenarioError,
+    SetupError,
+    SwarmLogisticsError,
+    suggest,
+)
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.curves import Curve, Event
-from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
-WIDTH_STEP = 0.25  # [m]
 
 
 class Session:
-    """A run and its twin, which has the same seed, policy and conditions but no faults.
+    """A run, and beside it another on the same seed: its twin without faults, or another policy.
 
     Args:
         scenario: the conditions.
-        make_policy: returns a policy; it is called once for the run and once for the twin.
+        policy: the policy of the run.
+        against: the policy of the run beside it, with the same faults; None: the same policy
+            without faults, the twin.
         seed: the seed of the first episode.
-        faults: faults of the run in every episode, in addition to those that are added by hand.
+        faults: faults in every episode, in addition to those that are added by hand.
         speed: how many times real time it plays; one of `SPEEDS`.
+        load: returns the policy of a name.
 
     Attributes:
-        run, twin: the run and its twin.
+        run, beside: the run and the one beside it.
+        policy, against: the names of their policies; `against` is None for the twin.
+        choices: the names that `compare` takes.
         seed: the seed of this episode.
         paused: whether time stands still.
         mode: the failure mode that `break_robot` uses.
         selected: the robot that is inspected, or None.
         events: the failures and repairs of robots in this episode.
         note: a sentence about what happened last.
-        trails: the paths of the run's robots, with every step, also of steps that are not shown.
 
     Raises:
         FaultError, ScenarioError: as `Warehouse.reset`.
+        PolicyError: no such policy.
         SetupError: `speed` is not one of `SPEEDS`.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        make_policy: Callable[[], Policy],
+        policy: str = "swarm-dt",
+        against: str | None = None,
         seed: int = 0,
         faults: Sequence[Fault] = (),
         speed: float = 1.0,
+        load: Callable[[str], Policy] = policies.load,
     ) -> None:
-        if speed not in SPEEDS:
-            known = ", ".join(f"{known:g}" for known in SPEEDS)
-            raise SetupError(f"speed = {speed:g}: should be one of {known}")
         for fault in faults:
             failed_robots(fault, seed, scenario.n_robots)
-        self._make_policy, self._planned = make_policy, tuple(faults)
-        self.speed, self.paused, self.mode = speed, False, "FM4"
+        self.load, self._planned = load, tuple(faults)
+        self.policy, self.against = policy, against
+        named = [name for name in (policy, against) if name is not None]
+        self.choices = tuple(dict.fromkeys([*named, *policies.NAMES]))
+        self.paused, self.mode = False, "FM4"
+        self.set_speed(speed)
         self.selected: int | None = None
         self.note = ""
         self._due = 0.0  # control periods
@@ -71,33 +84,47 @@ class Session:
 
     @property
     def is_over(self) -> bool:
-        """Whether run and twin have come to their ends."""
-        return self.run.is_over and self.twin.is_over
+        """Whether both runs have come to their ends."""
+        return self.run.is_over and self.beside.is_over
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """The titles of the two runs."""
+        if self.against is None:
+            return self.policy, f"{self.policy} without faults"
+        return self.policy, self.against
 
     @property
     def curves(self) -> tuple[Curve, Curve]:
-        """Deliveries of the run and of its twin."""
-        run, twin = self.run.world.state, self.twin.world.state
+        """Deliveries of the two runs."""
+        run, beside = self.run.world.state, self.beside.world.state
         return (
-            Curve("this run", run.delivery_times, run.time, 0),
-            Curve("without faults", twin.delivery_times, twin.time, 1),
+            Curve(self.names[0], run.delivery_times, run.time, 0),
+            Curve(self.names[1], beside.delivery_times, beside.time, 1),
         )
 
     # Time
 
-    def play(self, elapsed: float, budget: float = math.inf) -> int:
-        """Let run and twin go on for some wall time; return the number of steps taken.
+    def play(
+        self,
+        elapsed: float,
+        budget: float = math.inf,
+        after_step: Callable[[], object] = lambda: None,
+    ) -> int:
+        """Let both runs go on for some wall time; return the number of steps taken.
 
         Args:
             elapsed: wall time since the last call [s].
             budget: the most time to compute [s]; steps that do not fit into it are left out.
+            after_step: is called after every step.
         """
         if self.paused or self.is_over:
             return 0
         self._due += elapsed * self.speed / self.scenario.control_period
         stop, steps = time.perf_counter() + budget, 0
         while self._due >= 1.0 and not self.is_over:
-            self._advance()
+            self.advance()
+            after_step()
             self._due -= 1.0
             steps += 1
             if time.perf_counter() >= stop:
@@ -112,15 +139,27 @@ class Session:
     def step(self) -> None:
         """Pause, and take one control period."""
         self.paused = True
-        self._advance()
+        self.advance()
 
-    def faster(self) -> None:
-        """Play at the next higher speed."""
-        self.speed = SPEEDS[min(SPEEDS.index(self.speed) + 1, len(SPEEDS) - 1)]
+    def set_speed(self, speed: float) -> None:
+        """Play that many times as fast as real time, one of `SPEEDS`."""
+        if speed not in SPEEDS:
+            known = ", ".join(f"{known:g}" for known in SPEEDS)
+            raise SetupError(f"speed = {speed:g}: should be one of {known}")
+        self.speed = speed
 
-    def slower(self) -> None:
-        """Play at the next lower speed."""
-        self.speed = SPEEDS[max(SPEEDS.index(self.speed) - 1, 0)]
+    def compare(self, policy: str, against: str | None = None) -> None:
+        """Begin the episode again with other policies, out of `choices`; None is the twin."""
+        for name in filter(None, (policy, against)):
+            if name not in self.choices:
+                raise SetupError(f"no policy {name!r} to choose{suggest(name, self.choices)}")
+        before = self.policy, self.against
+        self.policy, self.against = policy, against
+        try:
+            self.restart()
+        except SwarmLogisticsError:
+            self.policy, self.against = before
+            raise
 
     def next_seed(self) -> None:
         """Begin an episode with the next seed."""
@@ -146,11 +185,6 @@ class Session:
             raise FaultError(f"no failure mode {mode!r}{suggest(mode, FAILURE_MODES)}")
         self.mode = mode
 
-    def next_mode(self, forward: bool = True) -> None:
-        """Choose the failure mode after, or before, the one that is chosen."""
-        modes = list(FAILURE_MODES)
-        self.mode = modes[(modes.index(self.mode) + (1 if forward else -1)) % len(modes)]
-
     def break_robot(self, robot: int | None = None) -> None:
         """Let `robot` fail from now on in the chosen mode; None means the selected robot."""
         robot = self._meant(robot)
@@ -161,7 +195,7 @@ class Session:
             return
         now = round(self.run.world.state.time, 9)
         fault = Fault(self.mode, [robot], onset=now)
-        self.run.world.set_faults([*self.run.world.faults, fault])
+        self._set_faults([*self.run.world.faults, fault])
         self._look_after_selection()
         self._log(robot, self.mode)
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
@@ -182,7 +216,7 @@ class Session:
                 kept += [fault.replace(robots=tuple(others))] if others else []
             else:
                 kept.append(fault)
-        world.set_faults(kept)
+        self._set_faults(kept)
         self._log(robot, None)
         self.note = f"robot {robot} is repaired"
 
@@ -210,10 +244,10 @@ class Session:
             self.note += f"; {left_out} faults affect more robots than there are: left out"
 
     def set_delivery_width(self, width: float) -> None:
-        """Make the delivery area that wide [m], in the run and in its twin, at once."""
+        """Make the delivery area that wide [m], in both runs, at once."""
         width = round(width, 6)
         try:
-            for play in (self.run, self.twin):
+            for play in (self.run, self.beside):
                 play.world.change(delivery_width=width)
         except ScenarioError as error:
             self.note = str(error)
@@ -229,11 +263,11 @@ class Session:
             except FaultError:
                 continue
             faults.append(fault.replace(robots=tuple(robots.tolist())))
-        self.run = Play(scenario, self._make_policy(), seed, faults)
-        self.twin = Play(scenario, self._make_policy(), seed)
-        self.seed, self._due = seed, 0.0
-        self.trails = Trails()
-        self.trails.note(self.run.world.state)
+        run = Play(scenario, self.load(self.policy), seed, faults)
+        other = self.policy if self.against is None else self.against
+        others_faults = faults if self.against is not None else []
+        self.beside = Play(scenario, self.load(other), seed, others_faults)
+        self.run, self.seed, self._due = run, seed, 0.0
         self.events: list[Event] = [
             Event(fault.onset, robot, fault.mode)
             for fault in faults
@@ -242,11 +276,16 @@ class Session:
         ]
         self._look_after_selection()
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
+        """Take one control period in both runs."""
         self.run.step()
-        self.twin.step()
-        self.trails.note(self.run.world.state)
+        self.beside.step()
         self._look_after_selection()
+
+    def _set_faults(self, faults: Sequence[Fault]) -> None:
+        self.run.world.set_faults(faults)
+        if self.against is not None and not self.beside.is_over:
+            self.beside.world.set_faults(faults)
 
     def _look_after_selection(self) -> None:
         present = self.run.world.state.robot_present

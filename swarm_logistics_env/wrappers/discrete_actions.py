@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete
@@ -12,11 +11,9 @@ from numpy.typing import ArrayLike
 
 from swarm_logistics_env.environment.commands import as_array
 from swarm_logistics_env.environment.dict_view import ArrayStep
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.wrappers.wrapper import Wrapper
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 _HALF = math.sqrt(0.5)
 

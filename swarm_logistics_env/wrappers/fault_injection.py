@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reset_options import faults_among
 from swarm_logistics_env.errors import FaultError
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
 from swarm_logistics_env.wrappers.sampling import Distribution
 from swarm_logistics_env.wrappers.wrapper import Wrapper
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-    from swarm_logistics_env.scenario import Scenario
 
 
 class FaultInjection(Wrapper):

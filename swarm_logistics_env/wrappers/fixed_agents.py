@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.commands import as_array
 from swarm_logistics_env.environment.dict_view import ArrayStep, Infos
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError
 from swarm_logistics_env.wrappers.wrapper import Wrapper
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class FixedAgents(Wrapper):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.environment.dict_view import ArrayStep
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.warehouse.state import NOBODY
@@ -23,9 +24,6 @@ from swarm_logistics_env.wrappers.indicator_payments import (
 )
 from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
 from swarm_logistics_env.wrappers.wrapper import Wrapper
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 CREDITS = ("team", "deliverer", "carriers")
 

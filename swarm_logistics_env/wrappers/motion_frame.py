@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class MotionFrame(Wrapper):
     """Gives each robot a memory of its own, and turns what it reads and commands into its motion.
 
-    Observations become rows of `motion.INPUTS` (84 numbers, most within -1 and 1): walls,
+    Observations become rows of `motion.INPUTS` (88 numbers, most within -1 and 1): walls,
     neighbours, items and the lowest timer, relative to the direction in which the robot drives,
     and what it remembers, such as the way to the delivery area. Actions become rows of
     `motion.OUTPUTS`: along and aside, fractions of the top speed, and the gripper, all within -1
@@ -45,7 +45,7 @@ class MotionFrame(Wrapper):
         >>> env = MotionFrame(swarm_logistics_v0.parallel_env(n_robots=3))
         >>> observations, infos = env.reset(seed=0)
         >>> observations["robot_0"].shape, env.action_space("robot_0").shape
-        ((84,), (3,))
+        ((88,), (3,))
     """
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper, listens: bool = True) -> None:
@@ -55,7 +55,7 @@ class MotionFrame(Wrapper):
         self._output_space = Box(-1.0, 1.0, (len(OUTPUTS),), np.float32)
 
     def observation_space(self, agent: str) -> Box:
-        """Return the space of a row of inputs (84,), the same for every agent."""
+        """Return the space of a row of inputs (88,), the same for every agent."""
         return self._read_space
 
     def action_space(self, agent: str) -> Box:
@@ -65,7 +65,7 @@ class MotionFrame(Wrapper):
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
-        """Begin an episode and return the first inputs (N, 84)."""
+        """Begin an episode and return the first inputs (N, 88)."""
         observations = super().reset_arrays(seed, options)
         return self._read(observations)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from numpy.typing import ArrayLike
 
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reset_options import scenario_fields
 from swarm_logistics_env.errors import ScenarioError, suggest
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
@@ -13,9 +14,6 @@ from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse.faults import GRACE
 from swarm_logistics_env.wrappers.sampling import Sampler
 from swarm_logistics_env.wrappers.wrapper import Wrapper
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class ParameterChange(Wrapper):

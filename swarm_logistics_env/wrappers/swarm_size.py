@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from swarm_logistics_env.environment.dict_view import agent_names
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reset_options import faults_among, scenario_fields
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.wrappers.sampling import Distribution, Sampler
 from swarm_logistics_env.wrappers.wrapper import Wrapper
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-    from swarm_logistics_env.scenario import Scenario
 
 
 class SwarmSize(Wrapper):

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_logistics_env.environment.dict_view import ArrayStep, DictView
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reset_options import checked_options, checked_seed
 from swarm_logistics_env.errors import SetupError
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-    from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.scenario import Scenario
 
 
 class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo ships no types

@@ -34,11 +34,12 @@ def shorter(factor):
 if __name__ == "__main__":
     # Also where the gate itself was started to ignore it, as by nohup.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    old = presets.PRESETS["paper"]
-    presets.PRESETS["paper"] = old.replace(
+    old = presets.load_preset("paper")
+    short = old.replace(
         scenario=Scenario(duration=DURATION),
         **{k: tuple(map(shorter, getattr(old, k))) for k in ("sizes", "ablations")},
     )
+    presets.PRESETS["paper"] = short
     app()
 """
 

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -22,6 +23,7 @@ from swarm_logistics_env.cli import app
         (["watch", "--set", "n_robot=40"], "did you mean 'n_robots'?"),
         (["watch", "--speed", "3"], "speed = 3: should be one of"),
         (["watch", "--port", "99999"], "--port"),
+        (["watch", "--until", "5"], "--until 5: should be above 0 s, together with --save"),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(
@@ -45,7 +47,7 @@ def test_port_in_use_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None
     assert f"port = {port}: is in use" in printed.err
 
 
-def test_page_is_served_until_ctrl_c_without_pygame() -> None:
+def test_page_is_served_until_ctrl_c_without_pygame(tmp_path: Path) -> None:
     script = (
         # Also where the gate itself was started to ignore it, as by nohup.
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
@@ -58,13 +60,13 @@ def test_page_is_served_until_ctrl_c_without_pygame() -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONWARNINGS": "error"},
+        env={**os.environ, "PYTHONWARNINGS": "error", "XDG_STATE_HOME": str(tmp_path)},
     )
     assert started.stdout
     found = re.search(r"http://127\.0\.0\.1:(\d+)(/\S+/) in a browser", started.stdout.readline())
     assert found
     connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=30)
-    connection.request("GET", f"{found[2]}moving?after=0")
+    connection.request("GET", f"{found[2]}page.js")
     answer = connection.getresponse()
     assert answer.status == 200
     assert answer.read()
@@ -74,3 +76,16 @@ def test_page_is_served_until_ctrl_c_without_pygame() -> None:
     connection.close()
     assert started.returncode == 0
     assert errors == ""
+
+
+def test_replay_is_written_without_a_server(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "run.html"
+    arguments = ["--set", "n_robots=5", "--save", str(file), "--until", "3"]
+    assert app.run(["watch", *arguments]) == 0
+    assert ": 3 s, " in capsys.readouterr().out
+    page = file.read_text(encoding="utf-8")
+    assert "script-src 'sha256-" in page
+    assert "http://" not in page
+    assert "src=" not in page.replace("'none'; script-src", "")

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 import gymnasium
+import numpy as np
 import pettingzoo
 import pytest
 
@@ -53,6 +54,27 @@ def test_gymnasium_makes_several_at_once(flat: bool) -> None:
         assert cut.tolist() == [step == 10] * 2
     assert rows.shape == (2, *alone.observation_space.shape)
     assert infos["failed"].shape == (2, 3)
+
+
+@pytest.mark.skipif(not hasattr(gymnasium.vector, "AutoresetMode"), reason="Gymnasium 1.1 has it")
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_gymnasium_begins_the_next_episode_in_each_of_its_modes(mode: str) -> None:
+    vector: Any = gymnasium.make_vec(
+        "SwarmLogistics-v0", 2, n_robots=2, duration=0.3, vector_kwargs={"autoreset_mode": mode}
+    )
+    first, _ = vector.reset(seed=[4, 5])
+    for step in range(3):
+        rows, _, _, cut, infos = vector.step(vector.action_space.sample())
+        assert cut.all() == (step == 2)
+    assert ("final_obs" in infos) == (mode == "SameStep")
+    if mode == "NextStep":
+        rows, _, _, cut, _ = vector.step(vector.action_space.sample())
+        assert not cut.any()
+    if mode == "Disabled":
+        rows, _ = vector.reset(seed=[4, 5], options={"reset_mask": np.array([True, False])})
+        assert rows[0].tobytes() == first[0].tobytes()
+    assert rows.shape == first.shape
+    vector.close()
 
 
 @pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="PettingZoo has no registry yet")

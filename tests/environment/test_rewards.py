@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms
+from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms, carrier_of_requested
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
@@ -123,6 +123,78 @@ def test_approach_pays_nothing_for_a_change_of_item_or_carrier(world: Warehouse)
     assert terms.pay(world).tolist() == [0.0] * 4
 
 
+def test_carrying_takes_back_at_the_delivery_what_it_paid_for_the_lift(world: Warehouse) -> None:
+    terms = started(world, carrying=2.0, discount=0.9)
+    give(world, 1, 2)
+    assert terms.pay(world).tolist() == [0.0, 1.8, 0.0, 0.0]
+    assert terms.pay(world) == pytest.approx([0.0, -0.2, 0.0, 0.0])
+    give(world, 3, 4)  # nobody asked for it, until the delivery
+    deliver(world, 1, next_request=4)
+    assert terms.pay(world).tolist() == [0.0, -2.0, 0.0, 1.8]
+
+
+@pytest.mark.parametrize("term", ["carrying", "carried_way"])
+def test_what_a_potential_pays_depends_on_where_an_episode_begins_and_ends_alone(term: str) -> None:
+    """So it changes no optimum: the discounted sum is that of the last state less the first."""
+    discount = 0.95
+    world = Warehouse(
+        Scenario(n_robots=8, n_items=4, warehouse_width=3, warehouse_height=3, restock=True)
+    )
+    world.reset(0)
+    terms = started(world, **{term: 1.0, "discount": discount})
+    rng = np.random.default_rng(1)
+    total, n_steps, n_changes = np.zeros(8), 600, 0
+    for step in range(n_steps):
+        carrier = carrier_of_requested(world)
+        world.step(rng.uniform(-1.0, 1.0, (8, 4)))
+        total += discount**step * terms.pay(world)
+        n_changes += carrier != carrier_of_requested(world)
+    last = np.zeros(8)
+    if (carrier := carrier_of_requested(world)) != NOBODY:
+        x = world.state.robot_position[carrier, 0]
+        last[carrier] = 1.0 if term == "carrying" else min(x, world.scenario.storage_width)
+    assert n_changes >= 10
+    assert total == pytest.approx(discount**n_steps * last, abs=1e-12)
+
+
+def test_approach_can_be_collected_in_circles_and_carried_way_cannot() -> None:
+    """A robot puts the item down, steps back, pulls it near by lifting it, and drives forward."""
+    world = Warehouse(
+        Scenario(n_robots=1, n_items=1, heading_drift=0.0, warehouse_width=5, warehouse_height=4)
+    )
+    world.reset(0)
+    state = world.state
+    paid = {
+        "approach": RewardTerms({"approach": 1.0}),
+        "carried_way": RewardTerms({"carried_way": 1.0, "discount": 1.0}),
+    }
+
+    def drive(x: float, y: float, gripper: float) -> None:
+        heading = state.robot_heading[0]
+        ahead = x * np.cos(heading) + y * np.sin(heading)
+        aside = y * np.cos(heading) - x * np.sin(heading)
+        world.step(np.array([[ahead, aside, 0.0, gripper]]))
+
+    for _ in range(200):
+        to_x, to_y = state.item_position[0] - state.robot_position[0]
+        drive(2.0 * to_x, 2.0 * to_y, -1.0)
+    drive(0.0, 0.0, 1.0)
+    assert carrier_of_requested(world) == 0
+    sums = dict.fromkeys(paid, 0.0)
+    for terms in paid.values():
+        terms.begin(world)
+    begun = state.robot_position[0, 0]
+    for _ in range(10):
+        for x, gripper in ((0.0, -1.0), (-1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, 0.0)):
+            drive(x, 0.0, gripper)
+            for name, terms in paid.items():
+                sums[name] += terms.pay(world)[0]
+    assert carrier_of_requested(world) == 0
+    assert sums["approach"] > 1.0
+    assert sums["carried_way"] == pytest.approx(state.robot_position[0, 0] - begun)
+    assert abs(sums["carried_way"]) < 0.1
+
+
 def test_contact_pays_its_seconds(world: Warehouse) -> None:
     terms = started(world, contact=-1.0)
     world.state.robot_contact[:] = [True, False, False, True]
@@ -146,11 +218,12 @@ def test_without_terms_nobody_earns(world: Warehouse) -> None:
 
 def test_after_the_last_delivery_every_term_still_pays(world: Warehouse) -> None:
     give(world, 1, 2)
-    terms = RewardTerms(dict.fromkeys(REWARD_TERMS, 1.0))
+    terms = RewardTerms({**dict.fromkeys(REWARD_TERMS, 1.0), "discount": 0.9})
     terms.begin(world)
     world.state.robot_contact[:] = False
     deliver(world, 1, next_request=NOBODY)
-    assert terms.pay(world).tolist() == [1.0, 2.0, 1.0, 1.0]
+    way = world.state.robot_position[1, 0]
+    assert terms.pay(world).tolist() == pytest.approx([1.0, 1.0 - min(way, STORAGE), 1.0, 1.0])
     assert terms.pay(world).tolist() == [0.0] * 4
 
 
@@ -158,10 +231,13 @@ def test_after_the_last_delivery_every_term_still_pays(world: Warehouse) -> None
     ("weights", "complaint"),
     [
         ({"delivry": 1.0}, "no reward term 'delivry'; did you mean 'delivery'?"),
-        ({"speed_of_light": 1.0}, "no reward term 'speed_of_light'; known: approach, contact"),
+        ({"speed_of_light": 1.0}, "no reward term 'speed_of_light'; known: approach, carried_way"),
         ({"delivery": float("nan")}, r"rewards\['delivery'\] = nan: should be a finite number"),
         ({"delivery": None}, r"rewards\['delivery'\] = None: should be a finite number"),
         ({"delivery": "1"}, r"rewards\['delivery'\] = '1': should be a finite number"),
+        ({"carrying": 1.0}, r"rewards\['carrying'\] pays .* rewards\['discount'\] should be given"),
+        ({"carrying": 1.0, "discount": 1.1}, r"rewards\['discount'\] = 1.1: should be above 0"),
+        ({"delivery": 1.0, "discount": 0.9}, r"rewards\['discount'\] = 0.9: should be left out"),
     ],
 )
 def test_unknown_terms_and_weights_that_are_no_numbers_are_refused(
@@ -174,7 +250,7 @@ def test_unknown_terms_and_weights_that_are_no_numbers_are_refused(
 def test_every_term_pays_finite_numbers_for_every_robot_in_a_running_world() -> None:
     world = Warehouse(Scenario(n_robots=6, n_items=8, warehouse_width=3, warehouse_height=3))
     world.reset(0, [Fault("removed", 2, onset=1.0)])
-    terms = RewardTerms(dict.fromkeys(REWARD_TERMS, 1.0))
+    terms = RewardTerms({**dict.fromkeys(REWARD_TERMS, 1.0), "discount": 0.9})
     terms.begin(world)
     rng = np.random.default_rng(0)
     for _ in range(60):

@@ -16,8 +16,8 @@ from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame, memory
 from swarm_logistics_env.policies import PolicyCard
 from swarm_logistics_env.policies.files import CARD
-from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
-from swarm_logistics_env.policies.onnx_export import write_onnx
+from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy, explore
+from swarm_logistics_env.policies.onnx_export import DEVIATIONS, write_onnx
 from swarm_logistics_env.streams import row_keys
 
 PAGE = Path(__file__).parents[2] / "docs" / "onnx.md"
@@ -51,7 +51,10 @@ def test_scripts_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", TRAINED)
 def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path: Path) -> None:
-    policy: Any = policies.load(name)
+    trained: Any = policies.load(name)
+    # The noise of a policy that explores is not in the file.
+    network = trained.card.network.replace(exploration=0.0)
+    policy = LearnedPolicy(trained.card.replace(network=network), trained.tensors)
     session = session_of(policy, tmp_path / "p.onnx")
     scenario = Scenario(n_robots=25, duration=100.0)
     world = Warehouse(scenario)
@@ -60,17 +63,25 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
     policy.reset(25, 3)
     # Beside the policy, a frame of its own: with the same rows it has the same memories.
     frame = MotionFrame(scenario, policy.card.network.listens)
-    frame.begin(row_keys(3, STREAM, 25))
-    furthest, n_rows = 0.0, 0
+    keys = row_keys(3, STREAM, 25)
+    frame.begin(keys)
+    width = len(policy.card.network.inputs)
+    told = session.get_modelmeta().custom_metadata_map[DEVIATIONS]
+    deviations = np.array(told.split(), np.float32)
+    assert deviations.any() == (policy.card.network.exploration > 0)
+    furthest, n_rows, step = 0.0, 0, 0
     while not (world.is_over_time or world.all_delivered):
         inputs = frame.read(rows)
         ours = policy._network(inputs)
-        [theirs] = session.run(None, {"inputs": inputs})
+        [theirs] = session.run(None, {"inputs": inputs[:, :width]})
         assert theirs.shape == (25, len(OUTPUTS))
         furthest = max(furthest, float(np.abs(theirs - ours).max()))
         n_rows += len(rows)
         commands = policy.act(rows)
+        if deviations.any():
+            explore(keys, step, deviations, ours)
         np.testing.assert_array_equal(frame.command(ours), commands)
+        step += 1
         rows = world.step(commands)
     assert n_rows == 25_000
     assert furthest < 1e-5
@@ -90,9 +101,11 @@ def test_other_networks_agree_too(
 
 
 def test_one_that_does_not_listen_ignores_timers(tmp_path: Path) -> None:
-    session = session_of(policies.load("ppo-robust"), tmp_path / "p.onnx")
+    trained: Any = policies.load("ppo-delivery")
+    card = trained.card.replace(network=trained.card.network.replace(listens=False))
+    session = session_of(LearnedPolicy(card, trained.tensors), tmp_path / "p.onnx")
     rng = np.random.default_rng(0)
-    inputs = rng.normal(size=(5, len(INPUTS))).astype(np.float32)
+    inputs = rng.normal(size=(5, len(card.network.inputs))).astype(np.float32)
     told = inputs.copy()
     lead = [place for place, name in enumerate(INPUTS) if name.startswith("lead_")]
     told[:, lead] = rng.normal(size=(5, len(lead)))

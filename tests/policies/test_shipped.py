@@ -7,6 +7,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.policies.loading import WEIGHTS
+from swarm_logistics_env.train.training import load_training, preset_names
 from swarm_logistics_env.warehouse import Fault
 
 SHIPPED = sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))
@@ -14,7 +15,8 @@ SHORT = Scenario(restock=True, duration=100.0)
 
 
 def test_there_is_one_for_each_preset_of_training() -> None:
-    assert SHIPPED == ["ppo-delivery", "ppo-indicator", "ppo-robust"]
+    trainings = [load_training(name) for name in preset_names() if "-arm-" not in name]
+    assert sorted(training.name for training in trainings) == SHIPPED
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -29,12 +31,7 @@ def test_they_are_small_and_say_how_they_were_made(name: str) -> None:
     assert all(score.low is not None and score.low <= score.value for score in card.scores)
 
 
-# ppo-robust listens to no timer and its memory fades: in a crowd it finds the delivery area as late
-# as Swarm D-T does.
-@pytest.mark.parametrize(
-    ("name", "n_robots"),
-    [(name, n) for name in SHIPPED for n in (5, 40) if (name, n) != ("ppo-robust", 40)],
-)
+@pytest.mark.parametrize(("name", "n_robots"), [(name, n) for name in SHIPPED for n in (5, 40)])
 def test_they_deliver_more_than_swarm_dt(name: str, n_robots: int) -> None:
     scenario = SHORT.replace(n_robots=n_robots)
     ours, scripted = (
@@ -44,9 +41,35 @@ def test_they_deliver_more_than_swarm_dt(name: str, n_robots: int) -> None:
     assert ours > 1.5 * scripted
 
 
-def test_delivery_learned_from_nothing() -> None:
-    training = policies.read_card(WEIGHTS / "ppo-delivery.safetensors").training
-    assert not {"imitation", "start"} & training.keys()
+@pytest.mark.parametrize("name", SHIPPED)
+def test_they_began_from_nothing_or_from_one_that_did(name: str) -> None:
+    start: str | None = name
+    while start is not None:
+        training = policies.read_card(WEIGHTS / f"{start}.safetensors").training
+        assert "imitation" not in training
+        start = training.get("start")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_preset_is_what_the_card_says(name: str) -> None:
+    card = policies.read_card(WEIGHTS / f"{name}.safetensors")
+    preset = load_training(card.command.split()[-1])
+    assert preset.model_dump(mode="json", exclude_defaults=True) == card.training
+
+
+def test_a_fast_drift_costs_delivery_little() -> None:
+    slow, fast = (
+        np.mean(
+            [
+                run_episode(
+                    SHORT.replace(heading_drift=drift), policies.load("ppo-delivery"), seed
+                ).delivered
+                for seed in range(8)
+            ]
+        )
+        for drift in (0.0, 0.1)
+    )
+    assert fast > 0.85 * slow
 
 
 def test_robust_lets_go_of_what_it_cannot_deliver() -> None:

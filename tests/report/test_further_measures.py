@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import NO_FAULT, OTHER_BEHAVIOUR, Setting
 from swarm_logistics_env.studies.fault_measures import (
@@ -337,14 +337,12 @@ def test_ablation_is_drawn_with_its_threshold() -> None:
 
 def test_policies_that_differ_in_punctuation_have_files_of_their_own() -> None:
     chosen = [{"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}, "label": "Swarm.DT"}]
-    study = Study(
-        policies=["swarm-dt", *chosen], seeds=1, faults=[{"modes": ["FM1"], "robots": [1]}]
-    )
+    study = Study(policies=["swarm-dt", *chosen], seeds=1, sizes=[{"values": [5, 10]}])
     found = judged(study, lambda *_: Outcome("", np.arange(30.0)))
     names = [figure.name for figure in document(found).figures()]
     assert len({name.lower() for name in names}) == len(names)
-    assert "FT-R-swarm-dt-Fault-tolerance-and-robustness" in names
-    assert "FT-R-Swarm-DT-Fault-tolerance-and-robustness-2" in names
+    assert "P-N-swarm-dt-Scalability" in names
+    assert "P-N-Swarm-DT-Scalability-2" in names
 
 
 def test_no_law_is_fitted_to_a_flat_series() -> None:

@@ -13,9 +13,9 @@ from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT, identity
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.engines import engine_named, execute
-from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
-from swarm_logistics_env.studies.shards import Shard, merge
+from swarm_logistics_env.studies.engines import engine_named, execute, expected_seconds
+from swarm_logistics_env.studies.metadata import merge
+from swarm_logistics_env.studies.runs import Condition, Shard, StudiedPolicy
 from swarm_logistics_env.studies.store import Store, export
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
@@ -178,3 +178,24 @@ def test_other_behaviour_meets_the_same_worlds() -> None:
     first, other_first, second, other_second = Recording.seeds
     assert (first, second) == (0, 1)
     assert len({first, second, other_first, other_second}) == 4
+
+
+class Broken:
+    """Fails at once."""
+
+    identity = "broken"
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        raise RuntimeError("a wheel came off")
+
+    def act(self, observations: Any) -> Any: ...
+
+
+def test_more_seeds_take_more_time(small: dict[str, Any]) -> None:
+    few, many = (expected_seconds(Study(**{**small, "seeds": seeds}).plan()) for seeds in (2, 200))
+    assert 0 < few < many
+
+
+def test_policy_that_fails_is_named(small: dict[str, Any]) -> None:
+    with pytest.raises(StudyError, match=r"'Broken' fails .*a wheel came off"):
+        expected_seconds(Study(**{**small, "policies": [Broken()]}).plan())

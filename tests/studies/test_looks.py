@@ -9,7 +9,7 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.spi.estimate import verdict_at
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import rows_of

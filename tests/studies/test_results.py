@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.report.result_tables import warnings
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import NO_FAULT, Setting

@@ -11,7 +11,8 @@ import pytest
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.shards import Shard, merge
+from swarm_logistics_env.studies.metadata import merge, of_existing
+from swarm_logistics_env.studies.runs import Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 
@@ -84,6 +85,13 @@ def test_shards_of_one_declared_study_stay_as_declared(tmp_path: Path) -> None:
     assert not Study.stored(tmp_path / "both").findings().exploratory
 
 
+def test_merged_study_keeps_its_declared_margin(tmp_path: Path) -> None:
+    parts = [played(tmp_path / name, margin=0.2) for name in ("one", "other")]
+    merge(parts, tmp_path / "both")
+    assert of_existing(tmp_path / "both").declared.margin == 0.2
+    assert not Study.stored(tmp_path / "both").findings().late_margin
+
+
 def test_success_wins_over_failure_whichever_comes_first(tmp_path: Path) -> None:
     whole = played(tmp_path / "whole")
     failed = altered(
@@ -119,6 +127,7 @@ def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
         ),
         ({"sizes": [{"values": [2, 4]}]}, "SELECT 1", "differ in sizes"),
         ({"looks": [2, 4]}, "SELECT 1", "different looks"),
+        ({"margin": 0.3}, "SELECT 1", "different margin"),
     ],
 )
 def test_what_is_not_one_study_is_not_merged(

@@ -137,7 +137,7 @@ def test_store_that_may_not_be_written_is_read_and_left_as_it_is(
     monkeypatch.setattr(os, "access", lambda *_: False)
     with Store.existing(directory) as store:
         assert store.succeeded() == {run(0).key}
-        assert store.note("specification") is None
+        assert store.notes() == {}
         with pytest.raises(StudyError, match="readonly database"):
             store.add(run(1), outcome(run(1), [1.0]))
         assert list(directory.iterdir()) == [path]
@@ -166,7 +166,7 @@ from swarm_logistics_env.studies.store import Store
 
 for line in sys.stdin:
     with Store(pathlib.Path(line.strip())) as store:
-        store.set_note(sys.argv[1], "here")
+        store.note({sys.argv[1]: "here"})
     print("made", flush=True)
 """
 
@@ -191,15 +191,15 @@ def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
                 assert maker.stdout is not None
                 assert maker.stdout.readline() == "made\n"
             with Store.existing(directory) as store:
-                assert [store.note("0"), store.note("1")] == ["here", "here"]
+                assert store.notes() == {"0": "here", "1": "here"}
 
 
 def test_store_is_there_once_it_is_whole(tmp_path: Path) -> None:
     with new_store(tmp_path / "new") as store:
-        store.set_note("name", "value")
+        store.note({"name": "value"})
         refuse_study_in(tmp_path / "new", "merge")
     with Store.existing(tmp_path / "new") as store:
-        assert store.note("name") == "value"
+        assert store.notes() == {"name": "value"}
     assert [path.name for path in (tmp_path / "new").iterdir()] == [FILE_NAME]
     with pytest.raises(StudyError, match="holds a study already: merge into a new directory"):
         refuse_study_in(tmp_path / "new", "merge")
@@ -208,7 +208,7 @@ def test_store_is_there_once_it_is_whole(tmp_path: Path) -> None:
 def test_failure_leaves_nothing(tmp_path: Path) -> None:
     def stopped() -> None:
         with new_store(tmp_path) as store:
-            store.set_note("name", "value")
+            store.note({"name": "value"})
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

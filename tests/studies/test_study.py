@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.indicator_table import INDICATORS
 from swarm_logistics_env.studies.performance_table import PERFORMANCE
-from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.studies.shards import Shard
+from swarm_logistics_env.studies.runs import Run, Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store, export
 from swarm_logistics_env.tasks.task import Outcome
 

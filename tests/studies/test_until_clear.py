@@ -17,7 +17,7 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.markup import markdown
+from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.runs import Run
@@ -179,7 +179,7 @@ def test_another_most_is_another_plan_and_exploratory(tmp_path: Path) -> None:
 
 
 def test_shards_and_missing_looks_are_refused() -> None:
-    from swarm_logistics_env.studies.shards import Shard
+    from swarm_logistics_env.studies.runs import Shard
 
     with pytest.raises(StudyError, match="shard"):
         until_clear(60).run(Engine(), shard=Shard(1, 2))

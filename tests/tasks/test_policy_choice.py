@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.shards import merge
+from swarm_logistics_env.studies.metadata import merge
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_of
 

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from safetensors.numpy import load_file
@@ -15,8 +14,6 @@ pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.train import trainer
-from swarm_logistics_env.train.settings import Evaluation, Imitation
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 
@@ -106,28 +103,6 @@ def test_a_training_that_was_killed_ends_as_one_that_was_not(tmp_path: Path) -> 
     assert_same_weights(cut / "tiny.safetensors", whole)
     assert_same_weights(cut / "best.safetensors", whole.with_name("best.safetensors"))
     assert curve(cut) == curve(whole.parent)
-
-
-class Killed(BaseException):
-    """Stands for kill -9: nothing of ours catches it."""
-
-
-def test_a_training_that_was_killed_does_not_imitate_again(
-    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    imitation = Imitation(rounds=1, seconds=2.0, sizes=(4,), fit=5, last_fit=5)
-    training = small(imitation=imitation, evaluation=Evaluation(seeds=1, n_robots=3))
-    whole = trainer.train(training, tmp_path / "whole")
-
-    def dies(*_: Any) -> None:
-        raise Killed
-
-    with monkeypatch.context() as changed:
-        changed.setattr(trainer, "TrainingCallback", dies)
-        with pytest.raises(Killed):
-            trainer.train(training, tmp_path / "cut")
-    monkeypatch.setattr(trainer, "imitate", dies)
-    assert_same_weights(trainer.train(training, tmp_path / "cut"), whole)
 
 
 def assert_same_weights(one: Path, other: Path) -> None:

@@ -17,8 +17,8 @@ def test_a_terminal_of_80_columns_shows_all_of_it(monkeypatch: pytest.MonkeyPatc
     console = Console(file=written, force_terminal=True, width=80, color_system=None)
     before = [(0, {"P": 1.0, "R_FM4": 0.0}), (2_000_000, {"P": 51.0, "R_FM4": -0.5})]
     table = LiveTable(
-        "ppo-[robust]", 8_000_000, 2_000_000, about="N = 25, 4 seeds", references=REFERENCES,
-        before=[*before], console=console,
+        "ppo-[robust]", 8_000_000, "agent-steps", done=2_000_000, about="N = 25, 4 seeds",
+        references=REFERENCES, before=[*before], console=console,
     )  # fmt: skip
     with table:
         now += 3.0
@@ -43,10 +43,10 @@ def test_a_terminal_of_80_columns_shows_all_of_it(monkeypatch: pytest.MonkeyPatc
 def test_a_pipe_gets_one_plain_line_per_evaluation(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    with LiveTable("tiny", 8, 4, references=REFERENCES) as table:
+    with LiveTable("tiny", 8, "agent-steps", done=4, references=REFERENCES) as table:
         table.reach(6)
         table.measured({"P": 49.5, "R_FM4": 0.25})
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("tiny: 6 of 8 agent-steps, ")
-    assert line.endswith(": P = 49.5 (swarm-dt 36.75, homing 146), R_FM4 = 0.25")
+    assert line.endswith(", P = 49.5 (swarm-dt 36.75, homing 146), R_FM4 = 0.25")
     assert "\x1b" not in line

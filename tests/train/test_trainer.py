@@ -19,13 +19,12 @@ from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS
-from swarm_logistics_env.policies.homing import homing_commands
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
-from swarm_logistics_env.train.learner import make_learner, outputs_of, tensors_of
+from swarm_logistics_env.train.learner import make_learner, tensors_of
 from swarm_logistics_env.train.network_view import KNOWN
 from swarm_logistics_env.train.run_record import simulation
-from swarm_logistics_env.train.settings import Imitation, Indicators, Scores
+from swarm_logistics_env.train.settings import Indicators, Scores
 from swarm_logistics_env.train.trainer import train
 
 
@@ -190,27 +189,6 @@ def test_a_checkpoint_that_is_cut_short_is_refused(small: Any, tmp_path: Path) -
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(TrainingError, match=r"cannot be read .*: train into a new directory"):
         train(small(), tmp_path)
-
-
-def test_imitation_brings_the_network_towards_homing(small: Any) -> None:
-    from swarm_logistics_env.train.imitation import imitate
-
-    asked = Imitation(rounds=3, seconds=5.0, sizes=(4, 6), fit=150, last_fit=300, common_share=1.0)
-    training: Training = small()
-    view = trainer._new_view(training)
-    policy = make_learner(training, view, "cpu").policy
-    view.seed(1)
-    inputs = torch.from_numpy(view.reset())
-    commands = homing_commands(view.frame, view.observations, training.scenario.control_period)
-    wanted = torch.from_numpy(view.frame.outputs_for(commands).astype(np.float32))
-
-    def error() -> float:
-        with torch.no_grad():
-            return float(((outputs_of(policy, inputs) - wanted) ** 2).mean())
-
-    before = error()
-    imitate(policy, training, asked)
-    assert error() < 0.3 * before
 
 
 def test_a_training_goes_on_from_a_trained_policy(small: Any, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions
+from swarm_logistics_env.train.settings import Conditions, PPOSettings
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -43,6 +43,12 @@ def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
     assert (met, training.rows) == ([(3, 8), (3, 8), (5, 60)], 11)
 
 
+def test_potentials_are_discounted_as_the_learner_discounts() -> None:
+    training = Training(rewards={"carrying": 0.5}, ppo=PPOSettings(gamma=0.9))
+    assert training.reward_weights == {"carrying": 0.5, "discount": 0.9}
+    assert Training(ppo=PPOSettings(gamma=0.9)).reward_weights == {"delivery": 1.0}
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
@@ -50,6 +56,7 @@ def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
         ("[ppo]\nlearnrate = 1", "no field 'learnrate'; did you mean 'learning_rate'"),
         ("[[conditions]]\nmodes = ['FM9']", "no failure mode 'FM9'; did you mean"),
         ("[rewards]\ndeliver = 1.0", "no reward term 'deliver'; did you mean 'delivery'"),
+        ("[rewards]\ncarrying = 1.0\ndiscount = 0.9", "should be left out, it is `ppo.gamma`"),
         ("[scenario]\nn_itens = 5", "Scenario has no field 'n_itens'"),
         ("[ppo]\nn_minibatches = 7", "should divide the batch of 150 robots x 128 steps"),
         ("worlds = []", "worlds"),
@@ -67,9 +74,8 @@ def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
         ("[[worlds]]\nscenario = { n_itens = 5 }", "Scenario has no field 'n_itens'"),
         ("[[worlds]]\nscenario = { n_robots = 5 }", "the swarm size is a field of its own"),
         ("[[worlds]]\nscenario = { message_size = 2 }", "the network sends no messages"),
+        ("[imitation]\nrounds = 1", "Training has no field 'imitation'"),
         ("[ppo]\nleast_deviation = [0.0, 0.1]", "should be greater than 0"),
-        ("[imitation]\nseconds = 0.01", "imitation.seconds = 0.01: .* the control period, 0.1 s"),
-        ("start = 'ppo-delivery'\n[imitation]", "should be left out beside `imitation`"),
         ("[[conditions]]\nonset = [9, 1]", "should be the earliest time, then the latest"),
         ("seed = -1", "Training.seed = -1: should be greater than or equal to 0"),
         ("[network]\nhidden = [0]", "hidden"),

@@ -124,7 +124,8 @@ def test_the_command_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> N
     for arguments, sentence in (
         ([], "should be given a preset"),
         (["delivery", "--tune", "swarm-dt"], "should be given a preset"),
-        (["delivery", "--trials", "3"], "--trials does not go with delivery"),
+        (["delivery", "--seeds", "3"], "--seeds does not go with delivery"),
+        (["delivery", "--trials", "3"], "evaluation.faults: should name the modes"),
         (["--tune", "swarm-dt", "--steps", "3"], "--steps does not go with swarm-dt"),
         (["deliver"], "no training preset 'deliver'; did you mean 'delivery'"),
         (["--tune", "swarm"], "no policy to tune"),

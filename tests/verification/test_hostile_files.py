@@ -19,7 +19,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.shards import merge
+from swarm_logistics_env.studies.metadata import merge
 from swarm_logistics_env.studies.store import FILE_NAME, Store, export
 
 STUDY = """\

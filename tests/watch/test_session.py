@@ -6,10 +6,8 @@ import pytest
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
 from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
 from swarm_logistics_env.policies import Policy
-from swarm_logistics_env.rendering.trails import TRAIL_SECONDS
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web.keys import KEYS, press
-from swarm_logistics_env.watch.web.view import observation_words
+from swarm_logistics_env.watch.web.messages import observation_parts
 
 SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
 
@@ -26,7 +24,7 @@ def finish(session: Session) -> None:
 def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
     scenario = SMALL.replace(duration=60.0)
     faults = [Fault("FM4", 3, onset=5.0)]
-    session = Session(scenario, swarm_dt, 2, faults)
+    session = Session(scenario, seed=2, faults=faults)
     finish(session)
     with_faults = run_episode(scenario, swarm_dt(), 2, faults)
     without = run_episode(scenario, swarm_dt(), 2)
@@ -37,9 +35,9 @@ def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
 
 
 def test_without_faults_run_and_twin_are_the_same() -> None:
-    session = Session(SMALL, swarm_dt)
+    session = Session(SMALL)
     session.play(15.0)
-    run, twin = session.run.world.state, session.twin.world.state
+    run, twin = session.run.world.state, session.beside.world.state
     assert np.array_equal(run.robot_position, twin.robot_position)
     session.select(0)
     session.break_robot()
@@ -48,46 +46,29 @@ def test_without_faults_run_and_twin_are_the_same() -> None:
     assert not twin.failed.any()
 
 
-def test_trails_lead_through_every_step_at_any_speed() -> None:
-    session = Session(SMALL, swarm_dt, speed=64.0)
-    session.play(0.1)
-    assert session.run.world.state.time == pytest.approx(6.4, abs=0.11)
-    past = session.trails.positions()
-    assert past.shape == (1 + round(TRAIL_SECONDS / SMALL.control_period), 8, 2)
-    longest = SMALL.max_speed * SMALL.control_period
-    assert np.hypot(*np.moveaxis(np.diff(past, axis=0), 2, 0)).max() < 1.5 * longest
-    session.restart()
-    session.next_seed()
-    assert np.array_equal(session.trails.positions()[0], session.run.world.state.robot_position)
-
-
 def test_speed_is_how_much_time_passes_in_a_second() -> None:
-    session = Session(SMALL, swarm_dt, speed=4.0)
+    session = Session(SMALL, speed=4.0)
     for _ in range(10):
         session.play(0.1)
     assert session.run.world.state.time == pytest.approx(4.0, abs=0.11)
-    session.faster()
-    assert session.speed == 8.0
-    for _ in range(20):
-        session.slower()
-    assert session.speed == 0.25
+    session.set_speed(0.25)
     assert session.play(0.1) == 0
 
 
 def test_paused_time_stands_still_and_a_step_is_one_period() -> None:
-    session = Session(SMALL, swarm_dt)
+    session = Session(SMALL)
     session.pause()
     session.play(5.0)
     assert session.run.world.state.time == 0.0
     session.step()
-    assert session.run.world.state.step == session.twin.world.state.step == 1
+    assert session.run.world.state.step == session.beside.world.state.step == 1
     session.pause()
     session.step()
     assert session.paused
 
 
 def test_what_the_budget_does_not_allow_is_not_caught_up_with() -> None:
-    session = Session(SMALL, swarm_dt, speed=64.0)
+    session = Session(SMALL, speed=64.0)
     assert session.play(1.0, budget=0.0) == 1
     assert session.play(0.0, budget=0.0) <= 1
     assert session.play(0.0, budget=0.0) == 0
@@ -95,7 +76,7 @@ def test_what_the_budget_does_not_allow_is_not_caught_up_with() -> None:
 
 @pytest.mark.parametrize("mode", FAILURE_MODES)
 def test_robot_breaks_and_is_repaired(mode: str) -> None:
-    session = Session(SMALL, swarm_dt)
+    session = Session(SMALL)
     session.play(2.0)
     session.choose_mode(mode)
     session.toggle_robot(3)
@@ -117,7 +98,7 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
 
 
 def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
-    session = Session(SMALL, swarm_dt, 0, [Fault("dead", 3), Fault("FM1", 2, onset=15.0)])
+    session = Session(SMALL, seed=0, faults=[Fault("dead", 3), Fault("FM1", 2, onset=15.0)])
     first, *others = np.flatnonzero(session.run.world.state.failed).tolist()
     session.repair_robot(first)
     assert np.flatnonzero(session.run.world.state.failed).tolist() == others
@@ -127,7 +108,7 @@ def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
 
 
 def test_breaking_twice_in_a_mode_is_once() -> None:
-    session = Session(SMALL, swarm_dt)
+    session = Session(SMALL)
 
     def modes() -> list[str]:
         return list(session.run.world.state.failure_modes[1])
@@ -146,7 +127,7 @@ def test_breaking_twice_in_a_mode_is_once() -> None:
 
 
 def test_without_a_selected_robot_it_says_what_to_do() -> None:
-    session = Session(SMALL, swarm_dt)
+    session = Session(SMALL)
     session.break_robot()
     assert session.note == "click a robot first"
     finish(session)
@@ -156,12 +137,12 @@ def test_without_a_selected_robot_it_says_what_to_do() -> None:
 
 
 def test_swarm_size_begins_again_and_says_so() -> None:
-    session = Session(SMALL, swarm_dt, 3, [Fault("FM2", 6), Fault("FM1", 1)])
+    session = Session(SMALL, seed=3, faults=[Fault("FM2", 6), Fault("FM1", 1)])
     session.play(2.0)
     session.select(7)
     session.resize(5)
     assert session.run.world.state.time == 0.0
-    assert session.run.world.state.n_robots == session.twin.world.state.n_robots == 5
+    assert session.run.world.state.n_robots == session.beside.world.state.n_robots == 5
     assert session.seed == 3
     assert session.selected is None
     assert "began again" in session.note
@@ -174,19 +155,19 @@ def test_swarm_size_begins_again_and_says_so() -> None:
 
 
 def test_delivery_width_changes_at_once_in_both() -> None:
-    session = Session(SMALL, swarm_dt)
+    session = Session(SMALL)
     session.play(2.0)
     session.set_delivery_width(3.0)
-    for play in (session.run, session.twin):
+    for play in (session.run, session.beside):
         assert play.world.scenario.delivery_width == 3.0
         assert play.world.state.time == pytest.approx(2.0)
     session.set_delivery_width(5.0)
     assert "leaves no storage" in session.note
-    assert session.scenario.delivery_width == session.twin.world.scenario.delivery_width == 3.0
+    assert session.scenario.delivery_width == session.beside.world.scenario.delivery_width == 3.0
 
 
 def test_next_seed_and_again() -> None:
-    session = Session(SMALL, swarm_dt, 0)
+    session = Session(SMALL)
     start = session.run.world.state.robot_position.copy()
     session.play(1.0)
     session.break_robot(0)
@@ -201,10 +182,10 @@ def test_next_seed_and_again() -> None:
 
 def test_wrong_arguments() -> None:
     with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
-        Session(SMALL, swarm_dt, speed=3.0)
+        Session(SMALL, speed=3.0)
     with pytest.raises(FaultError, match="at most n_robots = 8"):
-        Session(SMALL, swarm_dt, 0, [Fault("FM1", 9)])
-    session = Session(SMALL, swarm_dt)
+        Session(SMALL, seed=0, faults=[Fault("FM1", 9)])
+    session = Session(SMALL)
     with pytest.raises(FaultError, match="did you mean 'FM4'"):
         session.choose_mode("FM44")
     for robot in (-1, 8):
@@ -222,44 +203,30 @@ class Wrong:
 
 def test_policy_that_cannot_be_is_named() -> None:
     with pytest.raises(PolicyError, match="Wrong at 0 s"):
-        Session(SMALL, Wrong).step()
+        Session(SMALL, load=lambda _: Wrong()).step()
 
 
-def test_every_key_does_something() -> None:
-    assert len({key.name for key in KEYS}) == len(KEYS)
-    for key in KEYS:
-        session = Session(SMALL, swarm_dt, 1, speed=1.0)
-        session.play(0.3)
-        session.select(2)
-        if key.name == "r":
-            session.break_robot()
-
-        def seen(session: Session = session) -> tuple[object, ...]:
-            return (
-                session.paused, session.speed, session.mode, session.seed, session.selected,
-                session.run.world.state.step, session.run.world.state.failed.any(),
-                session.scenario, session.note,
-            )  # fmt: skip
-
-        before = seen()
-        assert press(session, key.name) == (key.act is not None)
-        assert (seen() != before) == (key.act is not None), key.name
-    assert not press(Session(SMALL, swarm_dt), "F13")
+def test_policies_are_compared_with_the_same_faults() -> None:
+    session = Session(SMALL, against="homing", seed=3)
+    session.break_robot(2)
+    assert session.beside.world.state.failure_modes[2] == ("FM4",)
+    session.compare("homing")
+    assert session.names == ("homing", "homing without faults")
+    assert session.run.world.state.time == 0.0
+    with pytest.raises(SetupError, match="did you mean 'homing'"):
+        session.compare("homin")
+    assert session.policy == "homing"
 
 
-def test_observation_row_in_words() -> None:
+def test_observation_has_all_parts_and_only_what_is_present() -> None:
     scenario = SMALL.replace(message_size=2)
-    session = Session(scenario, swarm_dt)
+    session = Session(scenario)
     session.play(3.0)
     for robot in range(8):
         row = session.run.sensed(robot)
-        words = dict(observation_words(row, scenario))
+        found = {name: values for name, _, values in observation_parts(row, scenario)}
         parts = observations.unflatten(row, scenario)
-        assert [name.partition(" [")[0] for name in words] == list(parts)
-        shown = [float(value) for value in words["range_walls [m]"].split()]
-        assert shown == pytest.approx(parts["range_walls"].tolist(), abs=0.0051)
-        n_items = int(parts["item_present"].sum())
-        assert words["item_present"] == f"{n_items} of 8"
-        assert len(words["item_x [m]"].replace("–", "").split()) == n_items
-        assert words["carrying"] == ("yes" if parts["carrying"][0] else "no")
-        assert "-0.00" not in " ".join(words.values())
+        assert list(found) == list(parts)
+        assert found["range_walls"] == pytest.approx(parts["range_walls"].tolist(), abs=0.0051)
+        assert len(found["item_x"]) == int(parts["item_present"].sum())
+        assert found["carrying"] == parts["carrying"].tolist()

@@ -1,37 +1,40 @@
-"""The server: for this machine, for the page's own files, for orders with the token alone."""
+"""The server: for this machine, for those who know the token in the address."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
-import errno
 import hmac
-import http.server
-import json
-import math
+import logging
+import os
 import re
 import secrets
-import socketserver
-import sys
-import threading
 import time
 from collections.abc import Callable
-from http import HTTPStatus
 from importlib import resources
-from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError
+from swarm_logistics_env.watch.replicas import Replicas
 from swarm_logistics_env.watch.session import Session
-from swarm_logistics_env.watch.web.orders import obey
-from swarm_logistics_env.watch.web.view import fixed_view, moving_view
+from swarm_logistics_env.watch.web.messages import changes, encode, fixed_data, frame, obey
+from swarm_logistics_env.watch.web.recording import Recording
+
+if TYPE_CHECKING:
+    from aiohttp import web
+    from aiohttp.typedefs import Handler
 
 _LOOPBACK = "127.0.0.1"
 # A foreign page may resolve its name to this machine, but it cannot forge these headers.
 _OWN_HOST = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?")
-_FILES = {
-    "": ("page.html", "text/html; charset=utf-8"),
-    "page.css": ("page.css", "text/css; charset=utf-8"),
-    "page.js": ("page.js", "text/javascript; charset=utf-8"),
+_TOKEN = re.compile(r"[\w-]{24}")
+FILES = {
+    "page.html": "text/html",
+    "page.css": "text/css",
+    "draw.js": "text/javascript",
+    "panel.js": "text/javascript",
+    "page.js": "text/javascript",
 }
 _HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
@@ -41,221 +44,199 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
+    "Server": "swarm-logistics",
 }
 _LONGEST_ORDER = 4096  # bytes
-_MOST_CONNECTIONS = 64
-_SILENCE = 10.0  # [s] until a connection that says nothing is closed
-_PATIENCE = 1.0  # [s] that a request for what comes next waits
+_MOST_PAGES = 16
 _FRAME_PERIOD = 0.05  # [s]
-_NOBODY_LOOKS_AFTER = 3.0  # [s] since the last request: time stands still
 
 
-class WatchServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
-    """Shows a session to those who know its address, which holds a random token.
+class WatchServer:
+    """Shows a session to those who know its address, which holds the token.
 
     Args:
         session: the session to show.
-        title: the name of the policy.
         port: the port; 0 takes any that is free.
+        token: 24 letters, digits, - or _; None: random ones.
 
     Attributes:
-        address: the address to open in a browser.
+        address: the address to open in a browser, once `start` is done.
 
     Raises:
-        SetupError: the port is in use or not allowed.
+        SetupError: aiohttp is not installed.
     """
 
-    allow_reuse_address = True
-    daemon_threads = True
-    block_on_close = False
-    request_queue_size = 64
-
-    def __init__(self, session: Session, title: str, port: int) -> None:
-        self.session, self.title = session, title
-        self.token = secrets.token_urlsafe(18)
-        self.changed = threading.Condition()
-        self.version = 1
-        self._last_look = -math.inf
-        self._room = threading.BoundedSemaphore(_MOST_CONNECTIONS)
-        here = resources.files(__package__)
-        self.files = {
-            name: (here.joinpath(file).read_bytes(), kind) for name, (file, kind) in _FILES.items()
-        }
+    def __init__(self, session: Session, port: int, token: str | None = None) -> None:
         try:
-            super().__init__((_LOOPBACK, port), _Handler)
+            from aiohttp import web
+        except ImportError as error:
+            raise SetupError(
+                f"watch needs aiohttp ({error}): pip install 'swarm-logistics-env[watch]'"
+            ) from None
+        self._web = web
+        self.session, self.port = session, port
+        self.token = token or secrets.token_urlsafe(18)
+        self.recording, self.replicas = Recording(session), Replicas()
+        self.address = ""
+        self._pages: dict[web.WebSocketResponse, dict[str, Any]] = {}
+
+        @web.middleware
+        async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+            self._check(request)
+            return await handler(request)
+
+        app = web.Application(middlewares=[guard])
+        app.router.add_get("/{token}/live", self._live)
+        app.router.add_get("/{token}/recording.html", self._save)
+        app.router.add_get("/{token}/{name:.*}", self._file)
+        app.on_response_prepare.append(_add_headers)
+        logger = logging.getLogger(__name__)
+        logger.addFilter(_is_own_error)
+        self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
+
+    async def start(self) -> None:
+        """Listen on the loopback interface.
+
+        Raises:
+            SetupError: the port is in use or not allowed.
+        """
+        await self._runner.setup()
+        site = self._web.TCPSite(self._runner, _LOOPBACK, self.port)
+        try:
+            await site.start()
         except OSError as error:
-            if error.errno == errno.EADDRINUSE:
+            await self._runner.cleanup()
+            if "in use" in str(error):
                 raise SetupError(
-                    f"port = {port}: is in use, should be another one, or 0 for any that is free"
+                    f"port = {self.port}: is in use, should be another one, or 0 for any that "
+                    "is free"
                 ) from None
-            raise SetupError(f"port = {port}: {error.strerror}") from None
-        self.address = f"http://{_LOOPBACK}:{self.server_address[1]}/{self.token}/"
+            raise SetupError(f"port = {self.port}: {error.strerror}") from None
+        self.port = self._runner.addresses[0][1]
+        self.address = f"http://{_LOOPBACK}:{self.port}/{self.token}/"
 
-    def play(self, is_over: Callable[[], bool] = lambda: False) -> None:
-        """Let the session go on while somebody looks, until `is_over`."""
+    async def play(self) -> None:
+        """Let the session go on while a page is open, until this is cancelled.
+
+        Raises:
+            PolicyError: the policy returned commands of the wrong shape, or not finite.
+        """
         before = time.monotonic()
-        while not is_over():
-            time.sleep(_FRAME_PERIOD)
-            now = time.monotonic()
-            elapsed, before = now - before, now
-            if now - self._last_look < _NOBODY_LOOKS_AFTER:
-                with self.changed:
-                    if self.session.play(elapsed, budget=_FRAME_PERIOD):
-                        self._tell()
-
-    def order(self, text: bytes) -> None:
-        """Do what the page asks."""
-        with self.changed:
-            obey(self.session, text)
-            self._tell()
-
-    def view(self, after: int, *, trails: bool = False) -> bytes:
-        """Return the first view later than version `after`, or the same again if none comes."""
-        self._last_look = time.monotonic()
-        with self.changed:
-            self.changed.wait_for(lambda: self.version != after, _PATIENCE)
-            moving = {"version": self.version, **moving_view(self.session, trails=trails)}
-        return json.dumps(moving, separators=(",", ":")).encode()
-
-    def _tell(self) -> None:
-        self.version += 1
-        self.changed.notify_all()
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Take a connection, unless there are too many."""
-        if self._room.acquire(blocking=False):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Serve a connection."""
         try:
-            super().process_request_thread(request, client_address)
+            while True:
+                await asyncio.sleep(_FRAME_PERIOD)
+                now = time.monotonic()
+                elapsed, before = now - before, now
+                if self._pages:
+                    self.replicas.ask(self.session)
+                    self.session.play(elapsed, _FRAME_PERIOD, self.recording.note)
+                    await self._tell()
+                else:
+                    self.replicas.ask(None)
         finally:
-            self._room.release()
+            self.replicas.ask(None)
+            await self._runner.cleanup()
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Ignore connections that break off; show our own bugs."""
-        if not isinstance(sys.exception(), OSError):
-            super().handle_error(request, client_address)
+    async def _tell(self) -> None:
+        now = {**frame(self.session), "indicators": self.replicas.results()}
+        for page, known in list(self._pages.items()):
+            message = changes(known, now)
+            if message:
+                self._pages[page] = now
+                with contextlib.suppress(ConnectionError):
+                    await page.send_str(encode(message))
 
-
-class _Handler(http.server.BaseHTTPRequestHandler):
-    server: WatchServer
-    server_version, sys_version = "swarm-logistics", ""
-    protocol_version = "HTTP/1.1"
-    timeout = _SILENCE
-
-    def do_GET(self) -> None:
-        name, query = self._asked()
-        if name in self.server.files:
-            self._answer(*self.server.files[name])
-        elif name == "fixed":
-            self._answer_json(json.dumps(fixed_view(self.server.title)).encode())
-        elif name == "moving":
-            asked = parse_qs(query)
-            after = asked.get("after", ["0"])[0]
-            version = int(after) if re.fullmatch(r"[0-9]{1,15}", after) else 0
-            self._answer_json(self.server.view(version, trails="trails" in asked))
-        elif name is not None:
-            self.send_error(HTTPStatus.NOT_FOUND)
-
-    def do_POST(self) -> None:
-        name, _ = self._asked()
-        if name is None:
-            return
-        length = self.headers.get("Content-Length", "")
-        kind = self.headers.get("Content-Type", "").partition(";")[0].strip()
-        if name != "order":
-            self.send_error(HTTPStatus.NOT_FOUND)
-        elif kind != "application/json":
-            self.send_error(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
-        elif not re.fullmatch(r"[0-9]{1,9}", length):
-            self.send_error(HTTPStatus.LENGTH_REQUIRED)
-        elif int(length) > _LONGEST_ORDER:
-            self.send_error(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
-        else:
-            try:
-                self.server.order(self.rfile.read(int(length)))
-            except SwarmLogisticsError as error:
-                problem = json.dumps({"problem": str(error)}).encode()
-                self._answer(problem, "application/json", HTTPStatus.BAD_REQUEST)
-            else:
-                self._answer_json(b"{}")
-
-    def _asked(self) -> tuple[str | None, str]:
-        """Return name and query of the request; None if an error response was already sent."""
-        hosts, origins = (self.headers.get_all(name, []) for name in ("Host", "Origin"))
-        own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0])
-        if not own or origins not in ([], [f"http://{hosts[0]}"]):
-            self.send_error(HTTPStatus.FORBIDDEN)
-            return None, ""
+    async def _live(self, request: web.Request) -> web.StreamResponse:
+        if len(self._pages) >= _MOST_PAGES:
+            raise self._web.HTTPServiceUnavailable(text="Too many pages are open.\n")
+        page = self._web.WebSocketResponse(
+            max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False
+        )
+        await page.prepare(request)
+        await page.send_str(encode(fixed_data(self.session)))
+        self._pages[page] = {}
         try:
-            asked = urlsplit(self.path)
-        except ValueError:
-            self.send_error(HTTPStatus.BAD_REQUEST)
-            return None, ""
-        token, slash, name = asked.path.removeprefix("/").partition("/")
-        known = hmac.compare_digest(token.encode(), self.server.token.encode())
-        if not (known and slash and not asked.netloc):
-            self.send_error(HTTPStatus.FORBIDDEN)
-            return None, ""
-        return name, asked.query
+            async for message in page:
+                try:
+                    obey(self.session, message.data if isinstance(message.data, str) else "")
+                except SwarmLogisticsError as error:
+                    await page.send_str(encode({"problem": str(error)}))
+                self.recording.note()
+        finally:
+            self._pages.pop(page, None)
+        return page
 
-    def _answer_json(self, body: bytes) -> None:
-        self._answer(body, "application/json")
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        name = request.match_info["name"] or "page.html"
+        if name not in FILES or request.path.endswith("/page.html"):
+            raise self._web.HTTPNotFound(text="Not Found\n")
+        text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+        return self._web.Response(text=text, content_type=FILES[name], charset="utf-8")
 
-    def _answer(self, body: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        for name, value in _HEADERS.items():
-            self.send_header(name, value)
-        if self.close_connection:
-            self.send_header("Connection", "close")
-        self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(body)
+    async def _save(self, request: web.Request) -> web.StreamResponse:
+        headers = {"Content-Disposition": 'attachment; filename="run.html"'}
+        page = await asyncio.to_thread(self.recording.page)
+        return self._web.Response(text=page, content_type="text/html", headers=headers)
 
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer with the meaning of the code; repeat nothing of the request."""
-        # The connection may go on with the rest of a body, so it is closed.
-        self.close_connection = True
-        status = HTTPStatus(code)
-        text = status.phrase
-        if status == HTTPStatus.FORBIDDEN:
-            text = "Open the address that swarm-logistics watch printed, on its machine."
-        # Data that is no request at all gets an answer, too.
-        self.command = getattr(self, "command", None) or "GET"
-        self.request_version = "HTTP/1.1"
-        self._answer(f"{text}\n".encode(), "text/plain; charset=utf-8", status)
-
-    def log_message(self, format: str, *args: Any) -> None:
-        """Write nothing: the terminal belongs to the user."""
+    def _check(self, request: web.Request) -> None:
+        hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
+        own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0])
+        token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
+        known = hmac.compare_digest(token.encode(), self.token.encode())
+        if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
+            text = "Open the address that swarm-logistics watch printed, on its machine.\n"
+            raise self._web.HTTPForbidden(text=text)
 
 
-def serve(session: Session, title: str, port: int, announce: Callable[[str], None]) -> None:
+def _is_own_error(record: logging.LogRecord) -> bool:
+    """Return whether an error is ours: requests that are no HTTP are answered and not shown."""
+    from aiohttp.http_exceptions import HttpProcessingError
+
+    return not (record.exc_info and isinstance(record.exc_info[1], HttpProcessingError))
+
+
+async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(_HEADERS)
+
+
+def kept_token() -> str | None:
+    """Return this user's token, so that an open page finds the server again; None if it can't be.
+
+    It is kept in a file that only the user can read, in the folder for the state of programs.
+    """
+    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    file = Path(state) / "swarm-logistics" / "watch-token"
+    try:
+        with contextlib.suppress(FileExistsError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(descriptor, "w") as opened:
+                opened.write(secrets.token_urlsafe(18))
+        token = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    return token if _TOKEN.fullmatch(token) else None
+
+
+def serve(session: Session, port: int, announce: Callable[[str], None]) -> None:
     """Show a session in the browser until Ctrl-C.
 
     Args:
         announce: is called with a sentence that has the address.
 
     Raises:
-        SetupError: the port is in use or not allowed.
+        SetupError: the port is in use or not allowed, or aiohttp is not installed.
         PolicyError: the policy returned commands of the wrong shape, or not finite.
     """
-    with WatchServer(session, title, port) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True)
-        thread.start()
+
+    async def run() -> None:
+        server = WatchServer(session, port, kept_token())
+        await server.start()
         announce(
             f"Open {server.address} in a browser on this machine (from another one: "
-            f"ssh -L {server.server_address[1]}:127.0.0.1:{server.server_address[1]}). "
-            "Ctrl-C ends it."
+            f"ssh -L {server.port}:127.0.0.1:{server.port}). Ctrl-C ends it."
         )
-        try:
-            with contextlib.suppress(KeyboardInterrupt):
-                server.play()
-        finally:
-            server.shutdown()
-            thread.join()
+        await server.play()
+
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(run())

@@ -1,0 +1,325 @@
+"""Writes the README's numbers from the tables of docs/results.md, and draws their picture.
+
+`python docs/front_page.py`; `make tables` calls it. Nothing is played here: `make tables` records
+that page.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+DOCS = Path(__file__).parent
+README, RESULTS = DOCS.parent / "README.md", DOCS / "results.md"
+MEDIA = DOCS / "media"
+
+BLOCK = "<!-- tables: {name} -->"
+END = "<!-- end of tables -->"
+_REFERENCE = "swarm-dt"  # the paper's controller
+_LEARNED = "ppo-"
+_NUMBER = r"-?(?:[\d.,]+|∞)"
+_VALUE = re.compile(rf"({_NUMBER}) \[({_NUMBER}), ({_NUMBER})\]")
+
+
+class Value(NamedTuple):
+    """A number of a table with the limits of its 95 % interval, and as it stands there."""
+
+    value: float
+    low: float
+    high: float
+    text: str
+
+
+Rows = Mapping[str, Mapping[str, Value]]  # by the row's label and the column's heading
+
+
+def block_of(text: str, name: str) -> str:
+    """Return what stands between the markers of a block.
+
+    Raises:
+        SystemExit: the page has no such block.
+    """
+    _, found, rest = text.partition(BLOCK.format(name=name))
+    block, ended, _ = rest.partition(END)
+    if not (found and ended):
+        raise SystemExit(f"the page has no {BLOCK.format(name=name)} followed by {END}")
+    return block.strip()
+
+
+def rewritten(text: str, blocks: Mapping[str, str]) -> str:
+    """Return a page with other text between the markers of each block.
+
+    Raises:
+        SystemExit: a block has no pair of markers.
+    """
+    for name, block in blocks.items():
+        block_of(text, name)  # it is there
+        before, start, rest = text.partition(BLOCK.format(name=name))
+        text = f"{before}{start}\n\n{block}\n\n{END}{rest.partition(END)[2]}"
+    return text
+
+
+def rows_of(block: str) -> Rows:
+    """Return the values with intervals in the table of a block."""
+    head, _, *lines = [line for line in block.splitlines() if line.startswith("|")]
+    columns = [cell.strip(" `") for cell in head.split("|")[2:-1]]
+    found: dict[str, dict[str, Value]] = {}
+    for line in lines:
+        label, *cells = [cell.strip() for cell in line.split("|")[1:-1]]
+        matches = {name: _VALUE.match(cell) for name, cell in zip(columns, cells, strict=True)}
+        found[label] = {
+            name: Value(*(float(part.replace("∞", "inf")) for part in match.groups()), match[0])
+            for name, match in matches.items()
+            if match
+        }
+    return found
+
+
+_MODES = {
+    "FM1": "tells a false timer",
+    "FM2": "lifts nothing",
+    "FM3": "radio dead",
+    "FM4": "delivers nothing",
+}
+_PANELS = {
+    "P, N = 25": "P, N = 25\n[items in 500 s]",
+    "S, N 25 -> 100": "S, scalability\nN 25 → 100",
+}
+_PANELS |= {f"R, {mode}, m = 2": f"R, {mode}\n{what}" for mode, what in _MODES.items()}
+
+# -- what one finds out -------------------------------------------------------------------------
+
+
+def findings(page: str) -> str:
+    """Return what the tables show, as a list: the numbers stand beside their intervals."""
+    policies = block_of(page, "policies")
+    (seeds,) = re.findall(r"^(\d+) seeds from ", policies, flags=re.MULTILINE)
+    more = re.findall(r"; (\d+) for (.*) of (.*), whose P is skewed there", policies)
+    rows = rows_of(policies)
+    told = [*_learned(rows), *_faults(rows), *_sizes(rows), *_paper(block_of(page, "paper"))]
+    lines = [f"* {one}" for one in told]
+    note = (
+        f"Means and indicators with 95 % intervals over {seeds} seeds on which nothing was fitted"
+    )
+    note += "".join(f" ({count} where a fault makes P skewed)" for count, _, _ in more)
+    return "\n".join([*lines, "", f"{note}; `docs/results.md` has all of them."])
+
+
+def _learned(rows: Rows) -> Iterator[str]:
+    p = rows["P, N = 25"]
+    best = max((name for name in p if name.startswith(_LEARNED)), key=lambda name: p[name].value)
+    yield (
+        f"**A learned swarm delivers {p[best].value / p[_REFERENCE].value:.1f} times as much**: "
+        f"25 robots with `{best}` bring {p[best].text} items in 500 s, the paper's Swarm D-T "
+        f"{p[_REFERENCE].text}."
+    )
+
+
+def _faults(rows: Rows) -> Iterator[str]:
+    """Yield the greatest difference that a failure mode makes, and one the other way round."""
+    r = {mode: row for mode in _MODES if (row := rows.get(f"R, {mode}, m = 2"))}
+    worst = {mode: min(row, key=lambda name: row[name].value) for mode, row in r.items()}
+    best = {mode: max(row, key=lambda name: row[name].low) for mode, row in r.items()}
+    mode = max(r, key=lambda mode: r[mode][best[mode]].value - r[mode][worst[mode]].value)
+    lost, kept = worst[mode], best[mode]
+    yield (
+        f"**One collapses under a fault that another shrugs off**: with two of 25 robots in mode "
+        f"{mode} ({_MODES[mode]}) `{lost}` delivers {100 * (_SHARE - r[mode][lost].value):.0f} % "
+        f"less (robustness R = {r[mode][lost].text}), while `{kept}` withstands it "
+        f"({r[mode][kept].text})."
+    )
+    for other, row in r.items():
+        if row[kept].high < 0.0 < row[lost].low:
+            yield (
+                f"**Under another fault it is the other way round**: with {other} "
+                f"({_MODES[other]}), R of `{kept}` is {row[kept].text}, of `{lost}` "
+                f"{row[lost].text}."
+            )
+            return
+
+
+_SHARE = 2 / 25  # of the robots that fail: R = (P_F - P_o) / P_o + m/N
+
+
+def _sizes(rows: Rows) -> Iterator[str]:
+    s = rows["S, N 25 -> 100"]
+    most = max(s, key=lambda name: s[name].value)
+    least = min(s, key=lambda name: s[name].value)
+    less = "delivers less with them" if s[least].high < 0 else "gains least"
+    yield (
+        f"**More robots are not more deliveries**: from 25 to 100, `{most}` scales best "
+        f"(S = {s[most].text}), and `{least}` {less} ({s[least].text})."
+    )
+
+
+def _paper(block: str) -> Iterator[str]:
+    for count, verdicts in re.findall(r"Of (\d+) claims .*?, adjusted after Holm: (.*?)\.", block):
+        yield f"**Of {count} claims about the paper's swarm**, {verdicts}."
+
+
+def speed(page: str) -> str:
+    """Return the sentence on speed, from the table of costs."""
+    costs = block_of(page, "costs")
+    cells = {
+        line.split("|")[1].partition(":")[0].strip(): [c.strip() for c in line.split("|")[2:-1]]
+        for line in costs.splitlines()
+        if line.startswith("| ")
+    }
+    arrays, dicts = cells["env.step_arrays"], cells["env.step"]
+    (machine,) = re.findall(r"^On (.*), \d+ cores?, Python .*\.$", costs, flags=re.MULTILINE)
+    return (
+        f"A step of 25 robots with bodies, 48 range beams each, radio and logistics takes "
+        f"{arrays[1]} µs on one core of {machine}: {arrays[0]} robot-steps a second "
+        f"({dicts[0]} as PettingZoo's dicts)."
+    )
+
+
+# -- the picture --------------------------------------------------------------------------------
+
+
+def draw(rows: Rows, path: Path) -> None:
+    """Draw the forest plot: a row a policy, a panel a question; equal rows give equal bytes."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    names = list(rows["P, N = 25"])
+    places = range(len(names), 0, -1)
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams |= {"svg.hashsalt": "front page", "font.size": 9.0, "axes.linewidth": 0.6}
+        canvas = Figure(figsize=(9.2, 2.7), layout="constrained")
+        panels = canvas.subplots(1, len(_PANELS), sharey=True)
+        for axes in panels[3:]:  # the modes on one scale
+            axes.sharex(panels[2])
+        for axes, (label, title) in zip(panels, _PANELS.items(), strict=True):
+            axes.set_title(title, fontsize=8.5, loc="left")
+            axes.axvline(0.0, color="#1b1b1b", linewidth=0.8)
+            for place, name in zip(places, names, strict=True):
+                if (one := rows[label].get(name)) is None:
+                    continue
+                colour = "#d55e00" if name.startswith(_LEARNED) else "#0072b2"
+                marker = "s" if name.startswith(_LEARNED) else "o"
+                axes.plot([one.low, one.high], [place, place], color=colour, linewidth=2.2)
+                axes.plot([one.value], [place], marker, color=colour, markersize=5.5)
+            axes.set_ylim(0.4, len(names) + 0.6)
+            axes.spines[["top", "right", "left"]].set_visible(False)
+            axes.tick_params(axis="y", length=0)
+            axes.grid(axis="y", color="#e4e6e9", linewidth=0.6)
+            axes.set_axisbelow(True)
+        panels[0].set_yticks(list(places), names)
+        panels[0].set_xlim(left=0.0)
+        canvas.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
+
+
+_PACKAGES = {
+    "env.step_arrays": "this package, arrays",
+    "env.step": "this package, dicts",
+    "RWARE": "RWARE",
+    "MPE2 simple_spread": "MPE2 simple_spread",
+    "VMAS navigation, 1 world": "VMAS navigation, 1 world",
+    "VMAS navigation, 256 worlds": "VMAS navigation, 256 worlds",
+}
+
+
+def draw_speed(costs: str, path: Path) -> None:
+    """Draw agent-steps a second of this package and of others, from the table of costs."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    rates = {
+        line.split("|")[1].partition(":")[0].strip(): float(line.split("|")[2].replace(",", ""))
+        for line in costs.splitlines()[2:]
+        if line.startswith("| ")
+    }
+    shown = {label: rates[name] for name, label in _PACKAGES.items() if name in rates}
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams |= {"svg.hashsalt": "front page", "font.size": 9.0, "axes.linewidth": 0.6}
+        canvas = Figure(figsize=(7.2, 2.1), layout="constrained")
+        axes = canvas.subplots()
+        colours = ["#0072b2" if "this" in label else "#9aa0a8" for label in shown]
+        bars = axes.barh(list(shown), list(shown.values()), color=colours, height=0.65)
+        axes.bar_label(bars, [f"{rate:,.0f}" for rate in shown.values()], padding=4)
+        axes.set_xscale("log")
+        axes.set_xlim(1e3, 5e6)
+        axes.invert_yaxis()
+        axes.spines[["top", "right", "left"]].set_visible(False)
+        axes.tick_params(axis="y", length=0)
+        axes.set_xlabel("agent-steps a second, logarithmic")
+        canvas.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
+
+
+# -- links --------------------------------------------------------------------------------------
+
+_PAGES = {
+    "quick start": "docs/quickstart.md",
+    "the environment": "docs/environment.md",
+    "results": "docs/results.md",
+    "indicators": "docs/indicators.md",
+    "faults": "docs/faults.md",
+    "studies": "docs/studies.md",
+    "trials of robots": "docs/trials.md",
+    "any swarm": "docs/tasks.md",
+    "training": "docs/training.md",
+    "extending": "docs/extending.md",
+    "other libraries": "docs/ecosystem.md",
+    "comparison": "docs/comparison.md",
+    "promises": "docs/promises.md",
+    "CONTRIBUTING": "CONTRIBUTING.md",
+    "CHANGELOG": "CHANGELOG.md",
+    "CITATION": "CITATION.cff",
+}
+
+
+def pictures_and_links(address: str | None) -> dict[str, str]:
+    """Return the blocks with the film, the picture and the links of the README.
+
+    Args:
+        address: of the repository, "https://.."; None: it has none, so that links are relative,
+            and the README says where they do not lead.
+    """
+    raw, blob = (f"{address}/raw/main/", f"{address}/blob/main/") if address else ("", "")
+    note = (
+        "Pictures and links are those of the repository. A package index does not show them; the "
+        "pages lie in `docs/` of the source distribution.\n\n"
+    )
+    film = "Two runs of one seed. Left: 25 robots. Right: five of them, marked 4, cannot deliver."
+    picture = "A row a policy: P, S and R in four failure modes, each with its 95 % interval"
+    links = "\n".join(f"[{name}]: {blob}{path}" for name, path in _PAGES.items())
+    return {
+        "film": f'<img align="right" width="390" src="{raw}docs/media/fm4.gif" alt="{film}">',
+        "picture": f"![{picture}]({raw}docs/media/policies.svg)",
+        "links": links if address else f"{note}{links}",
+    }
+
+
+def address_of_the_repository() -> str | None:
+    """Return `Repository` of [project.urls], without a slash at its end; None: there is none."""
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    address: str | None = project.get("urls", {}).get("Repository")
+    return address and address.rstrip("/")
+
+
+def blocks() -> dict[str, str]:
+    """Return every block of the README."""
+    page = RESULTS.read_text(encoding="utf-8")
+    return {
+        "findings": findings(page),
+        "speed": speed(page),
+        **pictures_and_links(address_of_the_repository()),
+    }
+
+
+def main() -> None:
+    """Write the README's blocks and the picture."""
+    README.write_text(rewritten(README.read_text(encoding="utf-8"), blocks()), encoding="utf-8")
+    page = RESULTS.read_text(encoding="utf-8")
+    draw(rows_of(block_of(page, "policies")), MEDIA / "policies.svg")
+    draw_speed(block_of(page, "costs"), MEDIA / "speed.svg")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,220 @@
+"""`swarm-logistics attack` and `blame`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_logistics_env.cli.options import (
+    PresetOption,
+    ScenarioOption,
+    SetOption,
+    faults_of,
+    scenario_of,
+)
+from swarm_logistics_env.cli.study_commands import ProcessesOption
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.fault_analysis.attack import AttackResult
+    from swarm_logistics_env.fault_analysis.attribution import Attribution, Share
+    from swarm_logistics_env.spi import Interval
+    from swarm_logistics_env.warehouse import Fault
+
+PolicyArgument = Annotated[
+    str, typer.Argument(metavar="POLICY", help="Name, path of a file, or package.module:Class.")
+]
+
+
+def attack_command(
+    policy: PolicyArgument,
+    robots: Annotated[int, typer.Option(min=1, help="How many robots fail.")] = 2,
+    modes: Annotated[
+        list[str] | None,
+        typer.Option("--mode", help="Mode to search; may be repeated."),
+    ] = None,
+    budget: Annotated[int, typer.Option(min=10, help="Runs of faults in the search.")] = 200,
+    fresh: Annotated[int, typer.Option(min=3, help="Other seeds, for the estimates.")] = 30,
+    seed: Annotated[int, typer.Option(help="Of the search's own choices.")] = 0,
+    preset: PresetOption = "paper",
+    file: ScenarioOption = None,
+    changes: SetOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; results/attack-POLICY if not given.")
+    ] = None,
+    processes: ProcessesOption = None,
+) -> None:
+    """Search for the fault that costs most: mode, role at the onset, time and duration.
+
+    What it finds bounds the worst fault from one side: there may be worse ones.
+    """
+    from swarm_logistics_env.fault_analysis.attack import MODES, Attack, attack
+    from swarm_logistics_env.studies.engines import engine_named
+
+    asked = Attack(
+        policy=policy,
+        scenario=scenario_of(preset, file, changes),
+        robots=robots,
+        modes=tuple(modes) if modes else MODES,
+        budget=budget,
+        fresh=fresh,
+        seed=seed,
+    )
+    engine = engine_named("local" if processes == 1 else "process", processes)
+    place = out or Path("results") / f"attack-{Path(policy).stem}"
+    try:
+        found = attack(asked, engine, place)
+    except KeyboardInterrupt:
+        _stopped(place)
+    _show_attack(found, policy, robots, fresh)
+
+
+def blame_command(
+    policy: PolicyArgument,
+    fault: Annotated[
+        str, typer.Option(help="MODE[:ROBOTS]@ONSET, with an onset later than 0, e.g. FM4:2@100.")
+    ],
+    role: Annotated[
+        str | None,
+        typer.Option(help="Robots that do this at the onset fail first; by the seed if not given."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of episodes.")] = 20,
+    first_seed: Annotated[int, typer.Option(min=0, help="Smallest seed.")] = 0,
+    preset: PresetOption = "paper",
+    file: ScenarioOption = None,
+    changes: SetOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; results/blame-POLICY-FAULT if not given.")
+    ] = None,
+    processes: ProcessesOption = None,
+) -> None:
+    """Tell which robots and which lost capabilities cost the deliveries that a fault costs."""
+    import os
+
+    from swarm_logistics_env.fault_analysis.attribution_run import attribute_in, write_tables
+    from swarm_logistics_env.progress_bar import ProgressBar
+
+    (chosen,) = faults_of([fault])
+    chosen = chosen.replace(role=role)
+    place = out or Path("results") / f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    scenario = scenario_of(preset, file, changes)
+    done = 0
+    with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
+
+        def count() -> None:
+            nonlocal done
+            done += 1
+            bar.reach(done)
+
+        try:
+            found = attribute_in(
+                place,
+                scenario,
+                policy,
+                chosen,
+                range(first_seed, first_seed + seeds),
+                processes or os.cpu_count() or 1,
+                count,
+            )
+        except KeyboardInterrupt:
+            _stopped(place)
+    _show_blame(found, policy)
+    typer.echo(f"Written: {', '.join(map(str, write_tables(found, place)))}")
+
+
+def _stopped(place: Path) -> None:
+    typer.echo(
+        f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
+    )
+    raise typer.Exit(130) from None
+
+
+def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.result_tables import Section
+
+    rows = tuple(
+        (
+            found.by,
+            _in_words(found.fault),
+            f"{found.robustness.value:+.3f}",
+            f"[{found.robustness.low:.3f}, {found.robustness.high:.3f}]"
+            if found.robustness.low is not None
+            else "",
+            str(found.runs),
+        )
+        for found in result.found
+    )
+    worst = min(result.found, key=lambda found: found.robustness.value)
+    lines = (
+        (
+            f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
+            f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met."
+        ),
+        (
+            f"{len(result.tried)} of {result.searched} faults were tried. What is found bounds "
+            "the worst from one side: it proves no other fault harmless."
+        ),
+    )
+    columns = ("found by", "fault", "R", "95 % interval", "runs")
+    show(Section(f"{policy}: worst faults found", columns, rows, lines))
+
+
+def _show_blame(found: Attribution, policy: str) -> None:
+    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.report.result_tables import Section
+
+    def rows(shares: tuple[Share, ...]) -> tuple[tuple[str, ...], ...]:
+        return tuple(
+            (
+                share.name.replace("_", " "),
+                share.meaning,
+                "" if share.robots is None else str(share.robots),
+                *_limits(share.lost),
+            )
+            for share in shares
+            if share.robots != 0
+        )
+
+    columns = ("part", "meaning", "robots", "lost", "95 % interval")
+    heading = f"{policy}: deliveries that {_in_words(found.fault)} costs, per episode"
+    sections = (
+        (heading, (found.total, *found.parts), (f"Means over {len(found.seeds)} seeds.",)),
+        (
+            "By role at the onset",
+            found.roles,
+            ("robots: how many failed in that role, over all seeds. The rows sum to all.",),
+        ),
+        (
+            "By lost capability",
+            found.capabilities,
+            (
+                "Shapley values over copies of the world at the onset; the rows sum to all.",
+                (
+                    "The requested item was held by a failed robot for "
+                    f"{_mean([each.blocked_seconds for each in found.seeds]):.0f} s, and working "
+                    "robots touched failed ones for "
+                    f"{_mean([each.anchoring_seconds for each in found.seeds]):.0f} robot-seconds."
+                ),
+            ),
+        ),
+    )
+    for title, shares, lines in sections:
+        show(Section(title, columns, rows(shares), lines))
+
+
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values)
+
+
+def _limits(lost: Interval) -> tuple[str, str]:
+    if lost.low is None or lost.high is None:
+        return f"{lost.value:.2f}", ""
+    return f"{lost.value:.2f}", f"[{lost.low:.2f}, {lost.high:.2f}]"
+
+
+def _in_words(fault: Fault) -> str:
+    who = "by the seed" if fault.role is None else fault.role.replace("_", " ")
+    until = "" if fault.duration is None else f" for {fault.duration:g} s"
+    return f"{fault.mode} of {fault.robots} ({who}) from {fault.onset:g} s{until}"

@@ -1,0 +1,110 @@
+"""Who is to blame: planted causes are found, and the shares sum to the loss."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Fault, Scenario, policies
+from swarm_logistics_env.errors import FaultError, StudyError
+from swarm_logistics_env.fault_analysis.attribution import attribute, losses
+from swarm_logistics_env.fault_analysis.attribution_run import (
+    FINISHED,
+    attribute_in,
+    write_tables,
+)
+from swarm_logistics_env.fault_analysis.fork import Fork
+from swarm_logistics_env.policies.swarm_dt import SwarmDT
+
+SCENARIO = Scenario(
+    n_robots=4,
+    warehouse_width=4.0,
+    warehouse_height=4.0,
+    delivery_width=1.2,
+    n_items=5,
+    restock=True,
+    duration=80.0,
+)
+
+
+class OneWorker(SwarmDT):
+    """Robot 0 works without its radio; the others stand still."""
+
+    def __init__(self) -> None:
+        super().__init__(taxis_gain=0.0)
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        commands = super().act(observations)
+        commands[1:] = 0.0
+        return commands
+
+
+def test_copies_without_a_fault_are_equal_and_lose_nothing() -> None:
+    fork = Fork(SCENARIO, policies.load("swarm-dt"), 0, 20.0)
+    assert fork.go_on() == fork.go_on()
+    # A robot that does not hear is as good as before to a policy that does not listen.
+    deaf = losses(SCENARIO, policies.load("random-walk"), Fault("FM3_hear", 2, onset=20.0), 0)
+    assert deaf.total == 0.0
+    assert set(deaf.capabilities.values()) == {0.0}
+
+
+def test_a_planted_robot_bears_the_whole_loss() -> None:
+    found = attribute(SCENARIO, OneWorker(), Fault("dead", (0, 3), onset=20.0), range(4))
+    assert found.total.lost.value > 0.0
+    for seed in found.seeds:
+        assert seed.robots[3][1] == 0.0
+        assert seed.robots[0][1] == seed.total
+
+
+def test_a_planted_capability_bears_the_whole_loss() -> None:
+    # A policy that does not listen loses nothing by deafness.
+    fault = Fault("dead[deliver,hear]", (0, 3), onset=20.0)
+    found = attribute(SCENARIO, OneWorker(), fault, range(4))
+    assert found.total.lost.value > 0.0
+    for seed in found.seeds:
+        assert seed.capabilities == {"deliver": seed.total, "hear": 0.0}
+
+
+def test_the_shares_sum_to_the_loss() -> None:
+    fault = Fault("dead[move,deliver]", 2, onset=20.0, role="carrier")
+    found = attribute(SCENARIO, policies.load("swarm-dt"), fault, range(2))
+    for seed in found.seeds:
+        assert sum(lost for _, lost in seed.robots.values()) == pytest.approx(seed.total)
+        assert sum(seed.capabilities.values()) == pytest.approx(seed.total)
+    total = found.total.lost.value
+    for rows in (found.parts, found.roles, found.capabilities):
+        assert sum(row.lost.value for row in rows) == pytest.approx(total)
+    assert sum(row.robots or 0 for row in found.roles) == 4
+
+
+@pytest.mark.parametrize(
+    ("fault", "sentence"),
+    [
+        (Fault("FM4", 2), "onset = 0 s: should be later than 0"),
+        (Fault("FM4", 7, onset=5.0), "7 robots: should be at most 6"),
+        (Fault("FM4", 2, onset=90.0), "should be earlier"),
+    ],
+)
+def test_what_cannot_be_attributed_is_refused(fault: Fault, sentence: str) -> None:
+    with pytest.raises(FaultError, match=sentence):
+        attribute(SCENARIO.replace(n_robots=8), policies.load("swarm-dt"), fault, [0])
+
+
+def test_finished_seeds_are_kept_also_beside_a_torn_line(tmp_path: Path) -> None:
+    fault = Fault("FM4", 1, onset=40.0)
+    played = []
+    first = attribute_in(
+        tmp_path, SCENARIO, "swarm-dt", fault, [0, 1], on_seed=lambda: played.append(1)
+    )
+    with (tmp_path / FINISHED).open("a", encoding="utf-8") as file:
+        file.write('{"seed": 2, "tot')
+    again = attribute_in(
+        tmp_path, SCENARIO, "swarm-dt", fault, [0, 1, 2], on_seed=lambda: played.append(1)
+    )
+    assert len(played) == 3
+    assert again.seeds[:2] == first.seeds
+    with pytest.raises(StudyError, match="another fault: should be another directory"):
+        attribute_in(tmp_path, SCENARIO, "swarm-dt", Fault("FM1", 1, onset=40.0), [0])
+    for path in write_tables(again, tmp_path):
+        assert path.stat().st_size > 0

@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion.steering import steer
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.3, 1.5, -0.6, 3.0, -2.0])
+def test_it_gets_to_drive_where_it_wants_to_and_remembers_that_it_turned(direction: float) -> None:
+    memory = np.zeros((1, known.N_COLUMNS))
+    memory[0, known.HOME_X] = 2.0
+    heading, wanted = 0.0, direction
+    for _ in range(10):
+        commands = np.array([[math.cos(wanted), math.sin(wanted), 0.0, 1.0]])
+        steer(0.6, memory, commands)
+        assert abs(commands[0, 2]) <= 1.0
+        assert commands[0, 1] == 0.0
+        assert commands[0, 3] == 1.0
+        heading += 0.6 * commands[0, 2]
+        wanted = direction - heading
+    assert abs(commands[0, 0]) == pytest.approx(1.0)
+    driven = heading if commands[0, 0] > 0 else heading + math.pi
+    assert math.cos(driven - direction) == pytest.approx(1.0)
+    home = math.atan2(memory[0, known.HOME_Y], memory[0, known.HOME_X])
+    assert math.cos(home + heading) == pytest.approx(1.0)
+    assert math.cos(memory[0, known.WALL] + heading) == pytest.approx(1.0)
+
+
+def test_homing_delivers_with_differential_drive() -> None:
+    scenario = Scenario(restock=True, drive="differential", duration=100.0)
+    ours, scripted = (
+        np.mean([run_episode(scenario, policies.load(name), seed).delivered for seed in range(3)])
+        for name in ("homing", "swarm-dt")
+    )
+    assert ours > 2 * scripted

@@ -1,0 +1,66 @@
+"""The page in a real browser, driven by real clicks, touches and keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from swarm_logistics_env import Fault
+from swarm_logistics_env.watch import Session
+from swarm_logistics_env.watch.web import recorded_page
+from tests.watch.conftest import SMALL, Served
+
+if TYPE_CHECKING:
+    from verification.browser import Browser
+
+AT = """(() => {{
+const canvas = element('arena0'), box = canvas.getBoundingClientRect();
+const place = placeOf(canvas, latest.scenario), poses = frames.at(-1).poses0;
+return [box.left + place.left + place.scale * poses[3 * {robot}] / 1000,
+box.top + place.bottom - place.scale * poses[3 * {robot} + 1] / 1000];
+}})()"""
+
+
+def test_robot_is_broken_by_click_and_by_touch(served: Served, browser: Browser) -> None:
+    browser.open(served.server.address)
+    browser.wait_for("latest && latest.time > 1")
+    browser.press(" ")
+    browser.wait_for("latest.paused")
+    browser.click(*browser.value(AT.format(robot=4)))
+    browser.wait_for("latest.selected && latest.selected.robot === 4")
+    browser.click_on("#break")
+    browser.wait_for("latest.robots0[4][2] === '4' && latest.robots1[4][2] === ''")
+    x, y = browser.value(AT.format(robot=2))
+    browser.call("Emulation.setTouchEmulationEnabled", enabled=True)
+    browser.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+    browser.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    browser.wait_for("latest.selected && latest.selected.robot === 2")
+    browser.press("b")
+    browser.wait_for("latest.robots0[2][2] === '4'")
+    browser.press("n")
+    browser.wait_for("latest.seed === 1 && latest.events.length === 0")
+    assert browser.console == []
+
+
+def test_page_finds_the_server_again(browser: Browser) -> None:
+    first = Served()
+    browser.open(first.server.address)
+    browser.wait_for("latest && element('state').hidden")
+    first.stop()
+    browser.wait_for("element('state').textContent.includes('has gone')")
+    again = Served(first.server.port, first.server.token)
+    try:
+        browser.wait_for("latest && element('state').hidden")
+    finally:
+        again.stop()
+
+
+def test_recording_plays_from_a_file(browser: Browser, tmp_path: Path) -> None:
+    session = Session(SMALL, faults=[Fault("FM4", [1], onset=5.0)], speed=8.0)
+    file = tmp_path / "run.html"
+    file.write_text(recorded_page(session, 20.0), encoding="utf-8")
+    browser.open(file.as_uri())
+    browser.wait_for("latest && playhead > 6")
+    assert browser.value("latest.time") == 20.0
+    assert browser.value("frames[frameAt(6)].robots0[1][2]") == "4"
+    assert browser.console == []

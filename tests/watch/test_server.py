@@ -1,0 +1,193 @@
+"""The server: what it serves, to whom, and what it refuses."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import json
+import random
+import socket
+import stat
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.watch import Session
+from swarm_logistics_env.watch.web import WatchServer
+from swarm_logistics_env.watch.web.server import kept_token
+from tests.watch.conftest import SMALL, Served
+
+
+def ask(served: Served, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
+    connection = http.client.HTTPConnection("127.0.0.1", served.server.port, timeout=30)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    found = answer.status, answer.read(), dict(answer.getheaders())
+    connection.close()
+    return found
+
+
+def messages(served: Served, orders: list[str], enough: int) -> list[dict[str, Any]]:
+    """Send orders and return the messages that come, until a problem or `enough` of them."""
+
+    async def talk() -> list[dict[str, Any]]:
+        got: list[dict[str, Any]] = []
+        async with (
+            aiohttp.ClientSession() as client,
+            client.ws_connect(f"{served.server.address}live") as page,
+        ):
+            for order in orders:
+                await page.send_str(order)
+            while len(got) < enough:
+                got.append(json.loads((await page.receive(30)).data))
+                if "problem" in got[-1]:
+                    break
+        return got
+
+    return asyncio.run(talk())
+
+
+def test_page_and_scripts_come_with_a_content_policy(served: Served) -> None:
+    for name in ("", "page.css", "draw.js", "panel.js", "page.js"):
+        status, body, headers = ask(served, f"/{served.server.token}/{name}")
+        assert status == 200
+        assert body
+        assert "default-src 'none'; script-src 'self'" in headers["Content-Security-Policy"]
+        assert headers["Cache-Control"] == "no-store"
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "swarm.example"},
+        {"Host": "127.0.0.1.swarm.example:8765"},
+        {"Host": ""},
+        {"Origin": "http://swarm.example"},
+        {"Origin": "null"},
+        {"Origin": "https://127.0.0.1"},
+    ],
+)
+@pytest.mark.parametrize("name", ["", "live", "recording.html"])
+def test_other_hosts_and_origins_are_refused(
+    served: Served, headers: dict[str, str], name: str
+) -> None:
+    assert ask(served, f"/{served.server.token}/{name}", **headers)[0] == 403
+
+
+def test_without_the_token_nothing_is_served(served: Served) -> None:
+    token = served.server.token
+    wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
+    for path in ("/", "/page.js", f"/{wrong}/", f"/{wrong}/live", "//", "/%ff/"):
+        status, body, _ = ask(served, path)
+        assert status == 403, path
+        assert token.encode() not in body
+
+
+@pytest.mark.parametrize(
+    "name", ["server.py", "../server.py", "..%2fserver.py", "%2e%2e/session.py", "/etc/passwd"]
+)
+def test_serves_no_other_file(served: Served, name: str) -> None:
+    status, body, _ = ask(served, f"/{served.server.token}/{name}")
+    assert status in (403, 404)
+    assert b"import" not in body
+
+
+def test_listens_on_loopback_only(served: Served) -> None:
+    listening = {site[0] for site in served.server._runner.addresses}
+    assert listening == {"127.0.0.1"}
+
+
+def test_frames_hold_what_changed(served: Served) -> None:
+    fixed, first, second = messages(served, [], 3)
+    assert "swarm-dt" in fixed["choices"]
+    assert len(first["poses0"]) == len(first["poses1"]) == 18
+    assert second["time"] > first["time"]
+    assert "scenario" not in second
+
+
+def test_orders_are_obeyed(served: Served) -> None:
+    orders = [
+        {"do": "choose", "mode": "FM1"},
+        {"do": "toggle", "robot": 3},
+        {"do": "widen", "width": 2},
+        {"do": "pause"},
+    ]
+    messages(served, [json.dumps(order) for order in orders], 3)
+    session = served.server.session
+    assert session.run.world.state.failure_modes[3] == ("FM1",)
+    assert not session.beside.world.state.failed.any()
+    assert session.paused
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        ('{"do":"toggle","robot":99}', "robot = 99"),
+        ('{"do":"choose","mode":"FM9"}', "FM9"),
+        ('{"do":"fly"}', "order"),
+        ('{"do":"select","robot":"3"}', "valid integer"),
+        ('{"do":"select","robot":3,"also":4}', "Unexpected keyword"),
+        ('{"do":"compare","policy":"os:abort"}', "no policy 'os:abort'"),
+        ('{"do":"widen","width":NaN}', "order"),
+        ("[]", "order"),
+        ("[" * 3000, "order"),
+    ],
+)
+def test_order_that_cannot_be_is_refused_in_a_sentence(
+    served: Served, order: str, words: str
+) -> None:
+    assert words in messages(served, [order], 10)[-1]["problem"]
+
+
+def test_malformed_requests_neither_stop_it_nor_leak_a_path(
+    served: Served, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rng = random.Random(7)
+    token = served.server.token.encode()
+    answered = 0
+    for _ in range(200):
+        line = rng.choice(
+            [b"GET / HTTP/1.1", b"GET /" + token + b"/../../x HTTP/1.1", b"POST /" + token,
+             b"\0", rng.randbytes(20), b"GET /" + b"a" * 70000 + b" HTTP/1.1"]
+        )  # fmt: skip
+        header = rng.choice([b"Host: evil", b"no colon", b"Content-Length: x", rng.randbytes(30)])
+        with socket.create_connection(("127.0.0.1", served.server.port), timeout=30) as one:
+            answer = b""
+            try:
+                one.sendall(line + b"\r\n" + header + b"\r\n\r\n")
+                one.shutdown(socket.SHUT_WR)
+                while part := one.recv(1 << 16):
+                    answer += part
+            except OSError:
+                pass  # closed on a request that was too long
+        answered += bool(answer)
+        assert not any(secret in answer for secret in (b"/usr/", b".py", b"Traceback"))
+    assert answered > 50
+    assert ask(served, f"/{served.server.token}/")[0] == 200
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_time_passes_only_while_a_page_is_open(served: Served) -> None:
+    assert served.server.session.run.world.state.step == 0
+    messages(served, [], 5)
+    assert served.server.session.run.world.state.step > 0
+
+
+def test_port_in_use_is_one_sentence(served: Served) -> None:
+    second = WatchServer(Session(SMALL), served.server.port)
+    with pytest.raises(SetupError, match="is in use, should be another one"):
+        asyncio.run(second.start())
+
+
+def test_token_is_kept_for_this_user_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    token = kept_token()
+    assert token is not None
+    assert kept_token() == token
+    file = tmp_path / "swarm-logistics" / "watch-token"
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    file.write_text("no token")
+    assert kept_token() is None
