@@ -102,7 +102,22 @@ def run_command(
         Path | None,
         typer.Option(help="Directory of its store and report; results/NAME if not given."),
     ] = None,
-    seeds: SeedsOption = None,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            "--seeds",
+            "--most",
+            min=1,
+            help="Number of seeds of every condition; with --until-clear the most (200).",
+        ),
+    ] = None,
+    until_clear: Annotated[
+        bool,
+        typer.Option(
+            "--until-clear",
+            help="Look at 20, 30, .. seeds, and play on only what is not decided yet.",
+        ),
+    ] = False,
     first_seed: FirstSeedOption = None,
     policies: PolicyOption = None,
     processes: ProcessesOption = None,
@@ -128,7 +143,10 @@ def run_command(
     from swarm_logistics_env.studies.runs import Shard
 
     part = Shard.parse(shard) if shard else None
-    chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed)
+    looks: dict[str, object] = {}
+    if until_clear:
+        seeds, looks = _until_clear(seeds)
+    chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
     out = out or Path("results", chosen.specification.name)
     chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
@@ -188,6 +206,23 @@ def merge_command(
     from swarm_logistics_env.studies.metadata import merge
 
     typer.echo(f"{merge(directories, out)} runs in {out}")
+
+
+def _until_clear(most: int | None) -> tuple[int, dict[str, object]]:
+    """Return the most seeds of a study that runs until it is clear, and its looks as fields.
+
+    Raises:
+        StudyError: there is no room for a look before the last.
+    """
+    from swarm_logistics_env.errors import StudyError
+    from swarm_logistics_env.studies.until_clear import FIRST_LOOK, MOST_SEEDS, looks_up_to
+
+    most = MOST_SEEDS if most is None else most
+    if most <= FIRST_LOOK:
+        raise StudyError(
+            f"--most {most}: should be more than {FIRST_LOOK} seeds, where the first look is"
+        )
+    return most, {"looks": looks_up_to(most), "until_clear": True}
 
 
 def study_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from swarm_logistics_env import spi
@@ -18,6 +19,7 @@ from swarm_logistics_env.studies.fault_measures import (
 from swarm_logistics_env.studies.judged_comparisons import CONFIDENCE
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import SizeSeries, steps
+from swarm_logistics_env.studies.until_clear import SPENDING
 
 _LAWS_TEXT = (
     "USL: P = gN / (1 + a(N-1) + bN(N-1)), N* = sqrt((1-a)/b). The other: "
@@ -134,6 +136,9 @@ def look_sections(results: StudyResults) -> Iterator[Section]:
     """Yield the declared looks, where there are any."""
     if not results.looks:
         return
+    if results.plan.specification.until_clear:
+        yield _stops(results)
+        return
     n_seeds, total = len(results.plan.seeds), len(results.looks)
     columns: list[Column] = [
         ("look", lambda look: f"{look[0]} of {total}"),
@@ -156,6 +161,29 @@ def look_sections(results: StudyResults) -> Iterator[Section]:
     alphas = spi.look_alphas(results.looks, 1 - CONFIDENCE)
     looks = zip(range(1, total + 1), results.looks, alphas)
     yield table_section("Declared looks", looks, columns, *lines)
+
+
+def _stops(results: StudyResults) -> Section:
+    """Return the looks of a study that runs until it is clear, and what stopped at each."""
+    stopped = Counter(results.indicators["stopped_at"].dropna())
+    total = len(results.indicators)
+    alphas = spi.look_alphas(results.looks, 1 - CONFIDENCE, spending=SPENDING)
+    columns: list[Column] = [
+        ("seeds", lambda look: str(look[0])),
+        ("p below, alone", lambda look: f"{look[1]:.4f}"),
+        ("level of intervals", lambda look: wording.percent(1 - look[1])),
+        ("stopped here", lambda look: str(stopped[look[0]])),
+    ]
+    return table_section(
+        "Looks, until it is clear",
+        zip(results.looks, alphas),
+        columns,
+        "Declared before the first run. Alpha is spent over the looks in proportion to the seeds, "
+        "and Holm's procedure steps down at each look, so that a comparison stops once its verdict "
+        "stands; the intervals hold over all looks together with 95 %.",
+        f"{stopped.total()} of {total} comparisons stopped. P and the further measures are over "
+        f"the {len(results.plan.seeds)} seeds that all conditions share.",
+    )
 
 
 def _when(look: int, n_seeds: int) -> str:

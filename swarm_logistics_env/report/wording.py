@@ -149,6 +149,8 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
         return
     unpaired = f"{test.n_seeds} runs a condition, unpaired"
     seeds = seeds_text(results) if results.plan.paired else unpaired
+    if results.plan.specification.until_clear:
+        seeds = f"{test.n_seeds} paired seeds"
     if test.verdict == "unaffected":
         yield f"{test.indicator} = {test.value:.3f} exactly, over {seeds}: {UNAFFECTED}."
         yield "Both conditions gave the same runs, so there is nothing to test."
@@ -176,6 +178,9 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
         yield "The verdict assumes normal differences."
     if "skewed" in test.flags:
         yield "Skewed: at so few seeds the verdict errs more often than its level."
+    if results.plan.specification.until_clear:
+        where = "Open after" if test.stopped_at is None else "Clear at"
+        yield f"{where} {test.n_seeds} of at most {results.plan.specification.looks[-1]} seeds."
     if results.exploratory:
         yield "Exploratory."
 

@@ -25,7 +25,7 @@ from .power import (
 from .resilience import resilience_index
 from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
-from .sequential import look_alphas
+from .sequential import Spending, look_alphas
 from .simulation import Simulation, mean_with_simulation
 from .summaries import (
     Interval,
@@ -49,6 +49,7 @@ __all__ = [
     "ScalingFit",
     "SelfRepair",
     "Simulation",
+    "Spending",
     "SurvivalCurve",
     "Trial",
     "Trials",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -15,30 +16,39 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+Spending = Literal["obrien-fleming", "linear"]
 _REACH = 9.0  # standard deviations that the integration grid covers
 _GRID = 801  # its points: the boundaries are then right to five digits
 
 
-def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
+def look_alphas(
+    looks: Sequence[int], alpha: float = 0.05, *, spending: Spending = "obrien-fleming"
+) -> tuple[float, ...]:
     """Two-sided p below which to stop at each declared look, in order.
 
-    Lan and DeMets' (1983) spending function of O'Brien-Fleming type, on both sides, with the share
-    of the final number of seeds as information. A single look gives (alpha,).
+    Lan and DeMets' (1983) spending of alpha on both sides, with the share of the final number of
+    seeds as information. A single look gives (alpha,).
 
     Args:
         looks: Numbers of seeds at which the study is looked at, rising.
         alpha: Chance of any false verdict over all looks, in (0, 1).
+        spending: "obrien-fleming" leaves nearly all of alpha to the last look; "linear" spends it
+            in proportion to the seeds (Kim and DeMets 1987), so that clear cases stop early.
 
     Raises:
         IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1).
     """
-    from scipy.optimize import brentq
-    from scipy.special import ndtr
-
     between_0_and_1("alpha", alpha)
     seeds = [count("look", look) for look in looks]
     if not seeds or any(later <= earlier for earlier, later in pairwise(seeds)):
         raise IndicatorError(f"looks = {tuple(looks)}: should be rising numbers of seeds")
+    return _boundaries(tuple(seeds), alpha, spending)
+
+
+@functools.lru_cache(maxsize=256)
+def _boundaries(seeds: tuple[int, ...], alpha: float, spending: Spending) -> tuple[float, ...]:
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
 
     # The sum process is Brownian motion on [0, 1]; `density` is that of paths not stopped so far,
     # on the points of the last look, where they start.
@@ -47,7 +57,7 @@ def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
     for look in seeds:
         now = look / seeds[-1]
         step = math.sqrt(now - information)
-        to_spend = _spent(now, alpha) - spent
+        to_spend = _spent(now, alpha, spending) - spent
 
         def stopped(
             boundary: float,
@@ -71,8 +81,10 @@ def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
     return tuple(alphas)
 
 
-def _spent(information: float, alpha: float) -> float:
+def _spent(information: float, alpha: float, spending: Spending) -> float:
     """Error spent, over both sides, when `information` in (0, 1] of the seeds are in."""
+    if spending == "linear":
+        return alpha * information
     from scipy.special import ndtr, ndtri
 
     return 4.0 * float(ndtr(ndtri(alpha / 4.0) / math.sqrt(information)))

@@ -31,14 +31,14 @@ class Level(NamedTuple):
     alpha: float = ALPHA
 
 
-def level_at(look: int, looks: Sequence[int]) -> Level:
+def level_at(look: int, looks: Sequence[int], spending: spi.Spending = "obrien-fleming") -> Level:
     """Return the level of one of the declared looks, counted from 0.
 
     Each test spends its own error over all of them: 5 % on both sides of a threshold, and as much
     on each side of the margin.
     """
-    both = spi.look_alphas(looks, 1 - CONFIDENCE)[look]
-    one_sided = spi.look_alphas(looks, 2 * ALPHA)[look] / 2
+    both = spi.look_alphas(looks, 1 - CONFIDENCE, spending=spending)[look]
+    one_sided = spi.look_alphas(looks, 2 * ALPHA, spending=spending)[look] / 2
     return Level(1 - max(both, _LEAST_ALPHA), max(one_sided, _LEAST_ALPHA))
 
 
@@ -53,6 +53,8 @@ class Judged:
         saturated: whether it rests on a P that is capped.
         p_holm, verdict_holm: of the estimate under Holm; None: unaffected, or blocked family.
         equivalence_holm: verdict of the equivalence under Holm; None as `equivalence`.
+        stopped_at: number of seeds at which it was clear, in a study that runs until then; None: it
+            is not, or the study is another.
     """
 
     comparison: Comparison
@@ -62,6 +64,7 @@ class Judged:
     p_holm: float | None = None
     verdict_holm: Verdict | None = None
     equivalence_holm: Verdict | None = None
+    stopped_at: int | None = None
 
 
 def judge_all(plan: Plan, cells: Mapping[CellKey, Row], level: Level) -> list[Judged]:

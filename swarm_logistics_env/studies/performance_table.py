@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.summaries import Interval
@@ -87,6 +88,33 @@ def table_of(rows: Iterable[Mapping[str, object]], columns: Columns) -> pd.DataF
     return frame.astype({name: kind for name, (kind, _) in columns.items()})
 
 
+class Played(NamedTuple):
+    """What an indicator takes from the runs of one condition.
+
+    Attributes:
+        by_seed: P seed by seed of the runs that succeeded, shape (n_seeds,).
+        digests: of these runs.
+        saturated: whether one of them delivered every item.
+        problem: why runs are missing; None: they are complete.
+    """
+
+    by_seed: NDArray[np.float64]
+    digests: tuple[str | None, ...]
+    saturated: bool
+    problem: str | None
+
+
+def played(found: Sequence[Outcome | None], *, paired: bool = True) -> Played:
+    """Return the runs of one condition, from their outcomes seed by seed; None: not played."""
+    succeeded = [outcome for outcome in found if outcome is not None and outcome.error is None]
+    return Played(
+        np.array([outcome.delivered for outcome in succeeded], dtype=np.float64),
+        tuple(outcome.digest for outcome in succeeded),
+        any(outcome.all_delivered for outcome in succeeded),
+        _problem(found, paired=paired),
+    )
+
+
 def _row(
     policy: str,
     table: str,
@@ -96,8 +124,8 @@ def _row(
     reference: Reference | None,
 ) -> dict[str, object]:
     found = [outcomes.get(arm.condition.run(plan.code, seed).key) for seed in plan.seeds]
-    succeeded = [outcome for outcome in found if outcome is not None and outcome.error is None]
-    p = np.array([outcome.delivered for outcome in succeeded], dtype=np.float64)
+    runs = played(found, paired=plan.paired)
+    p = runs.by_seed
     mean = spi.mean_interval(p) if p.size else _UNKNOWN
     one_run = spi.prediction_interval(p) if p.size else _UNKNOWN
     published = reference.performance.get(arm.setting) if reference else None
@@ -122,15 +150,12 @@ def _row(
         "prediction_low": one_run.low,
         "prediction_high": one_run.high,
         "published_inside": inside,
-        "saturated": any(outcome.all_delivered for outcome in succeeded),
-        "problem": _problem(found, paired=plan.paired),
         "arm": arm,
-        "by_seed": p,
-        "digests": tuple(outcome.digest for outcome in succeeded),
+        **runs._asdict(),
     }
 
 
-def _problem(found: list[Outcome | None], *, paired: bool) -> str | None:
+def _problem(found: Sequence[Outcome | None], *, paired: bool) -> str | None:
     missing = found.count(None)
     failed = sum(outcome is not None and outcome.error is not None for outcome in found)
     if not paired and missing < len(found):

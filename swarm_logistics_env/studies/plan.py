@@ -92,10 +92,11 @@ class Plan:
         asked, run = len(self.cells), len(self.conditions)
         start = self.specification.first_seed
         first = f" from {start} on" if start else ""
+        most = "at most " if self.specification.until_clear else ""
         return (
             f"{self.specification.name}: {len(self.comparisons)} comparisons of {asked} cells; "
-            f"{run} conditions ({asked - run} shared) x {len(self.seeds)} seeds{first} = "
-            f"{run * len(self.seeds)} runs"
+            f"{run} conditions ({asked - run} shared) x {most}{len(self.seeds)} seeds{first} = "
+            f"{most}{run * len(self.seeds)} runs"
         )
 
 

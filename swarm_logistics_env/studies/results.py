@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,6 +24,7 @@ from swarm_logistics_env.studies.judged_comparisons import (
 from swarm_logistics_env.studies.metadata import Declaration
 from swarm_logistics_env.studies.performance_table import Row, performance_table, rows_of
 from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.until_clear import standing
 from swarm_logistics_env.tasks.task import Outcome
 
 if TYPE_CHECKING:
@@ -37,7 +38,8 @@ class StudyResults:
     """All that a report says.
 
     Attributes:
-        plan: of the study.
+        plan: of the study; of one that runs until it is clear, over the seeds that all conditions
+            share.
         reference: what the study is compared with; None: nothing.
         performance: P of every policy and condition; its columns are those of
             `performance_table.PERFORMANCE`, with P seed by seed in `by_seed`.
@@ -102,11 +104,14 @@ def judge(
     reference = load_reference(plan.specification.reference)
     exploratory = declared is not None and not declared.covers(plan)
     looks = declared.looks if declared else ()
-    level = Level()
-    if looks and not exploratory:
+    level, found = Level(), None
+    if plan.specification.until_clear:
+        found = standing(plan, outcomes)
+        plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
+    elif looks and not exploratory:
         level = level_at(looks.index(len(plan.seeds)), looks)
     performance = performance_table(plan, outcomes, reference)
-    judged = judge_all(plan, _by_arm(performance), level)
+    judged = found.judged if found else judge_all(plan, _by_arm(performance), level)
     return StudyResults(
         plan,
         reference,

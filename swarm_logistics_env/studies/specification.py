@@ -159,6 +159,8 @@ class Specification(_Part):
         indicators: the indicators to test; conditions that only others need are not run.
         looks: rising numbers of seeds at which the study will be judged. If they are declared
             before the first run, the error over all looks stays at 5 % (O'Brien-Fleming spending).
+        until_clear: whether each comparison stops at the first of the looks at which its verdict is
+            clear under Holm; only the conditions that open ones need are played further.
         margin: the largest change of P that counts as none, as a share of P_o, in (0, 1); every R,
             FT and A is tested for it as well.
         reference: published results, which the report shows beside those of the study.
@@ -179,6 +181,7 @@ class Specification(_Part):
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
     indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     looks: tuple[PositiveInt, ...] = ()
+    until_clear: bool = False
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
     reference: str | None = None
 
@@ -248,6 +251,8 @@ class Specification(_Part):
     def _at_a_look(self) -> Self:
         if self.looks and self.seeds not in self.looks:
             raise ValueError(f"seeds = {self.seeds}: should be one of the looks {self.looks}")
+        if self.until_clear and not self.looks:
+            raise ValueError("until_clear: should come with looks, at which comparisons may stop")
         return self
 
     @field_validator("policies")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
@@ -18,9 +18,10 @@ from swarm_logistics_env.studies.metadata import Declaration, Metadata, of_exist
 from swarm_logistics_env.studies.plan import Plan, make_plan
 from swarm_logistics_env.studies.presets import load_preset
 from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.runs import Shard
+from swarm_logistics_env.studies.runs import Run, Shard
 from swarm_logistics_env.studies.specification import Specification, read_study_file
 from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.studies.until_clear import standing
 from swarm_logistics_env.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -42,6 +43,20 @@ class Tally:
     kept: int
     seconds: float
     error: str | None = None
+
+
+@dataclass
+class _Played:
+    """What one call of `Study.run` has played so far."""
+
+    kept: int
+    keys: set[str] = field(default_factory=set)
+    errors: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+
+    def tally(self) -> Tally:
+        first = self.errors[0] if self.errors else None
+        return Tally(len(self.keys), len(self.errors), self.kept, self.seconds, first)
 
 
 class Study:
@@ -165,28 +180,48 @@ class Study:
             engine = "process" if processes is not None and processes > 1 else "local"
         if isinstance(engine, str):
             engine = engine_named(engine, processes, address)
+        until_clear = self.specification.until_clear
+        if until_clear and shard:
+            raise StudyError(
+                "shard: should not be with until_clear, where all runs decide the next"
+            )
         whole = list(shard.of(plan.runs()) if shard else plan.runs())
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.of(self.specification)
             store.note(rows_of(self.specification, plan.code, plan.identities, declared))
             done = store.succeeded()
-            runs = [run for run in whole if run.key not in done]
-            kept = len(whole) - len(runs)
-            policies = Counter(run.condition.policy.label for run in runs)
-            progress = ProgressBar(self.specification.name, len(runs), "runs", parts=policies)
-            played, errors = Counter[str](), []
-            finished = engine(runs)
-            # Closed at once where this stops early, so that no worker outlives it.
-            with closing(finished), progress:
-                for run, outcome in finished:
-                    store.add(run, outcome)
-                    played[run.condition.policy.label] += 1
-                    if outcome.error is not None:
-                        errors.append(outcome.error.strip().splitlines()[-1])
-                    progress.reach(played.total(), f"{len(errors)} failed", played)
-            first_error = errors[0] if errors else None
-            return Tally(played.total(), len(errors), kept, progress.seconds, first_error)
+            played = _Played(sum(run.key in done for run in whole))
+            if not until_clear:
+                missing = [run for run in whole if run.key not in done]
+                self._play(missing, engine, store, played)
+            # A run that fails now is not tried again in this call.
+            while until_clear and (missing := self._wanted(store, played.keys)):
+                self._play(missing, engine, store, played)
+            return played.tally()
+
+    def _wanted(self, store: Store, played: Collection[str]) -> list[Run]:
+        """Return the runs that the next look needs, those that failed before this call too."""
+        plan = self.plan()
+        outcomes = store.outcomes(plan.runs())
+        kept = {k: o for k, o in outcomes.items() if o.error is None or k in played}
+        return list(standing(plan, kept).wanted)
+
+    def _play(self, runs: list[Run], engine: Engine, store: Store, played: _Played) -> None:
+        policies = Counter(run.condition.policy.label for run in runs)
+        progress = ProgressBar(self.specification.name, len(runs), "runs", parts=policies)
+        done, failed = Counter[str](), len(played.errors)
+        finished = engine(runs)
+        # Closed at once where this stops early, so that no worker outlives it.
+        with closing(finished), progress:
+            for run, outcome in finished:
+                store.add(run, outcome)
+                played.keys.add(run.key)
+                done[run.condition.policy.label] += 1
+                if outcome.error is not None:
+                    played.errors.append(outcome.error.strip().splitlines()[-1])
+                progress.reach(done.total(), f"{len(played.errors) - failed} failed", done)
+        played.seconds += progress.seconds
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.

@@ -1,0 +1,209 @@
+"""A study that runs until it is clear: each comparison stops at the first look that decides it.
+
+The looks are declared before the first run and alpha is spent over them, linearly, so that clear
+cases stop early. At each look Holm's procedure steps down through what its family has not decided
+yet, each step at the level that the spending gives for its share of alpha (Ye et al. 2013,
+Statistics in Medicine 32). The interval is the repeated one of Jennison and Turnbull (1989): over
+all looks together it holds the true value with 95 %, whatever made the comparison stop.
+
+Everything follows from the outcomes, so a study that was killed goes on as if it had not been.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.equivalence import ALPHA
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.studies.comparisons import Arm, Comparison
+from swarm_logistics_env.studies.judged_comparisons import (
+    CONFIDENCE,
+    CellKey,
+    Judged,
+    judge_one,
+    level_at,
+)
+from swarm_logistics_env.studies.performance_table import Played, played
+from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.runs import Condition, Run
+from swarm_logistics_env.tasks.task import Outcome
+
+# Below twenty seeds the studentised bootstrap of skewed counts errs at the small levels of a look.
+FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10
+MOST_SEEDS = 200
+SPENDING: spi.Spending = "linear"
+
+
+def looks_up_to(most: int) -> tuple[int, ...]:
+    """Return the looks of a study of at most so many seeds; the last is at `most`."""
+    return (*range(FIRST_LOOK, most, SEEDS_BETWEEN_LOOKS), most)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where the comparisons of a study stand.
+
+    Attributes:
+        judged: every comparison, as it was when it stopped or at the last complete look.
+        wanted: the runs that the next look needs; empty: everything is clear, or the most seeds
+            are played.
+        shared_seeds: number of seeds that every condition has, counted at the looks.
+    """
+
+    judged: tuple[Judged, ...]
+    wanted: tuple[Run, ...]
+    shared_seeds: int
+
+
+def standing(plan: Plan, outcomes: Mapping[str, Outcome]) -> Standing:
+    """Return where the comparisons of a plan stand after these outcomes, keyed by run."""
+    runs = _Runs(plan, outcomes)
+    families: dict[tuple[str, str], list[Comparison]] = {}
+    for comparison in plan.comparisons:
+        families.setdefault(comparison.family, []).append(comparison)
+    found = [_Family(members, runs) for members in families.values()]
+    first = plan.specification.looks[0]
+    wanted = {run.key: run for c in plan.conditions for run in runs.missing(c, first)}
+    for family in found:
+        wanted |= family.wanted
+    shared = [n for n in runs.looks if not any(runs.missing(c, n) for c in plan.conditions)]
+    judged = {comparison: one for family in found for comparison, one in family.judged().items()}
+    return Standing(
+        tuple(judged[comparison] for comparison in plan.comparisons),
+        tuple(wanted.values()),
+        max(shared, default=first),
+    )
+
+
+class _Runs:
+    """The runs of a plan, each hashed once, and what they gave."""
+
+    def __init__(self, plan: Plan, outcomes: Mapping[str, Outcome]) -> None:
+        self.plan = plan
+        self.declared = plan.specification.looks
+        self.looks = [look for look in self.declared if look <= len(plan.seeds)]
+        self._outcomes = outcomes
+        self._runs: dict[str, list[Run]] = {}
+
+    def of(self, condition: Condition, n_seeds: int) -> list[Run]:
+        if condition.key not in self._runs:
+            self._runs[condition.key] = [
+                condition.run(self.plan.code, seed) for seed in self.plan.seeds
+            ]
+        return self._runs[condition.key][:n_seeds]
+
+    def missing(self, condition: Condition, n_seeds: int) -> list[Run]:
+        return [run for run in self.of(condition, n_seeds) if run.key not in self._outcomes]
+
+    def cells(self, comparison: Comparison, n_seeds: int) -> dict[CellKey, Played]:
+        def cell(arm: Arm) -> Played:
+            return played([self._outcomes.get(r.key) for r in self.of(arm.condition, n_seeds)])
+
+        return {(comparison.policy, comparison.table, arm): cell(arm) for arm in comparison.arms}
+
+
+class _Family:
+    """The comparisons of one indicator and policy, taken from look to look.
+
+    Attributes:
+        wanted: by key, the runs that its next look needs.
+    """
+
+    def __init__(self, members: Sequence[Comparison], runs: _Runs) -> None:
+        self.wanted: dict[str, Run] = {}
+        self._members = members
+        self._runs = runs
+        self._found: dict[Comparison, Judged] = {}
+        self._look: dict[Comparison, int] = {}  # the last at which each was judged
+        self._open = list(members)
+        for look in range(len(runs.looks)):
+            if not self._open or not self._judged_at(look):
+                break
+
+    def _judged_at(self, look: int) -> bool:
+        """Judge what is open at a look; return whether its runs are there."""
+        n_seeds = self._runs.looks[look]
+        # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
+        playing = [c for c in self._open if not self._is_blocked(c)]
+        for comparison in playing:
+            for arm in comparison.arms:
+                missing = self._runs.missing(arm.condition, n_seeds)
+                self.wanted.update((run.key, run) for run in missing)
+        complete = not self.wanted
+        if not (complete or look == 0):
+            return False
+        level = level_at(look, self._runs.declared, SPENDING)
+        for comparison in playing:
+            cells = self._runs.cells(comparison, n_seeds)
+            self._found[comparison] = judge_one(comparison, cells, self._runs.plan, level)
+            self._look[comparison] = look
+        if complete:
+            self._stop_clear_ones(look, n_seeds)
+        return complete
+
+    def _is_blocked(self, comparison: Comparison) -> bool:
+        return comparison in self._found and isinstance(self._found[comparison].estimate, str)
+
+    def _stop_clear_ones(self, look: int, n_seeds: int) -> None:
+        p_values: dict[Comparison, float] = {}
+        for comparison in list(self._open):
+            estimate = self._found[comparison].estimate
+            if isinstance(estimate, str):
+                continue
+            if estimate.identical:  # nothing to test, at any number of seeds
+                self._stop(comparison, n_seeds)
+            elif estimate.p_value is not None:
+                p_values[comparison] = estimate.p_value
+        for comparison in sorted(p_values, key=lambda c: p_values[c]):
+            level = self._level(look, len(self._open))
+            if not p_values[comparison] < level:
+                break
+            self._settle(comparison, level)
+            self._stop(comparison, n_seeds)
+        for comparison in self._open:
+            if comparison in p_values:
+                self._settle(comparison, self._level(look, len(self._open)))
+
+    def _level(self, look: int, n_open: int) -> float:
+        alpha = (1 - CONFIDENCE) / n_open
+        return spi.look_alphas(self._runs.declared, alpha, spending=SPENDING)[look]
+
+    def _settle(self, comparison: Comparison, level: float) -> None:
+        """Note p on the scale on which 0.05 decides, and the verdict under Holm."""
+        one = self._found[comparison]
+        assert isinstance(one.estimate, Estimate)
+        p = one.estimate.p_value or 0.0
+        self._found[comparison] = replace(
+            one,
+            p_holm=min(1.0, p * (1 - CONFIDENCE) / level),
+            verdict_holm=one.estimate.verdict_for(p) if p < level else "inconclusive",
+        )
+
+    def _stop(self, comparison: Comparison, n_seeds: int) -> None:
+        self._open.remove(comparison)
+        self._found[comparison] = replace(self._found[comparison], stopped_at=n_seeds)
+
+    def judged(self) -> dict[Comparison, Judged]:
+        """Return every comparison, with the equivalences under Holm, each at its own look."""
+        tests = {c: self._found[c].equivalence for c in self._members}
+        if None in tests.values():  # not asked, or one is blocked
+            return self._found
+        left = [c for c in self._members if (test := tests[c]) and not test.identical]
+
+        def ratio(comparison: Comparison) -> float:
+            """Return p as a multiple of the level that it needs."""
+            test, look = tests[comparison], self._look[comparison]
+            looks = self._runs.declared
+            alphas = spi.look_alphas(looks, 2 * ALPHA / len(left), spending=SPENDING)
+            return 1.0 if test is None or test.p_value is None else test.p_value / alphas[look] * 2
+
+        shown = {c for c in self._members if c not in left}
+        while left and ratio(first := min(left, key=ratio)) < 1.0:
+            left.remove(first)
+            shown.add(first)
+        for comparison, test in tests.items():
+            verdict = test.verdict if test and comparison in shown else "inconclusive"
+            self._found[comparison] = replace(self._found[comparison], equivalence_holm=verdict)
+        return self._found

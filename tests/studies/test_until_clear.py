@@ -1,0 +1,194 @@
+"""Studies that run until they are clear: when comparisons stop, what is played, and errors."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+from collections.abc import Generator, Iterable
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.report_files import markdown
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.studies.until_clear import SPENDING, looks_up_to
+from swarm_logistics_env.tasks.task import Outcome
+from verification.verdict_errors import MODELS, wrong_verdicts
+
+FIELDS: dict[str, Any] = {
+    "until_clear": True,
+    "faults": [{"modes": ["FM2", "FM3", "FM4"], "robots": [1]}],
+    "indicators": ["R"],
+}
+MEANS = {"FM2": 38.5, "FM3": 34.0, "FM4": 15.0}  # of 40 items; R is 0.0025, -0.11 and -0.585
+
+
+def made_up(run: Run) -> Outcome:
+    """An outcome that depends on the run alone: Poisson counts around the mean of its fault."""
+    faults = [fault.mode for fault in run.condition.faults]
+    rng = np.random.default_rng([run.seed, *map(ord, "".join(faults))])
+    count = rng.poisson(MEANS[faults[0]] if faults else 40.0)
+    return Outcome(run.key, np.arange(float(count)), digest=run.key)
+
+
+class Engine:
+    """Gives made-up outcomes and counts them; kills its process after `most` of them."""
+
+    def __init__(self, most: int | None = None) -> None:
+        self.played: list[Run] = []
+        self._most = most
+
+    def __call__(self, runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        for run in runs:
+            if len(self.played) == self._most:
+                os.kill(os.getpid(), signal.SIGKILL)
+            self.played.append(run)
+            yield run, made_up(run)
+
+
+def until_clear(most: int, out: Path | None = None, **fields: Any) -> Study:
+    return Study(out=out, seeds=most, looks=looks_up_to(most), **FIELDS, **fields)
+
+
+def told(study: Study) -> dict[str, tuple[Any, ...]]:
+    return {
+        test.factor: (test.stopped_at, test.n_seeds, test.verdict_holm, test.low, test.high)
+        for test in rows_of(study.indicators())
+    }
+
+
+def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds() -> None:
+    study, engine = until_clear(100), Engine()
+    tally = study.run(engine)
+    found = told(study)
+    assert found["FM4"][:3] == (20, 20, "refuted")
+    assert found["FM3"][2] == "refuted"
+    assert 20 < found["FM3"][1] < 100
+    assert found["FM2"][:3] == (None, 100, "inconclusive")
+    modes = [fault.mode for run in engine.played for fault in run.condition.faults]
+    seeds = {mode: modes.count(mode) for mode in MEANS}
+    assert seeds == {mode: found[mode][1] for mode in MEANS}
+    assert tally.played == len(engine.played) == sum(seeds.values()) + 100
+
+
+def test_a_comparison_is_judged_by_its_own_seeds_and_its_repeated_interval() -> None:
+    study = until_clear(100)
+    study.run(Engine())
+    looks = looks_up_to(100)
+    for test in rows_of(study.indicators()):
+        alpha = spi.look_alphas(looks, spending=SPENDING)[looks.index(test.n_seeds)]
+        assert test.confidence == pytest.approx(1 - alpha)
+        code, seeds = study.plan().code, range(test.n_seeds)
+        p_o, p_f = (
+            [made_up(arm.condition.run(code, seed)).delivered for seed in seeds]
+            for arm in test.compared.arms
+        )
+        alone = spi.robustness(p_o, p_f, n=25, m=1, confidence=test.confidence)
+        assert (test.low, test.high, test.p_value) == (alone.low, alone.high, alone.p_value)
+
+
+def test_killed_at_any_moment_it_goes_on_to_the_same_result(tmp_path: Path) -> None:
+    whole, engine = until_clear(60), Engine()
+    whole.run(engine)
+    moments, played = random.Random(0), 0
+    for most in (moments.randrange(1, 20) for _ in range(4)):
+        # Killed as by kill -9: no cleaning up, and only what the store holds is left.
+        killed = get_context("fork").Process(
+            target=lambda m: until_clear(60, tmp_path).run(Engine(m)), args=(most,)
+        )
+        killed.start()
+        killed.join()
+        assert killed.exitcode == -signal.SIGKILL
+        played += most
+    last = Engine()
+    until_clear(60, tmp_path).run(last)
+    assert played + len(last.played) == len(engine.played)
+    stored = Study.stored(tmp_path)
+    assert told(stored) == told(whole)
+    assert not stored.findings().exploratory
+
+
+def test_later_outcomes_of_a_shared_condition_change_no_verdict() -> None:
+    def capped_later(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        for run in runs:
+            full = not run.condition.faults and run.seed >= 20
+            yield run, replace(made_up(run), all_delivered=full)
+
+    plain, capped = until_clear(60), until_clear(60)
+    plain.run(Engine())
+    capped.run(capped_later)
+    # A capped P_F would block "refuted" only; a capped P_o blocks "supported", and marks the rest.
+    (early,) = (t for t in rows_of(capped.indicators()) if t.factor == "FM4")
+    assert told(capped)["FM4"] == told(plain)["FM4"]
+    assert not early.saturated
+
+
+def test_a_failed_run_blocks_its_comparison_and_no_other() -> None:
+    def fails_once(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        for run in runs:
+            faults = [fault.mode for fault in run.condition.faults]
+            broken = faults == ["FM3"] and run.seed == 7
+            yield run, Outcome(run.key, error="ValueError: no") if broken else made_up(run)
+
+    study = until_clear(60)
+    tally = study.run(fails_once)
+    assert tally.failed == 1
+    tests = {test.factor: test for test in rows_of(study.indicators())}
+    assert "1 of 20 runs failed" in tests["FM3"].problem
+    assert tests["FM4"].stopped_at == 20
+    study.run(Engine())  # what failed is tried again
+    assert study.indicators()["problem"].isna().all()
+
+
+def test_the_same_runs_are_exact_at_the_first_look() -> None:
+    def unaffected(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        for run in runs:
+            outcome = Outcome(run.key, np.arange(40.0 + run.seed), digest=f"{run.seed}")
+            yield run, outcome
+
+    study = until_clear(60)
+    assert study.run(unaffected).played == 4 * 20
+    assert {test.stopped_at for test in rows_of(study.indicators())} == {20}
+    assert set(study.indicators()["verdict_holm"]) == {"unaffected"}
+
+
+def test_the_report_tells_where_each_stopped() -> None:
+    study = until_clear(60)
+    study.run(Engine())
+    text = markdown(document(study.findings()))
+    assert "Clear at 20 of at most 60 seeds." in text
+    assert "Open after 60 of at most 60 seeds." in text
+
+
+def test_another_most_is_another_plan_and_exploratory(tmp_path: Path) -> None:
+    until_clear(40, tmp_path).run(Engine())
+    longer = until_clear(60, tmp_path)
+    assert longer.exploratory_because() is not None
+    longer.run(Engine())
+    assert longer.findings().exploratory
+
+
+def test_shards_and_missing_looks_are_refused() -> None:
+    from swarm_logistics_env.studies.runs import Shard
+
+    with pytest.raises(StudyError, match="shard"):
+        until_clear(60).run(Engine(), shard=Shard(1, 2))
+    with pytest.raises(StudyError, match="until_clear"):
+        Study(seeds=20, **FIELDS)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_wrong_verdicts_over_all_looks_are_bounded(model: str) -> None:
+    most = 0.08 if model == "geometric" else 0.055
+    # 1,500 studies tell 0.05 to 0.011; `python -m verification.verdict_errors` plays 10,000.
+    assert 0.02 < wrong_verdicts(model, looks_up_to(100), studies=1_500).share < most
