@@ -25,11 +25,16 @@ def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone(
     indicator = load_training("indicator")
     same_mix = load_training("indicator-arm-same-mix")
     deliveries = load_training("indicator-arm-deliveries")
-    reward = {"indicators": None, "rewards": same_mix.rewards}
-    names = {"name": same_mix.name, "about": same_mix.about}
-    assert indicator.replace(**reward, **names) == same_mix
-    names = {"name": deliveries.name, "about": deliveries.about}
-    assert same_mix.replace(conditions=(), **names) == deliveries
+    assert differing(indicator, same_mix) == {"name", "about", "rewards", "indicators"}
+    assert differing(same_mix, deliveries) == {"name", "about", "worlds", "conditions"}
+    assert (same_mix.indicators, deliveries.conditions) == (None, ())
+    for mixed, plain in zip(same_mix.worlds, deliveries.worlds, strict=True):
+        assert mixed.replace(conditions=()) == plain.replace(conditions=())
+        assert not any(kind.modes for kind in plain.conditions)
+
+
+def differing(one: Training, other: Training) -> set[str]:
+    return {n for n in Training.model_fields if getattr(one, n) != getattr(other, n)}
 
 
 def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
