@@ -23,6 +23,7 @@ SCRIPTS = (
     ("torchrl", "plain_ppo"),
     ("torchrl", "discrete_loop"),
     ("benchmarl", "benchmarl_mappo"),
+    ("benchmarl", "benchmarl_learning"),
     ("skrl", "skrl_ippo"),
     ("supersuit", "supersuit_wrappers"),
     ("rllib", "rllib_ppo"),
