@@ -17,7 +17,7 @@ from swarm_logistics_env.report.verdict_matrix import VerdictMatrix
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.tasks.recording import Recording, can_be_recorded, record_run
+from swarm_logistics_env.tasks.replay import Recording, can_be_recorded, record_run
 from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.tasks.task_choice import DEFAULT
 
@@ -199,6 +199,7 @@ def _seed_by_seed(results: StudyResults, compared: Comparison) -> list[float | N
     values: list[float | None] = []
     for place in range(len(results.plan.seeds)):
         try:
+            # It is called before `place` changes.
             one = compared.estimate(lambda arm: samples[arm][place : place + 1])  # noqa: B023
         except spi.IndicatorError:
             values.append(None)

@@ -180,7 +180,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         drawings=drawings,
         latex=latex_tables(document.summary),
         # A text must not end the script that it stands in.
-        data=json.dumps(data, separators=(",", ":")).replace("</", "<\\/"),
+        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
     )
 

@@ -59,8 +59,9 @@ class Line:
     @property
     def limits(self) -> tuple[float, float]:
         """The limits of the interval; the value itself where there is none."""
-        known = self.low is not None and self.high is not None
-        return (self.low, self.high) if known else (self.value, self.value)  # type: ignore[return-value]
+        if self.low is None or self.high is None:
+            return self.value, self.value
+        return self.low, self.high
 
 
 @dataclass(frozen=True)
@@ -130,13 +131,13 @@ def _lines(results: StudyResults) -> Iterator[Line]:
     for test in tests:
         if test.kind == "parameter":
             yield _line("A", f"{test.comparison} m", test)
-    budgets = list(fault_budgets(results))
-    if any(one.budget is None for one in budgets):
+    found = list(fault_budgets(results))
+    budgets = [(one.budget, one.compared) for one in found if one.budget is not None]
+    if len(budgets) < len(found):
         yield Line("fault budget", "runs are missing", math.nan)
         return
-    least = min(budgets, key=lambda one: one.budget.robots)  # type: ignore[union-attr]
-    robots, limit = least.budget  # type: ignore[misc]
-    mode = least.compared.changed.setting.name
+    (robots, limit), compared = min(budgets, key=lambda one: one[0].robots)
+    mode = compared.changed.setting.name
     ended = "every m tested is withstood" if limit is None else f"{mode} ends it"
     yield Line("fault budget", f"robots of any mode; {ended}", float(robots))
 

@@ -149,8 +149,8 @@ def glossary(plan: Plan) -> Section:
 
 def _meaning(definition: Definition) -> str:
     """Return an indicator's formula, which its function's docstring begins with, and its words."""
-    formula, *_ = (definition.function.__doc__ or "").strip().splitlines()
-    formula = formula.partition(" (paper")[0].rstrip(".")
+    first, *_ = (definition.function.__doc__ or definition.heading).strip().splitlines()
+    formula = first.partition(" (paper")[0].rstrip(".")
     adjectives = (f"above {x:g} {adjective}" for x, adjective in definition.adjectives.items())
     return "; ".join([formula, *adjectives])
 

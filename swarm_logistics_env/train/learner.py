@@ -131,7 +131,7 @@ def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) 
         "torch": torch.get_rng_state(),
         "cuda": torch.cuda.get_rng_state_all(),
         # stable-baselines3 shuffles minibatches by numpy's global generator.
-        "numpy": np.random.get_state(),  # noqa: NPY002
+        "numpy": np.random.get_state(),  # noqa: NPY002 - see above
         "python": random.getstate(),
         "log": log,
     }

@@ -162,8 +162,8 @@ def test_saturated_cell_marks_what_rests_on_it() -> None:
     marked = set(found.indicators["comparison"][found.indicators["saturated"]])
     assert marked == {f"warehouse_width 5 -> {x}" for x in (10, 15, 20)}
     text = markdown(document(found))
-    # The cell; its indicators in a table, the claims and a sentence; caption and explanation.
-    assert text.count("†") == 1 + 3 * 3 + 2
+    # The cell; its indicators in a table, claims and a sentence; caption, explanation, glossary.
+    assert text.count("†") == 1 + 3 * 3 + 3
 
 
 def test_ablation_that_falls_is_supported(published: StudyResults) -> None:
