@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 import traceback
 from pathlib import Path
@@ -63,6 +64,8 @@ def _sentence(error: Exception) -> str | None:
 
     if isinstance(error, SwarmLogisticsError | IndicatorError):
         return str(error)
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
     return _of_a_policy(error)
 
 

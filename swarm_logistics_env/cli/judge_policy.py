@@ -7,8 +7,6 @@ from pathlib import Path
 
 import typer
 
-from swarm_logistics_env.cli.options import is_file
-
 
 def names_policy(asked: str) -> bool:
     """Return whether the argument of `judge` is a policy, not a file of trials."""
@@ -17,7 +15,7 @@ def names_policy(asked: str) -> bool:
     suffix = Path(asked).suffix
     if suffix in (*SUFFIXES, ".py"):
         return True
-    if is_file(asked) or suffix.lower() in (".csv", ".tsv", ".txt"):
+    if Path(asked).is_file() or suffix.lower() in (".csv", ".tsv", ".txt"):
         return False
     return ":" in asked or not suffix
 

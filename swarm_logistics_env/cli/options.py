@@ -49,14 +49,6 @@ TrustPolicyOption = Annotated[
 _FAULT = re.compile(r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+))?(@(?P<onset>\d+\.?\d*|\.\d+))?")
 
 
-def is_file(text: str) -> bool:
-    """Return whether a word of the command line names a file that is there."""
-    try:
-        return Path(text).is_file()
-    except OSError:  # a name that is too long for a file
-        return False
-
-
 def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
     """Return the scenario that `--preset`, `--scenario` and `--set` describe, the last one wins.
 

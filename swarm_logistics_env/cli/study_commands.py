@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.options import is_file
-
 if TYPE_CHECKING:
     from swarm_logistics_env.report.document import Document
     from swarm_logistics_env.report.result_tables import Section
@@ -257,7 +255,7 @@ def study_of(
                     f"--policy {name}: reading a model of stable-baselines3 executes the code in "
                     "it: should be allowed by --trust-code"
                 )
-    if asked.endswith(".toml") or is_file(asked):
+    if asked.endswith(".toml") or Path(asked).is_file():
         return Study.from_file(asked, out=out, trust_code=trust_code, **fields)
     return Study.preset(asked, out=out, **fields)
 
