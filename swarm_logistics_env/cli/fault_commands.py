@@ -178,9 +178,15 @@ def _show_blame(found: Attribution, policy: str) -> None:
         )
 
     columns = ("part", "meaning", "robots", "lost", "95 % interval")
+    means = [f"Means over {len(found.seeds)} seeds."]
+    if capped := sum(each.is_capped for each in found.seeds):
+        means.append(
+            f"Capped: in {capped} of them every item was delivered without the fault, so it costs "
+            "more than is shown. --set restock=true has no cap."
+        )
     heading = f"{policy}: deliveries that {_in_words(found.fault)} costs, per episode"
     sections = (
-        (heading, (found.total, *found.parts), (f"Means over {len(found.seeds)} seeds.",)),
+        (heading, (found.total, *found.parts), tuple(means)),
         (
             "By role at the onset",
             found.roles,

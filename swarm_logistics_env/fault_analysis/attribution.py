@@ -44,6 +44,7 @@ class Losses(NamedTuple):
         capabilities: lost capabilities with their contributions, which sum to `total`.
         missing_work: what it costs to take the same robots out of the arena instead.
         blocked_seconds, anchoring_seconds: as in `AfterOnset`, with the whole fault.
+        is_capped: whether every item was delivered without the fault: it costs more than `total`.
     """
 
     seed: int
@@ -53,6 +54,7 @@ class Losses(NamedTuple):
     missing_work: float
     blocked_seconds: float
     anchoring_seconds: float
+    is_capped: bool
 
 
 @dataclass(frozen=True)
@@ -193,6 +195,7 @@ def losses(scenario: Scenario, policy: Policy, fault: Fault, seed: int) -> Losse
         missing_work=lost(whole if fault.mode == "removed" else fork.go_on([removed])),
         blocked_seconds=whole.blocked_seconds,
         anchoring_seconds=whole.anchoring_seconds,
+        is_capped=sound.is_capped,
     )
 
 

@@ -23,11 +23,13 @@ class AfterOnset(NamedTuple):
         delivered: items delivered.
         blocked_seconds: for which the requested item was held by a robot that failed [s].
         anchoring_seconds: robot-seconds that working robots spent touching failed ones.
+        is_capped: whether every item was delivered, so that more could not have been.
     """
 
     delivered: int
     blocked_seconds: float
     anchoring_seconds: float
+    is_capped: bool
 
 
 class Fork:
@@ -89,4 +91,5 @@ class Fork:
             delivered=state.delivered - delivered,
             blocked_seconds=blocked * world.scenario.control_period,
             anchoring_seconds=state.anchoring_seconds - anchoring,
+            is_capped=world.all_delivered,
         )
