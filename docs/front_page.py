@@ -256,6 +256,7 @@ def draw_speed(costs: str, path: Path) -> None:
 
 _PAGES = {
     "quick start": "docs/quickstart.md",
+    "a recorded run": "docs/media/run.html",
     "the environment": "docs/environment.md",
     "results": "docs/results.md",
     "indicators": "docs/indicators.md",
