@@ -23,7 +23,7 @@ from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.roles import ROLES
 
 STORE = "runs.sqlite"
-# A removed robot is the reference of the others; wear and slow motors need a factor.
+# A removed robot is the reference of the others; motor_wear leaves more speed than motor_slow.
 MODES = tuple(mode for mode in FAILURE_MODES if mode not in ("removed", "motor_wear"))
 _ONSETS = (0.0, 0.2, 0.4, 0.6)  # shares of an episode
 _DURATIONS = (None, 0.2, 0.4)  # shares of an episode; None: for good
