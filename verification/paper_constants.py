@@ -67,7 +67,7 @@ class Budget(NamedTuple):
     """
 
     first: int = 64
-    rounds: tuple[tuple[int, int], ...] = ((8, 1), (4, 4), (2, 10))
+    rounds: tuple[tuple[int, int], ...] = ((6, 1), (3, 5))
     fresh: int = 30
     duration: float = 500.0
 
