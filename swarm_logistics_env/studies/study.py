@@ -188,7 +188,7 @@ class Study:
         whole = list(shard.of(plan.runs()) if shard else plan.runs())
         with self._store() as store:
             noted = self._own_metadata(store)
-            declared = noted.declared if noted else Declaration.of(self.specification)
+            declared = noted.declared if noted else Declaration.model_validate(self.specification)
             store.note(rows_of(self.specification, plan.code, plan.identities, declared))
             done = store.succeeded()
             played = _Played(sum(run.key in done for run in whole))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
@@ -41,61 +41,6 @@ class RecordedFault(Record):
     mode: str
     robots: int
     onset: float = 0.0
-
-
-class RecordedCell(Record):
-    """One condition of a table.
-
-    Args:
-        kind, name, value, onset: of the study's setting.
-        scenario, fault: what the file says of it; fault None: there is none.
-        repeated: whether these are the trials without fault of a second set.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    kind: Literal["size", "fault", "parameter"]
-    name: str
-    value: float
-    onset: float = 0.0
-    scenario: RecordedScenario
-    fault: RecordedFault | None = None
-    repeated: bool = False
-
-
-class RecordedTable(Record):
-    """Conditions that are compared with each other, the original one first.
-
-    Args:
-        policy: what controlled the robots; title: heading in the report.
-        cells: the conditions.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    policy: str
-    title: str
-    cells: tuple[RecordedCell, ...]
-
-
-class Origin(Record):
-    """Where recorded trials came from, and what is compared in them.
-
-    Args:
-        file: its name; digest: of its content; paired: whether its rows name their seeds.
-        seeds: those that they name; empty: none.
-        setup: what the user states about the trials, name and value.
-        tables: what is compared.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    file: str
-    digest: str
-    paired: bool
-    seeds: tuple[int, ...] = ()
-    setup: tuple[tuple[str, str], ...] = ()
-    tables: tuple[RecordedTable, ...] = ()
 
 
 class RecordedTrials:

@@ -209,7 +209,7 @@ def test_a_sentence_tells_the_change_and_whether_it_is_within_the_margin() -> No
 
 def test_a_margin_that_was_not_declared_is_exploratory() -> None:
     found = results(as_published)
-    declared = Declaration(range(SEEDS), margin=0.2)
+    declared = Declaration(first_seed=0, seeds=SEEDS, margin=0.2)
     late = judge(found.plan, found.outcomes, declared)
     assert late.late_margin
     assert not late.exploratory
