@@ -14,7 +14,8 @@ from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_of
 from swarm_logistics_env.tasks.task import Outcome, Playable
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
+from swarm_logistics_env.warehouse.faults import Fault
 
 __all__ = ["WAREHOUSE", "Fault", "Scenario", "WarehouseTask"]
 
