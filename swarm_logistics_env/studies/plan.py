@@ -224,16 +224,16 @@ def robustness(
     scenario = task.vary(base, faults.scenario)
     table = _title(faults, "Fault tolerance and robustness")
     for m in faults.robots:
-        if m >= task.size(scenario):
+        if m >= scenario.n_robots:
             raise StudyError(
-                f"faults.robots = {m}: should be less than n_robots = {task.size(scenario)}, "
+                f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, "
                 "or no working robot is left"
             )
     for onset in faults.onsets:
-        if onset >= task.duration(scenario):
+        if onset >= scenario.duration:
             raise StudyError(
                 f"faults.onsets = {onset:g} s: should be less than duration = "
-                f"{task.duration(scenario):g} s, or nothing fails"
+                f"{scenario.duration:g} s, or nothing fails"
             )
     original = Arm(NO_FAULT, _condition(task, policy, scenario))
     if any(faults.onsets):
@@ -283,7 +283,7 @@ def _ablation(
 ) -> Iterator[Comparison]:
     scenario = task.vary(base, ablation.scenario)
     whole, part = (
-        Arm(Setting("policy", label.label, task.size(scenario)), _condition(task, label, scenario))
+        Arm(Setting("policy", label.label, scenario.n_robots), _condition(task, label, scenario))
         for label in (policy, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".

@@ -49,14 +49,6 @@ class WarehouseTask:
         """Return the version of the simulation."""
         return code_version()
 
-    def size(self, scenario: Scenario) -> int:
-        """Return the number N of robots."""
-        return scenario.n_robots
-
-    def duration(self, scenario: Scenario) -> float:
-        """Return the time at which an episode ends at the latest [s]."""
-        return scenario.duration
-
     def vary(self, base: Scenario, fields: Mapping[str, Any]) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.
 
