@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .inputs import IndicatorError
+from .inputs import IndicatorError, Numbers
 from .trials_table import Table, read_table
 
 NO_FAULT = "none"
@@ -106,7 +105,7 @@ class Trials:
             raise IndicatorError(f"{self.file} has no trial with {asked}")
         return tuple(sorted(found, key=lambda row: row.seed or 0))
 
-    def performance(self, **conditions: object) -> NDArray[np.float64]:
+    def performance(self, **conditions: object) -> Numbers:
         """Return P of the runs that `select` gives, shape (n,)."""
         return np.array([row.performance for row in self.select(**conditions)])
 

@@ -58,14 +58,6 @@ class RecordedTrials:
         """Return a word in place of a code version: none made these runs."""
         return "imported"
 
-    def size(self, scenario: RecordedScenario) -> int:
-        """Return the number N of robots."""
-        return scenario.n_robots
-
-    def duration(self, scenario: RecordedScenario) -> float:
-        """Return how long a trial lasted [s]."""
-        return scenario.duration
-
     def vary(self, base: RecordedScenario, fields: Mapping[str, Any]) -> RecordedScenario:
         """Return `base` with some fields changed."""
         return base.replace(**fields)

@@ -337,8 +337,8 @@ def test_disk_that_fills_up_stops_the_study_in_words_and_keeps_what_is_finished(
 
     def add_until_full(store: Store, run: Run, outcome: Outcome) -> None:
         if len(store) == 5:
-            (pages,) = store._database._connection.execute("PRAGMA page_count").fetchone()
-            store._database._connection.execute(f"PRAGMA max_page_count = {pages}")
+            (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
+            store._connection.execute(f"PRAGMA max_page_count = {pages}")
         add(store, run, outcome)
 
     with monkeypatch.context() as patched:
