@@ -219,13 +219,19 @@ class Study:
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.
 
+        A study that runs until it is clear counts those that its next look needs, because what the
+        later ones need is not known yet.
+
         Args:
             shard: of which part; None: of all.
         """
         asked = {run.key for run in self._runs(shard)}
         try:
             with self._store(existing=True) as store:
-                return len(asked & store.succeeded()), len(asked)
+                done = asked & store.succeeded()
+                if self.specification.until_clear:
+                    return len(done), len(done) + len(self._wanted(store, ()))
+                return len(done), len(asked)
         except StudyError:  # nothing has been run
             return 0, len(asked)
 
