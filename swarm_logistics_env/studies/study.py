@@ -225,15 +225,13 @@ class Study:
         Args:
             shard: of which part; None: of all.
         """
-        asked = {run.key for run in self._runs(shard)}
+        whole = self._runs(shard)
         try:
             with self._store(existing=True) as store:
-                done = asked & store.succeeded()
-                if self.specification.until_clear:
-                    return len(done), len(done) + len(self._wanted(store, ()))
-                return len(done), len(asked)
+                done = len({run.key for run in whole} & store.succeeded())
+                return done, done + len(self._missing(whole, store, ()))
         except StudyError:  # nothing has been run
-            return 0, len(asked)
+            return 0, len(whole)
 
     def exploratory_because(self) -> str | None:
         """Return why verdicts over the asked seeds are exploratory; None: they are not.
