@@ -25,11 +25,11 @@ from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.streams import generator, key
 from swarm_logistics_env.studies.comparisons import Setting
 from swarm_logistics_env.studies.engines import serial
-from swarm_logistics_env.studies.plan import make_plan, studied
+from swarm_logistics_env.studies.plan import make_plan
 from swarm_logistics_env.studies.presets import PAPER, load_preset
-from swarm_logistics_env.studies.runs import Condition
+from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.studies.store import Store
-from swarm_logistics_env.tasks.policy_choice import PolicyChoice
+from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_identity, policy_label
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from verification.paper_model import Model, fitted
 
@@ -167,7 +167,8 @@ class Players:
         # The defaults' runs have the keys that they have in the paper's study.
         own = candidate == defaults()
         source = "swarm-dt" if own else PolicyChoice(name="swarm-dt", parameters=parameters)
-        policy = studied(source, WAREHOUSE)
+        identity = policy_identity(source, WAREHOUSE.policies)
+        policy = StudiedPolicy(policy_label(source), identity, source)
         scenario = known.scenario.replace(**changes)
         return Condition(policy, scenario, known.faults, task=WAREHOUSE)
 
