@@ -22,6 +22,7 @@ from swarm_logistics_env.studies.store import Store
 from verification.paper_constants import (
     CELLS,
     FM1,
+    LEAST,
     PUBLISHED,
     RANGES,
     TABLE_I,
@@ -79,7 +80,7 @@ def judgement(found: Found) -> str:
             )
         )
     halves = [
-        f"Half {number}: {', '.join(str(CELLS[k]) for k in one.searched.cells)}."
+        f"Half {number}: {'; '.join(str(CELLS[k]) for k in one.searched.cells)}."
         for number, one in enumerate(found.judged, start=1)
     ]
     seeds = found.judged[0].p.shape[1]
@@ -135,7 +136,7 @@ def constants(found: Found, told: Identified) -> str:
 def effects(model: Model) -> str:
     """Return by how much P changes in each group of cells if a constant doubles, on average."""
     places = spread(1024, "effects") - 0.5
-    logs = np.log(model.means(places + 0.5))
+    logs = np.log(np.maximum(model.means(places + 0.5), LEAST))
     all_slopes, *_ = np.linalg.lstsq(places, logs - logs.mean(axis=0))
     rows = []
     for group, belongs in _GROUPS.items():
@@ -145,8 +146,26 @@ def effects(model: Model) -> str:
             f"{np.expm1(slope * np.log(2) / np.log(high / low)):+.0%}"
             for slope, (low, high) in zip(slopes, RANGES.values())
         ]
+        doubled = [change.replace("+0%", "0%").replace("-0%", "0%") for change in doubled]
         rows.append((group, *doubled, f"{model.explained[cells].mean():.0%}"))
     return table(("cells", *RANGES, "explained"), rows)
+
+
+def trade(found: Found) -> str:
+    """Return how well Table I and FM1 are met together, by the defaults and by a rival."""
+    seeds, n = found.p_trade.shape[1], len(TABLE_I)
+    own = found.p_defaults[[*TABLE_I, *FM1], :seeds]
+    rows = []
+    for name, p in (("defaults", own), ("rival", found.p_trade)):
+        means = p.mean(axis=1)
+        losses = (errors(means[:n], TABLE_I).mean(), errors(means[n:], FM1).mean())
+        told = [", ".join(f"{mean:.1f}" for mean in part) for part in (means[n:], means[:n])]
+        rows.append((name, *(f"{loss:.3f}" for loss in losses), *told))
+    paper = [", ".join(f"{PUBLISHED[k]:g}" for k in cells) for cells in (FM1, TABLE_I)]
+    head = ("", "loss on Table I", "loss on FM1", "P under FM1, m = 1, 2, 3", "P of Table I")
+    rival = ", ".join(f"{name} {value:g}" for name, value in zip(RANGES, found.trade))
+    text = f"{seeds} fresh seeds. The rival: {rival}."
+    return "\n".join([table(head, [("paper", "", "", *paper), *rows]), "", text])
 
 
 def draw(canvas: Figure, found: Found, told: Identified) -> None:
@@ -168,22 +187,22 @@ def draw(canvas: Figure, found: Found, told: Identified) -> None:
 
 def _plain_ticks(axes: Axes, low: float, high: float) -> None:
     ticks = [
-        value
-        for value in (0.1, 0.2, 0.3, 0.5, 1, 2, 4, 8, 80, 100, 150, 200)
-        if low <= value <= high
+        value for value in (0.1, 0.2, 0.5, 1, 2, 4, 8, 80, 100, 150, 200) if low <= value <= high
     ]
     axes.set_xticks(ticks, [f"{value:g}" for value in ticks])
     axes.minorticks_off()
 
 
 def _draw_trade(axes: Axes, found: Found, told: Identified) -> None:
-    for p, style in ((found.p_first, "."), (found.p_defaults.mean(axis=1)[None], "D")):
-        x, y = (errors(p[:, list(cells)], cells).mean(axis=1) for cells in (TABLE_I, FM1))
-        axes.plot(x, y, style, color=COLOURS[1] if style == "D" else INK,
-                  alpha=1.0 if style == "D" else 0.35, markersize=5)  # fmt: skip
-    front, _ = told.trade
-    axes.plot(*front.T, color=COLOURS[0])
-    axes.set(xlim=(0, 1), ylim=(0, 1.5), xlabel="loss on Table I", ylabel="loss on FM1")
+    x, y = (errors(found.p_first[:, list(k)], k).mean(axis=1) for k in (TABLE_I, FM1))
+    axes.plot(x, y, ".", color=INK, alpha=0.35)
+    axes.plot(*told.trade[0].T, color=COLOURS[0])
+    n, both = len(TABLE_I), [*TABLE_I, *FM1]
+    for p, marker, colour in ((found.p_defaults[both], "D", 1), (found.p_trade, "s", 2)):
+        of_cell = errors(p.mean(axis=1), both)
+        place = of_cell[:n].mean(), of_cell[n:].mean()
+        axes.plot(*place, marker, color=COLOURS[colour], markersize=5)
+    axes.set(xlim=(0, 0.6), ylim=(0, 0.8), xlabel="loss on Table I", ylabel="loss on FM1")
     axes.set_title("Table I against FM1")
 
 
@@ -198,6 +217,7 @@ def main(out: Path = OUT, budget: Budget = BUDGET) -> None:
         "judgement": judgement(found),
         "constants": constants(found, told),
         "effects": effects(model),
+        "trade": trade(found),
     }
     PAGE.write_text(rewritten(PAGE.read_text(encoding="utf-8"), blocks), encoding="utf-8")
     svg, _ = images(lambda canvas: draw(canvas, found, told), 9.0)

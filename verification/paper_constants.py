@@ -69,8 +69,8 @@ class Budget(NamedTuple):
     """
 
     first: int = 46
-    rounds: tuple[tuple[int, int], ...] = ((4, 1), (2, 3))
-    fresh: int = 10
+    rounds: tuple[tuple[int, int], ...] = ((3, 1),)
+    fresh: int = 4
     reference: int = 30
     duration: float = 500.0
 
@@ -277,12 +277,16 @@ class Found(NamedTuple):
         p_first: P of one run of each (n, cells).
         judged: of both halves.
         p_defaults: P of the defaults on all fresh seeds (cells, seeds).
+        trade: the candidate that the model expects to meet Table I and FM1 together best.
+        p_trade: its P on fresh seeds in the cells of these two (cells, seeds).
     """
 
     first: list[Candidate]
     p_first: Floats
     judged: tuple[Judged, ...]
     p_defaults: Floats
+    trade: Candidate
+    p_trade: Floats
 
 
 def play(players: Players, budget: Budget) -> Found:
@@ -301,4 +305,7 @@ def play(players: Players, budget: Budget) -> Found:
         )
         for one, other in zip(found, reversed(halves()))
     )
-    return Found(first, p_first, judged, p_defaults)
+    both = (*TABLE_I, *FM1)
+    (trade,) = proposed(model_of(first, p_first, both), both, 1, "Table I and FM1")
+    p_trade = players.played(trade, both, fresh)
+    return Found(first, p_first, judged, p_defaults, trade, p_trade)

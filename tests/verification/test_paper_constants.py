@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
@@ -21,6 +22,7 @@ from verification.paper_constants import (
     RANGES,
     TABLE_I,
     Budget,
+    Found,
     Players,
     candidates_at,
     defaults,
@@ -63,21 +65,48 @@ def test_the_defaults_play_what_the_paper_describes() -> None:
     assert sum(expected) > 0
 
 
-def test_a_search_goes_on_where_it_was(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Found]:
+    """A folder with the runs of a small search, and what it found."""
+    folder = tmp_path_factory.mktemp("search")
+    with Store(folder / "runs.sqlite") as store:
+        return folder, play(Players(store, TINY.duration), TINY)
+
+
+def test_a_search_goes_on_where_it_was(
+    searched: tuple[Path, Found], monkeypatch: pytest.MonkeyPatch
+) -> None:
     def nothing_is_left(runs: Iterable[Run]) -> Iterator[object]:
         assert not list(runs)
         return iter(())
 
-    with Store(tmp_path / "runs.sqlite") as store:
-        found = play(Players(store, TINY.duration), TINY)
+    folder, found = searched
     monkeypatch.setattr(paper_constants, "serial", nothing_is_left)
-    with Store(tmp_path / "runs.sqlite") as store:
+    with Store(folder / "runs.sqlite") as store:
         again = play(Players(store, TINY.duration), TINY)
     assert [one.searched for one in again.judged] == [one.searched for one in found.judged]
     assert np.array_equal(again.p_first, found.p_first)
     for one in found.judged:
         assert not set(one.cells) & set(one.searched.cells)
         assert one.difference.value == pytest.approx(one.losses[0] - one.losses[1])
+
+
+def test_the_page_quotes_what_was_played(
+    searched: tuple[Path, Found], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs")
+    script = importlib.import_module("play_constants")
+    page, figure = tmp_path / "page.md", tmp_path / "figure.svg"
+    page.write_text(script.PAGE.read_text(encoding="utf-8"), encoding="utf-8")
+    monkeypatch.setattr(script, "PAGE", page)
+    monkeypatch.setattr(script, "FIGURE", figure)
+    folder, found = searched
+    script.main(folder, TINY)
+    text = page.read_text(encoding="utf-8")
+    for one in found.judged:
+        assert all(f"| {loss:.3f} |" in text for loss in one.losses)
+    assert f"{found.p_trade[-1].mean():.1f}" in text
+    assert all(f"{name} [" in figure.read_text(encoding="utf-8") for name in script.UNITS)
 
 
 @pytest.fixture(scope="module")
