@@ -141,7 +141,8 @@ class Players:
             StudyError: a run failed.
         """
         conditions = [self._condition(candidate, CELLS[k]) for k in cells]
-        runs = [c.run(self._code, seed) for c in conditions for seed in seeds]
+        # Seed by seed, so that a search that was stopped has complete seeds.
+        runs = [c.run(self._code, seed) for seed in seeds for c in conditions]
         there = self._store.outcomes(runs)
         missing = {run.key: run for run in runs if run.key not in there}
         for run, outcome in serial(missing.values()):
@@ -150,7 +151,7 @@ class Players:
                 raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
             there[run.key] = outcome
         p = np.array([there[run.key].delivered for run in runs], dtype=np.float64)
-        return p.reshape(len(cells), len(seeds))
+        return p.reshape(len(seeds), len(cells)).T
 
     def _condition(self, candidate: Candidate, cell: Setting) -> Condition:
         known = _conditions()[cell]
