@@ -262,7 +262,7 @@ def test_a_wrapper(copy: Copy) -> None:
 
 def test_a_failure_mode(copy: Copy) -> None:
     row = '    "weak": FailureMode("drives slowly and lifts nothing", speed=0.2, lifts=False),'
-    copy.insert("warehouse/faults.py", '    "dead": ', row)
+    copy.insert("warehouse/failure_modes.py", '    "dead": ', row)
     printed = copy.command("run", "--fault", "weak:2@1")
     assert "failed robots " in printed
     assert copy.changed == files_of("A failure mode")

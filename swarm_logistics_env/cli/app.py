@@ -71,8 +71,7 @@ def scenario_command(
     ] = False,
 ) -> None:
     """Print every condition of a run: value, unit, and whether the default is sourced or fitted."""
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.cli.terminal_tables import show_table
     from swarm_logistics_env.scenario import SOURCES
 
     chosen = scenario_of(preset, scenario_file, changes)
@@ -85,25 +84,17 @@ def scenario_command(
     )
     sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
     columns = ("condition", "value", "unit, meaning; source")
-    show(
-        Section(
-            f"Scenario, from the preset {preset}",
-            columns,
-            tuple(chosen.conditions()),
-            (marks, sources),
-        )
-    )
+    show_table(f"Scenario, from the preset {preset}", columns, chosen.conditions(), marks, sources)
 
 
 @app.command("policies")
 def policies_command() -> None:
     """List the policies that can be called by name."""
-    from swarm_logistics_env.cli.terminal_tables import show
+    from swarm_logistics_env.cli.terminal_tables import show_table
     from swarm_logistics_env.policies import known_policies
-    from swarm_logistics_env.report.result_tables import Section
 
     line = "A policy of your own is package.module:Class, or the path of a file that `train` wrote."
-    show(Section("Policies", ("name", "kind", "about"), tuple(known_policies()), (line,)))
+    show_table("Policies", ("name", "kind", "about"), known_policies(), line)
 
 
 @app.command("run")

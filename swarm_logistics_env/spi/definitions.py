@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+from .estimate import Estimate
 from .indicators import (
     adaptability,
     fault_tolerance,
@@ -17,9 +18,6 @@ from .indicators import (
     robustness,
     scalability,
 )
-
-if TYPE_CHECKING:
-    from .estimate import Estimate
 
 Factor = Literal["size", "fault", "parameter", "policy"]
 

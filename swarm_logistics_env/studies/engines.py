@@ -19,6 +19,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from unittest.mock import patch
 
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.studies.plan import Plan
@@ -87,7 +88,9 @@ def execute(run: Run) -> Outcome:
 
 
 # One thread per worker: n workers with n threads each would wait for each other.
-_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_ONE_THREAD = dict.fromkeys(
+    ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+)
 
 
 class ProcessPool:
@@ -162,7 +165,7 @@ def workers(count: int) -> Iterator[ProcessPoolExecutor]:
     theirs, ours = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
     try:
-        with _one_thread_each(), _interrupts_ignored():
+        with patch.dict(os.environ, _ONE_THREAD), _interrupts_ignored():
             started = [pool.submit(os.getpid) for _ in range(count)]
         try:
             started[0].result()
@@ -205,20 +208,6 @@ def _play(key: str, message: bytes) -> Outcome:
         return execute(pickle.loads(message))
     except Exception:  # noqa: BLE001 - a policy that only the parent can import
         return Outcome(key, error=traceback.format_exc())
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 @contextmanager

@@ -136,8 +136,8 @@ def _performance(results: StudyResults, arm: Arm, seeds: Sequence[int]) -> NDArr
     """
     values = []
     for seed in seeds:
-        outcome = results.outcomes.get(arm.condition.run(results.plan.code, seed).key)
-        if outcome is None or outcome.error is not None:
+        outcome = results.outcome(arm, seed)
+        if outcome is None:
             raise StudyError(f"{arm.setting}: the run of seed {seed} is missing or failed")
         values.append(outcome.delivered)
     return np.array(values, dtype=np.float64)

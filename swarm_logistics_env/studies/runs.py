@@ -53,12 +53,12 @@ class Condition:
     @property
     def size(self) -> int:
         """Swarm size N."""
-        return self.task.size(self.scenario)
+        return int(self.scenario.n_robots)
 
     @property
     def duration(self) -> float:
         """Time at which a run ends at the latest [s]."""
-        return self.task.duration(self.scenario)
+        return float(self.scenario.duration)
 
     @cached_property
     def scenario_json(self) -> str:

@@ -149,14 +149,6 @@ class ParallelTask:
             repr(settings), (self._make_env, self._gain), lambda: self._made(self.default, ())
         )
 
-    def size(self, scenario: ParallelScenario) -> int:
-        """Return the number N of robots."""
-        return scenario.n_robots
-
-    def duration(self, scenario: ParallelScenario) -> float:
-        """Return the time at which a run ends at the latest [s]."""
-        return scenario.duration
-
     def vary(self, base: ParallelScenario, fields: Mapping[str, Any]) -> ParallelScenario:
         """Return a scenario with some fields changed.
 
