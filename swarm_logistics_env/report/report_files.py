@@ -14,6 +14,7 @@ from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.answer import digest
+from swarm_logistics_env.report.attributions import with_attributions
 from swarm_logistics_env.report.document import Document, document
 from swarm_logistics_env.report.drawing import INK, PAPER, images
 from swarm_logistics_env.report.page_data import page_data
@@ -35,7 +36,7 @@ def write_report(
     Raises:
         StudyError: a file cannot be written.
     """
-    whole = whole or document(results)
+    whole = with_attributions(whole or document(results), directory)
     paths = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
     pictures, page = directory / "figures", directory / "report.html"
     try:
