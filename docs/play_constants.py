@@ -1,7 +1,7 @@
 """Searches the constants that the paper leaves open: `python docs/play_constants.py`.
 
 It rewrites the tables and the figure of docs/paper_constants.md. What is played is kept, so that a
-call after an interruption plays the rest; all of it takes about an hour on one core.
+call after an interruption plays the rest; all of it takes a quarter of an hour on one free core.
 """
 
 from __future__ import annotations
