@@ -47,7 +47,7 @@ class WarehouseTask:
 
     def code(self) -> str:
         """Return the version of the simulation."""
-        return code_version()
+        return code_version(self.world)
 
     def vary(self, base: Scenario, fields: Mapping[str, Any]) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.
