@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -82,6 +83,11 @@ class Record(BaseModel):
         if problem["type"] == "missing":
             return f"{field} is missing"
         return f"{field} = {_short(problem['input'])}: {message}"
+
+
+def canonical_json(value: object) -> str:
+    """Return JSON in one form: equal values give equal texts."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
 def _in_plain_words(problem: dict[str, Any]) -> str:

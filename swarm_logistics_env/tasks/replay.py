@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_of, runs_code
+from swarm_logistics_env.tasks.policy_choice import policy_of
 from swarm_logistics_env.tasks.task import Playable
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
 
@@ -38,11 +38,6 @@ class Recording:
     carrying: NDArray[np.bool_]
     failed: NDArray[np.bool_]
     digest: str
-
-
-def can_be_recorded(source: object) -> bool:
-    """Return whether a policy may be played again to be shown: a store's text must run no code."""
-    return not (isinstance(source, str | PolicyChoice) and runs_code(source))
 
 
 def record_run(source: object, condition: Playable, seed: int, policy_seed: int) -> Recording:
