@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,18 +191,11 @@ class IndicatorReward(Wrapper):
                 info[f"{name}_{role}_episodes"] = self.measured.count(reference) if reference else 0
         return info
 
-    def reset_arrays(
-        self, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> NDArray[np.float32]:
-        """Begin an episode; the one before is counted in `measured` if it came to its end."""
-        if self._is_over:
-            self.measured.add(self.condition, self.unwrapped.warehouse.state.delivered)
-            self._is_over = False
-        return super().reset_arrays(seed, options)
-
     def begun(self, seed: int) -> None:
-        """Store the condition of the episode and what it pays."""
-        self._seed = seed
+        """Count the episode before if it came to its end; store what this one is and pays."""
+        if self._is_over:
+            self.measured.add(self.condition, self._delivered)
+        self._seed, self._is_over = seed, False
         self._paid, self._delivered = Payment(), 0
         self._carriers = set[int]()  # those that carried the requested item since its request
         self._take_condition()
