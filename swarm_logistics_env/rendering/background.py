@@ -19,12 +19,8 @@ def background(
     """Return the empty warehouse on a picture of that height [px]."""
     picture = np.empty((height, projection.width, 3), np.uint8)
     picture[:] = palette.SURROUNDINGS
-    left, top, right, bottom = (
-        projection.left,
-        projection.top,
-        projection.right,
-        projection.bottom,
-    )
+    left, right = projection.left, projection.right
+    top, bottom = projection.top, projection.bottom
     wall = max(2, projection.margin // 5)
     picture[top - wall : bottom + wall, left - wall : right + wall] = palette.INK
     floor = picture[top:bottom, left:right]
