@@ -53,26 +53,6 @@ class Arm:
     condition: Condition
 
 
-@dataclass(frozen=True)
-class NullPair:
-    """Two arms without fault that share worlds, not behaviour: what chance alone makes of them.
-
-    Attributes:
-        table: heading of the report's table of the faults whose null this is.
-        original: the arm of P_o.
-        other: the same with other behaviour seeds.
-    """
-
-    table: str
-    original: Arm
-    other: Arm
-
-    @property
-    def policy(self) -> str:
-        """Label of the policy."""
-        return self.original.condition.policy.label
-
-
 class Question(NamedTuple):
     """What a comparison asks, whichever policy it is asked of."""
 

@@ -15,7 +15,7 @@ from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
 from swarm_logistics_env.studies import comparisons, metadata
-from swarm_logistics_env.studies.comparisons import Arm, Comparison, NullPair, Setting
+from swarm_logistics_env.studies.comparisons import Arm, Comparison, Setting
 from swarm_logistics_env.studies.metadata import Declaration, Origin
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
@@ -93,13 +93,18 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     Raises:
         StudyError: something has nothing that it can be relative to.
     """
-    found = [item for title, arms in _tables(origin) for item in _compared(title, arms)]
+    tables = list(_tables(origin))
     return Plan(
         specification,
-        tuple(item for item in found if isinstance(item, Comparison)),
+        tuple(comparison for title, arms in tables for comparison in _compared(title, arms)),
         RECORDED.code(),
         {},
-        null_pairs=tuple(item for item in found if isinstance(item, NullPair)),
+        nulls={
+            (arm.condition.policy.label, title): arm
+            for title, arms in tables
+            for arm in arms[1:]
+            if arm.setting == comparisons.OTHER_BEHAVIOUR
+        },
         paired=origin.paired,
         imported_from=origin.file,
         imported_seeds=origin.seeds,
@@ -107,7 +112,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     )
 
 
-def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison | NullPair]:
+def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
     original, *others = arms
     kind = original.setting.kind
     if kind == "size":
@@ -118,8 +123,6 @@ def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison | NullPair
     by_setting = {arm.setting: arm for arm in arms}
     for arm in others:
         setting = arm.setting
-        if setting == comparisons.OTHER_BEHAVIOUR:
-            yield NullPair(title, original, arm)
         if kind == "fault" and setting.name in (REPEATED, RECORDED.removed):
             continue
         removed = by_setting.get(setting._replace(name=str(RECORDED.removed)))
