@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
-from types import MappingProxyType
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
@@ -53,7 +52,7 @@ class Plan:
     comparisons: tuple[Comparison, ...]
     code: str
     identities: Mapping[str, str]
-    nulls: Mapping[tuple[str, str], Arm] = MappingProxyType({})
+    nulls: Mapping[tuple[str, str], Arm] = field(default_factory=dict)
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
