@@ -247,7 +247,8 @@ def rates(canvas: Canvas, panels: Mapping[str, pd.DataFrame], onset: float, y_la
             line.set(linestyle=LINES[index % len(LINES)], marker=MARKERS[index % len(MARKERS)])
             line.set(markevery=(index * 4, 12), markersize=4.5)
         axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
-        axes.set_ylim(bottom=0.0)
+    # After the last panel, as this fixes the scale, which all panels share.
+    axes.set_ylim(bottom=0.0)
 
 
 def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None:

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
@@ -169,6 +170,19 @@ def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) ->
     assert deliveries["fault", 1800.0] == pytest.approx(50, abs=6)
     names = [figure.name for figure in document(repaired).figures()]
     assert "deliveries-swarm-dt-Fault-tolerance-and-robustness-dead-600s" in names
+
+
+def test_one_scale_holds_the_rates_of_all_policies(repaired: StudyResults) -> None:
+    figures = pytest.importorskip("matplotlib.figure", reason="needs the extra study")
+    (comparison,) = (c for c in repaired.plan.comparisons if c.indicator == "FT")
+    few = rate_curves(repaired, comparison)
+    many = few.assign(**{name: 10.0 * few[name] for name in ("deliveries", "low", "high")})
+    canvas = figures.Figure()
+    drawing.rates(canvas, {"few": few, "many": many}, ONSET, "deliveries")
+    for axes in canvas.axes:
+        bottom, top = axes.get_ylim()
+        assert bottom == 0.0
+        assert top >= many["high"].max()
 
 
 def test_anchoring_load_per_failed_robot(repaired: StudyResults) -> None:
