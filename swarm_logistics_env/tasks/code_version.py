@@ -28,7 +28,7 @@ ENVIRONMENT_SOURCES = (
 _environments: dict[str, str] = {}
 
 
-def code_version(world: type[Warehouse] = Warehouse) -> str:
+def code_version(world: type = Warehouse) -> str:
     """Return the digest of the code that decides an episode in a world, 16 hexadecimal digits.
 
     Its modules are those that the world and `run_episode` use; policies have identities of their

@@ -173,8 +173,7 @@ class Warehouse:
             ScenarioError: a field is unknown, cannot change during a run, or its value cannot be.
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("change")
+        self._begun("change")
         for name in fields:
             if name not in CHANGES_DURING_RUN and name in Scenario.model_fields:
                 raise ScenarioError(
@@ -192,9 +191,7 @@ class Warehouse:
             FaultError: a fault names robots that are not there.
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("set_faults")
-        seed, n = self._seed, self.state.n_robots
+        seed, n = self._begun("set_faults"), self.state.n_robots
         occurrences = [Occurrence(fault, seed, n) for fault in faults]
         self.faults, self._occurrences = tuple(faults), occurrences
         self._apply_faults()
@@ -206,8 +203,7 @@ class Warehouse:
         Raises:
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("observe")
+        self._begun("observe")
         return self._rows
 
     @property
@@ -222,8 +218,7 @@ class Warehouse:
         Raises:
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("step")
+        self._begun("step")
         return self._address
 
     @property
@@ -235,6 +230,12 @@ class Warehouse:
     def is_over_time(self) -> bool:
         """Whether the scenario's duration has passed."""
         return self.state.step >= self.scenario.n_steps
+
+    def _begun(self, asked: str) -> int:
+        """Return the seed of the episode; raise SetupError if there is none."""
+        if self._seed is None:
+            raise SetupError(f"{asked} before reset: call reset(seed) first")
+        return self._seed
 
     def _advance(self, rows: NDArray[np.float32]) -> bool:
         return stepping.step(self._address, rows)
@@ -255,8 +256,7 @@ class Warehouse:
         state.requested = int(items.order[0])
 
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
-        if self._seed is None:
-            raise _not_begun("step")
+        self._begun("step")
         try:
             if np.iscomplexobj(commands):
                 raise CommandError("commands should be numbers: real ones, not complex")
@@ -398,7 +398,3 @@ class Warehouse:
         self._words[:] = words
         self._address: int = self._words.ctypes.data
         self._physics.begin(self._words)
-
-
-def _not_begun(asked: str) -> SetupError:
-    return SetupError(f"{asked} before reset: call reset(seed) first")

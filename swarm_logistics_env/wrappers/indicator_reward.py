@@ -142,7 +142,7 @@ class IndicatorReward(Wrapper):
             self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
         self.payments: dict[str, Payment] = {}
         self._indicators: dict[str, EpisodeIndicator] = {}
-        self._is_over = False
+        self._is_over, self._delivered = False, 0
 
     def payments_of(self, condition: Condition) -> dict[str, Payment]:
         """Return what an episode of that condition would pay, by indicator; unweighted.
