@@ -8,9 +8,10 @@ import numpy as np
 import pygame
 
 from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.projection import Projection
-from swarm_logistics_env.rendering.sprites import words
 from swarm_logistics_env.scenario import Scenario
+
+from .projection import Projection
+from .sprites import words
 
 
 def background(

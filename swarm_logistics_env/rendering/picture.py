@@ -8,14 +8,15 @@ import numpy as np
 import pygame
 
 from swarm_logistics_env.rendering import palette, sprites
-from swarm_logistics_env.rendering.background import background
-from swarm_logistics_env.rendering.canvas import Point, new_canvas, stamp
-from swarm_logistics_env.rendering.caption import Caption
-from swarm_logistics_env.rendering.overlays import draw_beams, draw_links, draw_trails
-from swarm_logistics_env.rendering.projection import Projection
-from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+
+from .background import background
+from .canvas import Point, new_canvas, stamp
+from .caption import Caption
+from .overlays import draw_beams, draw_links, draw_trails
+from .projection import Projection
+from .trails import Trails
 
 # What decides the picture's layout.
 _shape = attrgetter(

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering.palette import film_colours
+
+from .palette import film_colours
 
 Frame = NDArray[np.uint8]  # (H, W, 3), both even
 SUFFIXES = (".mp4", ".gif")

@@ -13,7 +13,8 @@ from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
 from swarm_logistics_env.spi.equivalence import Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.runs import Condition
+
+from .runs import Condition
 
 Performance = Callable[["Arm"], NDArray[np.float64]]
 
@@ -220,7 +221,7 @@ def load_reference(name: str | None) -> Reference | None:
     """
     if name is None:
         return None
-    from swarm_logistics_env.studies.presets import PAPER
+    from .presets import PAPER
 
     known = {"paper": PAPER}
     if name not in known:

@@ -17,9 +17,10 @@ from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.spi.survival import SurvivalCurve
-from swarm_logistics_env.studies.comparisons import Comparison
-from swarm_logistics_env.studies.performance_table import Row, rows_of
-from swarm_logistics_env.studies.results import StudyResults, Times
+
+from .comparisons import Comparison
+from .performance_table import Row, rows_of
+from .results import StudyResults, Times
 
 if TYPE_CHECKING:
     import pandas as pd

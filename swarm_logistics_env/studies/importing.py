@@ -15,14 +15,15 @@ from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
 from swarm_logistics_env.studies import comparisons, metadata
-from swarm_logistics_env.studies.comparisons import Arm, Comparison, Setting
-from swarm_logistics_env.studies.metadata import Declaration, Origin
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
-from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.studies.store import new_store, refuse_study_in
 from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, RecordedScenario
 from swarm_logistics_env.tasks.task import Outcome
+
+from .comparisons import Arm, Comparison, Setting
+from .metadata import Declaration, Origin
+from .plan import Plan
+from .runs import Condition, StudiedPolicy
+from .specification import Specification
+from .store import new_store, refuse_study_in
 
 
 def import_results(

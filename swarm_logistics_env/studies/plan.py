@@ -9,23 +9,11 @@ from itertools import product
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
-from swarm_logistics_env.studies.comparisons import (
-    NO_FAULT,
-    OTHER_BEHAVIOUR,
-    Arm,
-    Comparison,
-    Setting,
-)
-from swarm_logistics_env.studies.runs import Condition, Run, StudiedPolicy
-from swarm_logistics_env.studies.specification import (
-    Ablation,
-    Factor,
-    Faults,
-    Parameter,
-    Sizes,
-    Specification,
-)
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
+
+from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .runs import Condition, Run, StudiedPolicy
+from .specification import Ablation, Factor, Faults, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 

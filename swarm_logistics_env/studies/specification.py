@@ -23,12 +23,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record, read_toml
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.tasks.policy_choice import (
-    PolicySource,
-    policy_name,
-    runs_code,
-    told_apart,
-)
+from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, refuse_untrusted, task_of
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from swarm_logistics_env.policies.forager import Forager
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.tasks.foraging import Foraging, ForagingScenario
-from swarm_logistics_env.tasks.warehouse_task import WarehouseTask
+
+from .foraging import Foraging, ForagingScenario
+from .warehouse_task import WarehouseTask
 
 # What these modes take away means something else here, or nothing.
 _OTHER_MEANING = {

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.tasks.policy_choice import policy_of
-from swarm_logistics_env.tasks.task import Playable
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
+
+from .policy_choice import policy_of
+from .task import Playable
 
 FRAME_RATE = 2.5  # per second, at most
 NOWHERE = -1.0  # in both coordinates: a robot removed, an item carried or delivered

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.logistics import is_remembered
-from swarm_logistics_env.warehouse.radio import ITEM_SEEN, ROBOT_SEEN, is_missed
-from swarm_logistics_env.warehouse.rangers import Pose, in_frame
-from swarm_logistics_env.warehouse.structs import Nearby, World
+
+from .logistics import is_remembered
+from .radio import ITEM_SEEN, ROBOT_SEEN, is_missed
+from .rangers import Pose, in_frame
+from .structs import Nearby, World
 
 _ITEM_WIDTH = len(row.ITEM_FEATURES)
 _NEIGHBOUR_WIDTH = len(row.NEIGHBOUR_FEATURES)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.rangers import Pose
-from swarm_logistics_env.warehouse.structs import NOBODY, World
+
+from .rangers import Pose
+from .structs import NOBODY, World
 
 
 @inlined_kernel

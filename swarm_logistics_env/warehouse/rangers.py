@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.structs import Grid, Nearby, World
+
+from .structs import Grid, Nearby, World
 
 _N_BEAMS = row.N_BEAMS
 _BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)

@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
 from swarm_logistics_env.warehouse import contact, rangers
-from swarm_logistics_env.warehouse.cameras import (
-    choose_neighbours,
-    see_items,
-    tell_of_neighbours,
-)
-from swarm_logistics_env.warehouse.grid import look_around
-from swarm_logistics_env.warehouse.own_state import feel_itself
-from swarm_logistics_env.warehouse.radio import listen, lowest_timer_heard
-from swarm_logistics_env.warehouse.rangers import Pose
-from swarm_logistics_env.warehouse.structs import NOBODY, World
+
+from .cameras import choose_neighbours, see_items, tell_of_neighbours
+from .grid import look_around
+from .own_state import feel_itself
+from .radio import listen, lowest_timer_heard
+from .rangers import Pose
+from .structs import NOBODY, World
 
 _N_BEAMS = row.N_BEAMS
 _ROBOTS, _WALLS, _ITEMS, _LOWEST = (

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import gaussian, inlined_kernel, uniform
-from swarm_logistics_env.warehouse.structs import Parameters, World
+
+from .structs import Parameters, World
 
 _N_BEAMS = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
 _ITEM_WIDTH, _NEIGHBOUR_WIDTH = len(row.ITEM_FEATURES), len(row.NEIGHBOUR_FEATURES)

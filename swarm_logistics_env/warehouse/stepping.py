@@ -6,27 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse.engine import advance, follow
-from swarm_logistics_env.warehouse.grid import fill
-from swarm_logistics_env.warehouse.item_collisions import mask_below_lifters, unmask_left
-from swarm_logistics_env.warehouse.kinematics import drive, refused_command
-from swarm_logistics_env.warehouse.logistics import (
-    carry_along,
-    close_grippers,
-    deliver,
-    open_grippers,
-)
-from swarm_logistics_env.warehouse.packing import unpacked_at
-from swarm_logistics_env.warehouse.radio import run_timers, send_messages
-from swarm_logistics_env.warehouse.sensing import sense
-from swarm_logistics_env.warehouse.sensor_errors import disturb, fail_rangers
-from swarm_logistics_env.warehouse.structs import (
-    NOBODY,
-    STORED,
-    Commands,
-    Numbers,
-    World,
-)
+
+from .engine import advance, follow
+from .grid import fill
+from .item_collisions import mask_below_lifters, unmask_left
+from .kinematics import drive, refused_command
+from .logistics import carry_along, close_grippers, deliver, open_grippers
+from .packing import unpacked_at
+from .radio import run_timers, send_messages
+from .sensing import sense
+from .sensor_errors import disturb, fail_rangers
+from .structs import NOBODY, STORED, Commands, Numbers, World
 
 
 @kernel

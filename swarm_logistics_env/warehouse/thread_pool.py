@@ -23,12 +23,13 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import CommandError, ScenarioError
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 from swarm_logistics_env.warehouse import stepping
-from swarm_logistics_env.warehouse.atomic import add, exchange, load, replace
-from swarm_logistics_env.warehouse.kinematics import refused_command
-from swarm_logistics_env.warehouse.native import pointer_at
-from swarm_logistics_env.warehouse.packing import unpacked_at
-from swarm_logistics_env.warehouse.structs import NOBODY, Numbers, World
-from swarm_logistics_env.warehouse.warehouse import Warehouse
+
+from .atomic import add, exchange, load, replace
+from .kinematics import refused_command
+from .native import pointer_at
+from .packing import unpacked_at
+from .structs import NOBODY, Numbers, World
+from .warehouse import Warehouse
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
 

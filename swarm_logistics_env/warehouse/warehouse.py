@@ -15,20 +15,13 @@ from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.warehouse import layout, stepping
-from swarm_logistics_env.warehouse.faults import GRACE, Fault, Occurrence, apply_faults
-from swarm_logistics_env.warehouse.grid import blank_grid
-from swarm_logistics_env.warehouse.packing import blank, packed
-from swarm_logistics_env.warehouse.physics import Physics
-from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
-from swarm_logistics_env.warehouse.structs import (
-    Claims,
-    Commands,
-    Nearby,
-    Outcome,
-    World,
-    lengths_of,
-    parameters_of,
-)
+
+from .faults import GRACE, Fault, Occurrence, apply_faults
+from .grid import blank_grid
+from .packing import blank, packed
+from .physics import Physics
+from .state import NOBODY, STORED, WarehouseState
+from .structs import Claims, Commands, Nearby, Outcome, World, lengths_of, parameters_of
 
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.

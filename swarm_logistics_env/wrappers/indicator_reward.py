@@ -13,8 +13,9 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.warehouse.state import NOBODY
-from swarm_logistics_env.wrappers.condition import Condition, changes_of, condition_of
-from swarm_logistics_env.wrappers.indicator_payments import (
+
+from .condition import Condition, changes_of, condition_of
+from .indicator_payments import (
     INDICATORS,
     PERFORMANCES,
     EpisodeIndicator,
@@ -22,8 +23,8 @@ from swarm_logistics_env.wrappers.indicator_payments import (
     derivative_of,
     indicator_of,
 )
-from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+from .reference_performances import GivenPerformances, RunningMeans
+from .wrapper import Wrapper
 
 CREDITS = ("team", "deliverer", "carriers")
 
