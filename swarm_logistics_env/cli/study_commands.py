@@ -270,9 +270,12 @@ def run_study(asked: Study, engine: Engine, shard: Shard | None = None) -> Tally
         return asked.run(engine, shard=shard)
     except KeyboardInterrupt:
         done, total = asked.finished(shard)
+        left = f"the other {total - done}"
+        if asked.specification.until_clear:
+            left += ", and with what later looks need"
         typer.echo(
             f"\nStopped. {done} of {total} runs are finished and kept in {asked.out}; the same "
-            f"command goes on with the other {total - done}.",
+            f"command goes on with {left}.",
             err=True,
         )
         raise typer.Exit(130) from None

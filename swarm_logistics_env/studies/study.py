@@ -220,15 +220,19 @@ class Study:
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.
 
+        A study that runs until it is clear counts those that its next look needs, because what the
+        later ones need is not known yet.
+
         Args:
             shard: of which part; None: of all.
         """
-        asked = {run.key for run in self._runs(shard)}
+        whole = self._runs(shard)
         try:
             with self._store(existing=True) as store:
-                return len(asked & store.succeeded()), len(asked)
+                done = len({run.key for run in whole} & store.succeeded())
+                return done, done + len(self._missing(whole, store, ()))
         except StudyError:  # nothing has been run
-            return 0, len(asked)
+            return 0, len(whole)
 
     def exploratory_because(self) -> str | None:
         """Return why verdicts over the asked seeds are exploratory; None: they are not.
