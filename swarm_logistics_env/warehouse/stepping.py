@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 
@@ -16,11 +15,11 @@ from .packing import unpacked_at
 from .radio import run_timers, send_messages
 from .sensing import sense
 from .sensor_errors import disturb, fail_rangers
-from .structs import NOBODY, STORED, Commands, Numbers, World
+from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
 
 
 @kernel
-def perceive(address: int, rows: NDArray[np.float32]) -> None:
+def perceive(address: int, rows: Sensed) -> None:
     """Run the timers and fill the observation rows (N, D) of the world at `address`."""
     world = unpacked_at(World, address)
     robots, items, progress = world.robots, world.items, world.progress
@@ -34,7 +33,7 @@ def perceive(address: int, rows: NDArray[np.float32]) -> None:
 
 
 @kernel
-def step(address: int, rows: NDArray[np.float32]) -> bool:
+def step(address: int, rows: Sensed) -> bool:
     """Take a control step in the world at `address` and fill the observation rows (N, D).
 
     Returns whether there is something to tell, see `take_step`; a command that is refused is, and
@@ -47,7 +46,7 @@ def step(address: int, rows: NDArray[np.float32]) -> bool:
 
 
 @kernel
-def take_step(address: int, rows: NDArray[np.float32]) -> bool:
+def take_step(address: int, rows: Sensed) -> bool:
     """Take a control step by commands that are finite.
 
     Returns whether there is something to tell: a delivery, faults that begin or end, no room for
@@ -71,9 +70,7 @@ def begin(world: World) -> None:
 
 
 @inlined_kernel
-def finish(
-    address: int, world: World, rows: NDArray[np.float32], n_delivered: int, is_room: bool
-) -> bool:
+def finish(address: int, world: World, rows: Sensed, n_delivered: int, is_room: bool) -> bool:
     """Take the part of a step after items were handled: let the robots sense, note what is to tell.
 
     Returns whether there is something, see `take_step`.

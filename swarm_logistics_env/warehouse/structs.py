@@ -25,6 +25,7 @@ Numbers: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.bool_]
 Keys: TypeAlias = NDArray[np.uint64]
+Sensed: TypeAlias = NDArray[np.float32]  # observations: rows (N, D), one row or its scan
 
 
 class Parameters(NamedTuple):

@@ -21,7 +21,7 @@ from .grid import blank_grid
 from .packing import blank, packed
 from .physics import Physics
 from .state import NOBODY, STORED, WarehouseState
-from .structs import Claims, Commands, Nearby, Outcome, World, lengths_of, parameters_of
+from .structs import Claims, Commands, Nearby, Outcome, Sensed, World, lengths_of, parameters_of
 
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
@@ -62,11 +62,8 @@ class Warehouse:
         self._words = np.zeros(0, np.int64)
 
     def reset(
-        self,
-        seed: int = 0,
-        faults: Sequence[Fault] = (),
-        scenario: Scenario | None = None,
-    ) -> NDArray[np.float32]:
+        self, seed: int = 0, faults: Sequence[Fault] = (), scenario: Scenario | None = None
+    ) -> Sensed:
         """Begin an episode and return the first observations (N, D).
 
         Args:
@@ -93,7 +90,7 @@ class Warehouse:
         self._save()
         return self.observe()
 
-    def step(self, commands: ArrayLike) -> NDArray[np.float32]:
+    def step(self, commands: ArrayLike) -> Sensed:
         """Move the world by one control period and return what is sensed after it.
 
         Args:
@@ -120,7 +117,7 @@ class Warehouse:
         self.take(rows, self._advance(rows))
         return rows
 
-    def take(self, rows: NDArray[np.float32], is_eventful: bool) -> None:
+    def take(self, rows: Sensed, is_eventful: bool) -> None:
         """Take over a step that compiled code took.
 
         Args:
@@ -190,7 +187,7 @@ class Warehouse:
         self._apply_faults()
         self._remember()
 
-    def observe(self) -> NDArray[np.float32]:
+    def observe(self) -> Sensed:
         """Return what every robot senses now: (N, D) float32, absent robots zeros.
 
         Raises:
@@ -230,7 +227,7 @@ class Warehouse:
             raise SetupError(f"{asked} before reset: call reset(seed) first")
         return self._seed
 
-    def _advance(self, rows: NDArray[np.float32]) -> bool:
+    def _advance(self, rows: Sensed) -> bool:
         return stepping.step(self._address, rows)
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
@@ -354,7 +351,7 @@ class Warehouse:
             return step - 1
         return step if step * period >= time - GRACE else step + 1
 
-    def _blank_rows(self) -> NDArray[np.float32]:
+    def _blank_rows(self) -> Sensed:
         # New memory every time: what was handed out stays as it was.
         return np.empty(self._row_shape, np.float32)
 
