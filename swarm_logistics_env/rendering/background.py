@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.scenario import Scenario
 
+from . import palette
 from .projection import Projection
 from .sprites import words
 

@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import pygame
 
-from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
+from . import palette
 from .sprites import badge, blank, halo, item, robot, words
 
 # The widest texts there may be, so that a picture's size does not change with what happens.

@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import palette, sprites
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
+from . import palette, sprites
 from .beams import N_BEAMS, ranges
 from .canvas import Point, draw_line, stamp
 from .links import followed

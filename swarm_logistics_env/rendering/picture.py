@@ -7,10 +7,10 @@ from operator import attrgetter
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import palette, sprites
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
+from . import palette, sprites
 from .background import background
 from .canvas import Point, new_canvas, stamp
 from .caption import Caption

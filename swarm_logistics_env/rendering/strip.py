@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 
 import pygame
 
-from swarm_logistics_env.rendering import palette
-
+from . import palette
 from .canvas import Point, draw_line, new_canvas
 from .curves import Curve, Event
 from .sprites import badge, words

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from swarm_logistics_env.report import wording
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.studies.few_real_runs import narrowed, replays
 from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import size_series
 
+from . import wording
 from .answer import Answer, answer
 from .figures import Figure, indicator_figures, scaling_figure
 from .further_measures import budget_sections, load_sections, look_sections, size_sections

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import SwarmLogisticsError
-from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
@@ -20,6 +19,7 @@ from swarm_logistics_env.tasks.policy_choice import runs_code
 from swarm_logistics_env.tasks.replay import Recording, record_run
 from swarm_logistics_env.tasks.task_choice import DEFAULT
 
+from . import wording
 from .verdict_matrix import VerdictMatrix
 
 if TYPE_CHECKING:

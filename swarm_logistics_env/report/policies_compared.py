@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from swarm_logistics_env.report import drawing, wording
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Setting
 from swarm_logistics_env.studies.performance_table import groups_of
@@ -18,6 +17,7 @@ from swarm_logistics_env.studies.policy_comparison import (
 )
 from swarm_logistics_env.studies.results import StudyResults
 
+from . import drawing, wording
 from .drawing import Panel
 from .figures import Figure, slug
 from .result_tables import Column, Section, table_section

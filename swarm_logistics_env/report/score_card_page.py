@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from swarm_logistics_env.report import wording
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 
+from . import wording
 from .report_files import write_text
 from .score_card import Line, ScoreCard, explanation, others, rank
 

@@ -14,12 +14,11 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
-from swarm_logistics_env.studies import comparisons, metadata
 from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, RecordedScenario
 from swarm_logistics_env.tasks.task import Outcome
 
-from .comparisons import Arm, Comparison, Setting
-from .metadata import Declaration, Origin
+from .comparisons import OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .metadata import Declaration, Origin, rows_of
 from .plan import Plan
 from .runs import Condition, StudiedPolicy
 from .specification import Specification
@@ -83,7 +82,7 @@ def import_results(
                 run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
                 store.add(run, _outcome(run.key, row))
         declared = Declaration.model_validate(specification)
-        notes = metadata.rows_of(specification, RECORDED.code(), {}, declared)
+        notes = rows_of(specification, RECORDED.code(), {}, declared)
         store.note({**notes, "imported": origin.model_dump_json()})
     return len(trials.rows)
 
@@ -104,7 +103,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
             (arm.condition.policy.label, title): arm
             for title, arms in tables
             for arm in arms[1:]
-            if arm.setting == comparisons.OTHER_BEHAVIOUR
+            if arm.setting == OTHER_BEHAVIOUR
         },
         paired=origin.paired,
         imported_from=origin.file,

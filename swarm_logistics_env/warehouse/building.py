@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse import engine as whom
 
+from . import engine as whom
 from .engine import collide_with
 from .native import call_at, made_at
 from .packing import unpacked_at

@@ -9,8 +9,8 @@ import math
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse import contact, rangers
 
+from . import contact, rangers
 from .cameras import choose_neighbours, see_items, tell_of_neighbours
 from .grid import look_around
 from .own_state import feel_itself

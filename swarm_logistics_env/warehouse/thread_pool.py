@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import CommandError, ScenarioError
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse import stepping
 
+from . import stepping
 from .atomic import add, exchange, load, replace
 from .kinematics import refused_command
 from .native import pointer_at

@@ -14,8 +14,8 @@ from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
-from swarm_logistics_env.warehouse import layout, stepping
 
+from . import layout, stepping
 from .faults import GRACE, Fault, Occurrence, apply_faults
 from .grid import blank_grid
 from .packing import blank, packed
