@@ -154,9 +154,7 @@ def draw(canvas: Figure, found: Found, told: Identified) -> None:
     top = max(np.quantile(profile.loss, 0.9) for profile in told.profiles.values())
     for axes, default, (name, profile) in zip(panels, defaults(), told.profiles.items()):
         centres = np.sqrt(profile.values[1:] * profile.values[:-1])
-        kept = profile.loss <= profile.limit
-        for start, end in zip(profile.values[:-1][kept], profile.values[1:][kept]):
-            axes.axvspan(start, end, color=COLOURS[5], alpha=0.25, linewidth=0)
+        axes.axvspan(*profile.kept, color=COLOURS[5], alpha=0.25, linewidth=0)
         axes.plot(centres, profile.loss, color=COLOURS[0])
         axes.plot(default, of_defaults, "D", color=COLOURS[1], markersize=5)
         axes.set(xscale="log", ylim=(0.0, 1.15 * max(top, of_defaults)), ylabel="loss")
@@ -169,7 +167,7 @@ def draw(canvas: Figure, found: Found, told: Identified) -> None:
 def _plain_ticks(axes: Axes, low: float, high: float) -> None:
     ticks = [
         value
-        for value in (0.1, 0.2, 0.3, 0.5, 1, 2, 3, 4, 6, 8, 80, 100, 150, 200)
+        for value in (0.1, 0.2, 0.3, 0.5, 1, 2, 4, 8, 80, 100, 150, 200)
         if low <= value <= high
     ]
     axes.set_xticks(ticks, [f"{value:g}" for value in ticks])

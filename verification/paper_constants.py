@@ -60,14 +60,14 @@ class Budget(NamedTuple):
     """How much is played.
 
     Attributes:
-        first: candidates that are spread over the ranges, each with one seed; a power of 2.
+        first: candidates that are spread over the ranges, each with one seed.
         rounds: of each half: how many candidates stay, and how many seeds each has by then.
         fresh: seeds of the judgement.
         duration: of an episode [s].
     """
 
-    first: int = 64
-    rounds: tuple[tuple[int, int], ...] = ((8, 1), (4, 4), (2, 10))
+    first: int = 48
+    rounds: tuple[tuple[int, int], ...] = ((6, 1), (3, 5))
     fresh: int = 30
     duration: float = 500.0
 
@@ -107,9 +107,10 @@ def places_of(candidates: Sequence[Candidate]) -> Floats:
 
 
 def spread(count: int, purpose: str) -> Floats:
-    """Return places (count, constants) spread evenly over the unit cube; `count` a power of 2."""
+    """Return places (count, constants) spread evenly over the unit cube."""
     sobol = stats.qmc.Sobol(len(RANGES), seed=key(0, purpose))
-    return np.asarray(sobol.random(count), dtype=np.float64)
+    power_of_two = 1 << (count - 1).bit_length()
+    return np.asarray(sobol.random(power_of_two)[:count], dtype=np.float64)
 
 
 def halves() -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -140,7 +141,8 @@ class Players:
             StudyError: a run failed.
         """
         conditions = [self._condition(candidate, CELLS[k]) for k in cells]
-        runs = [c.run(self._code, seed) for c in conditions for seed in seeds]
+        # Seed by seed, so that a search that was stopped has complete seeds.
+        runs = [c.run(self._code, seed) for seed in seeds for c in conditions]
         there = self._store.outcomes(runs)
         missing = {run.key: run for run in runs if run.key not in there}
         for run, outcome in serial(missing.values()):
@@ -149,7 +151,7 @@ class Players:
                 raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
             there[run.key] = outcome
         p = np.array([there[run.key].delivered for run in runs], dtype=np.float64)
-        return p.reshape(len(cells), len(seeds))
+        return p.reshape(len(seeds), len(cells)).T
 
     def _condition(self, candidate: Candidate, cell: Setting) -> Condition:
         known = _conditions()[cell]
@@ -162,9 +164,11 @@ class Players:
                 changes[name] = value
             else:
                 parameters[name] = value
-        choice = PolicyChoice(name="swarm-dt", parameters=parameters)
-        identity = policy_identity(choice, WAREHOUSE.policies)
-        policy = StudiedPolicy(policy_label(choice), identity, choice)
+        # The defaults' runs have the keys that they have in the paper's study.
+        own = candidate == defaults()
+        source = "swarm-dt" if own else PolicyChoice(name="swarm-dt", parameters=parameters)
+        identity = policy_identity(source, WAREHOUSE.policies)
+        policy = StudiedPolicy(policy_label(source), identity, source)
         scenario = known.scenario.replace(**changes)
         return Condition(policy, scenario, known.faults, task=WAREHOUSE)
 
@@ -188,7 +192,7 @@ def model_of(candidates: Sequence[Candidate], p: Floats, cells: Sequence[int]) -
 
 def proposed(model: Model, cells: Sequence[int], count: int, purpose: str) -> list[Candidate]:
     """Return the candidates that a model of these cells expects to meet them best, far apart."""
-    blocks = spread(4096 * count, purpose).reshape(count, 4096, -1)
+    blocks = np.split(spread(4096 * count, purpose), count)
     best = [block[errors(model.means(block), cells).mean(axis=1).argmin()] for block in blocks]
     return candidates_at(np.array(best))
 

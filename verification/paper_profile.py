@@ -29,7 +29,7 @@ from verification.paper_constants import (
 )
 from verification.paper_model import Model
 
-BINS = 12
+BINS = 8
 _PLACES = 2**16
 _TABLES = 200
 _ALL = tuple(range(len(CELLS)))
@@ -56,8 +56,9 @@ class Profile(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The share of the range that the tables do not rule out, on the logarithmic scale."""
-        return float((self.loss <= self.limit).mean())
+        """The share of the range between these two, on the logarithmic scale."""
+        low, high = self.kept
+        return float(np.log(high / low) / np.log(self.values[-1] / self.values[0]))
 
 
 class Identified(NamedTuple):
@@ -66,6 +67,7 @@ class Identified(NamedTuple):
     Attributes:
         best: the candidate that the model expects to meet all cells best.
         loss: its expected loss.
+        limit: 95 % of simulated tables put the true constants below this loss.
         profiles: by constant.
         right: the loss of constants that are right: mean and 2.5 and 97.5 % of simulated tables.
         linked: rank correlations between constants among the candidates that are not ruled out.
@@ -75,6 +77,7 @@ class Identified(NamedTuple):
 
     best: Candidate
     loss: float
+    limit: float
     profiles: dict[str, Profile]
     right: Interval
     linked: Floats
@@ -105,17 +108,18 @@ def identify(model: Model, runs: Floats) -> Identified:
         profiles = _lowest(lost, bins)
         above.append(profiles[np.arange(len(RANGES)), bins[truth]] - lost.min())
     limits = loss.min() + np.quantile(above, 0.95, axis=0)
-    kept = loss <= loss.min() + np.quantile(joint, 0.95)
+    limit = float(loss.min() + np.quantile(joint, 0.95))
     lowest = _lowest(loss, bins)
     return Identified(
         best=candidates_at(places[[truth]])[0],
         loss=float(loss[truth]),
+        limit=limit,
         profiles={
             name: Profile(np.geomspace(low, high, BINS + 1), lowest[k], float(limits[k]))
             for k, (name, (low, high)) in enumerate(RANGES.items())
         },
         right=Interval(float(np.mean(right)), *np.quantile(right, (0.025, 0.975)).tolist()),
-        linked=_ranks_correlated(places[kept]),
+        linked=_ranks_correlated(places[loss <= limit]),
         trade=_trade(places, of_cell),
     )
 

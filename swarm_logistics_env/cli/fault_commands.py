@@ -145,7 +145,7 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         rows,
         f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
         f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.",
-        f"{len(result.tried)} of {result.searched} faults were tried. What is found bounds "
+        f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
     )
 

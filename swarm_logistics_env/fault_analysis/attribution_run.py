@@ -19,6 +19,7 @@ from swarm_logistics_env.fault_analysis.attribution import (
     check_fault,
     losses,
 )
+from swarm_logistics_env.policies.code_identity import code_digest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.engines import workers
 from swarm_logistics_env.tasks.code_version import code_version
@@ -58,7 +59,7 @@ def attribute_in(
         "scenario": json.loads(scenario.to_json()),
         "policy": policy_identity(policy),
         "fault": json.loads(fault.to_json()),
-        "code": code_version(),
+        "code": f"{code_version()}, {code_digest(Losses)}",
     }
     finished = _finished(out / FINISHED, about)
     missing = [seed for seed in seeds if seed not in finished]
