@@ -146,7 +146,7 @@ def stocking(world: Warehouse, before: Before) -> Earned:
         return None
     nearer = np.minimum(state.item_position[items, 0], edge)
     nearer -= np.minimum(before.item_x[items], edge)
-    return np.bincount(carriers[items], nearer, state.n_robots)
+    return np.bincount(carriers[items], nearer, state.n_robots).astype(np.float64)
 
 
 def carrying(world: Warehouse, before: Before) -> Earned:

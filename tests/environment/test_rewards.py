@@ -207,7 +207,7 @@ def test_stocking_pays_the_way_of_every_item_so_that_no_circle_earns() -> None:
         carriers = state.item_carrier.copy()
         world.step(rng.uniform(-1.0, 1.0, (8, 4)))
         total += terms.pay(world)
-        n_changes += np.count_nonzero(carriers != state.item_carrier)
+        n_changes += int(np.count_nonzero(carriers != state.item_carrier))
     assert n_changes >= 20
     assert state.delivered == 0
     assert np.all(total != 0.0)
