@@ -44,6 +44,12 @@ FLOWS: Mapping[str, Sequence[Box]] = {
         ("its tests", "named beside it"),
         ("make test", "runs them all"),
     ),
+    "questions": (
+        ("a question", "a sentence of the field"),
+        ("its study", "examples/questions"),
+        ("play_questions.py", "fresh seeds, kept runs"),
+        ("its page", "tables, figure, limits"),
+    ),
     "study_files": (
         ("study.toml", "policies, seeds, factors"),
         ("study plan", "conditions, time"),

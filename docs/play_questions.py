@@ -1,0 +1,149 @@
+"""Plays the studies that answer the field's questions: `python docs/play_questions.py [NAME ...]`.
+
+Each study of examples/questions has a page of its name, whose tables and figure this writes. What
+is played is kept, as by `play_tables.py`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+import question_tables as tables
+from play_tables import OUT, ROOT, play, rewritten
+
+from swarm_logistics_env.report import drawing
+from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.drawing import Draw, Panel
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.fault_measures import rate_curves
+from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.results import StudyResults
+
+DOCS = ROOT / "docs"
+STUDIES = ROOT / "examples" / "questions"
+Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
+
+
+def study(name: str, out: Path = OUT / "questions") -> Study:
+    """Return the study of a question."""
+    return Study.from_file(STUDIES / f"{name}.toml", out=out / name)
+
+
+def policies_compared(found: StudyResults) -> Answer:
+    """Answer with all policies side by side, and the report's figure of R."""
+    blocks = {"answer": tables.side_by_side(found), "count": tables.better_or_worse(found)}
+    figure = next(f for f in document(found).figures() if f.name.startswith("R-Two-robots"))
+    return blocks, figure.draw, figure.height
+
+
+def larger_swarms(found: StudyResults) -> Answer:
+    """Answer with P and R against N."""
+    blocks = {
+        "performance": tables.performances_by_size(found),
+        "robustness": f"{tables.by_size(found)}\n\n{tables.over(found).capitalize()}. [95 %]; the "
+        f"last column is paired by seed and unadjusted. {tables.LEGEND}.",
+    }
+    rows = [test for test in rows_of(found.indicators) if test.indicator == "R"]
+    modes = list(dict.fromkeys(test.factor for test in rows))
+    points = pd.DataFrame(
+        [
+            {
+                "policy": test.policy,
+                "series": test.factor,
+                "style": modes.index(test.factor),
+                "category": f"{test.n_robots}, m = {test.after:g}",
+                "value": test.value,
+                "low": test.low,
+                "high": test.high,
+                "decided": test.verdict_holm in ("supported", "refuted"),
+                "saturated": False,
+                "published": float("nan"),
+            }
+            for test in rows
+        ]
+    )
+    panels = [
+        Panel(policy, "robustness R", own, (0.0,), "swarm size N, faulty robots m")
+        for policy, own in points.groupby("policy", sort=False)
+    ]
+    return blocks, partial(drawing.intervals, panels=panels), 0.5 + 2.5 * len(panels)
+
+
+def wear_and_repair(found: StudyResults) -> Answer:
+    """Answer with what wear costs and what a repair brings, drawn over time for FM4."""
+    blocks = {
+        "wear": tables.wear(found),
+        "repair": f"{tables.repairs(found)}\n\n{tables.over(found).capitalize()}. [95 %], the two "
+        f"columns after 200 s in percent of the deliveries without a fault. {tables.LEGEND}.",
+    }
+    panels = {}
+    for policy in dict.fromkeys(found.indicators["policy"]):
+        curves = {}
+        for test in rows_of(found.indicators):
+            if (test.policy, test.factor) == (policy, "FM4"):
+                frame = rate_curves(found, test.compared)
+                told = {"fault": test.table.lower(), "no fault": "no fault"}
+                curves |= {told[runs]: own for runs, own in frame.groupby("runs", sort=False)}
+        panels[policy] = pd.concat([own.assign(runs=runs) for runs, own in curves.items()])
+    draw = partial(drawing.rates, panels=panels, onset=100.0, y_label="deliveries in 100 s")
+    return blocks, draw, 0.5 + 2.4 * len(panels)
+
+
+def mixed_swarms(found: StudyResults) -> Answer:
+    """Answer with P and R against the share."""
+    blocks = {
+        "shares": f"{tables.shares(found)}\n\n{tables.over(found).capitalize()}. [95 %]. "
+        f"{tables.LEGEND}; the steps are one family, straight lines are unadjusted."
+    }
+    policies = list(dict.fromkeys(found.indicators["policy"]))
+    rows = [cell for cell in rows_of(found.performance) if cell.n_seeds]
+    faults = list(dict.fromkeys(str(cell.arm.setting) for cell in rows))
+    points = pd.DataFrame(
+        [
+            {
+                "series": str(cell.arm.setting),
+                "style": faults.index(str(cell.arm.setting)),
+                "category": f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
+                "value": cell.mean,
+                "low": cell.low,
+                "high": cell.high,
+                "decided": True,
+                "saturated": cell.saturated,
+                "published": float("nan"),
+            }
+            for cell in rows
+        ]
+    )
+    panel = Panel("", "P [items in 500 s]", points, (0.0,), f"share of {policies[-1]}")
+    return blocks, partial(drawing.intervals, panels=[panel]), 3.2
+
+
+def realistic_robots(found: StudyResults) -> Answer:
+    """Answer with all policies, and each beside itself in the ideal world."""
+    blocks, draw, height = policies_compared(found)
+    (ideal,) = play([study("central_or_swarm")])
+    return {**blocks, "lost": tables.beside_another_world(found, ideal)}, draw, height
+
+
+QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
+    "central_or_swarm": policies_compared,
+}
+
+
+def main(names: list[str]) -> None:
+    """Play the studies of these names, and rewrite their pages and figures."""
+    for name in names or QUESTIONS:
+        (found,) = play([study(name)])
+        blocks, draw, height = QUESTIONS[name](found)
+        svg, _ = drawing.images(draw, height)
+        (DOCS / "media" / f"{name}.svg").write_text(svg, encoding="utf-8")
+        page = DOCS / f"{name}.md"
+        page.write_text(rewritten(page.read_text(encoding="utf-8"), blocks), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

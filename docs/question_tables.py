@@ -1,0 +1,311 @@
+"""The tables of the pages that answer a question of the field, from the results of its study."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from record_tables import table
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.report import wording
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.summaries import Interval, t_interval
+from swarm_logistics_env.spi.verdict_signs import SIGNS
+from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.policy_comparison import (
+    cells_against_baseline,
+    indicators_against_baseline,
+    jackknife_interval,
+    judged_policies,
+)
+from swarm_logistics_env.studies.results import StudyResults
+
+LEGEND = (
+    f"{SIGNS['supported'].mark} above the threshold, {SIGNS['refuted'].mark} below it, "
+    f"{SIGNS['equivalent'].mark} open there but P within a tenth of P_o, "
+    f"{SIGNS['inconclusive'].mark} open, {SIGNS['unaffected'].mark} the same runs; under Holm"
+)
+
+
+def over(found: StudyResults) -> str:
+    """Return over which seeds a table is."""
+    seeds = found.plan.seeds
+    return f"{len(seeds)} paired seeds from {seeds[0]:,} on, on which nothing was fitted"
+
+
+def with_sign(test: Row) -> str:
+    """Return an indicator with its interval and the sign of its verdict."""
+    known = "unaffected" if test.verdict == "unaffected" else test.conclusion or "blocked"
+    return f"{wording.ratio(test)} {SIGNS[known].mark}"
+
+
+Judged = tuple[StudyResults, Row]
+
+
+def difference(one: Judged, other: Judged) -> Interval:
+    """Return how much an indicator is above another over the same seeds, with its interval."""
+    seeds, others = (judged[0].plan.seeds for judged in (one, other))
+    assert list(seeds) == list(others)
+
+    def value(judged: Judged, some: NDArray[np.intp]) -> float:
+        results, test = judged
+        key = test.policy, test.table
+        estimate = test.compared.estimate(lambda arm: results.by_arm[*key, arm].by_seed[some])
+        return float(estimate.value)
+
+    return jackknife_interval(len(seeds), lambda some: value(one, some) - value(other, some))
+
+
+# -- policies side by side ----------------------------------------------------------------------
+
+
+def side_by_side(found: StudyResults) -> str:
+    """Return P and the indicators of every policy, and how they differ from the first one's."""
+    baseline, *others = judged_policies(found)
+    rows: dict[str, dict[str, str]] = {}
+    labels: dict[str, str] = {}  # of conditions, each of which may stand in several tables
+    cells = [one for own in cells_against_baseline(found).values() for one in own]
+    for one in sorted(cells, key=lambda one: one.cell.kind != "size"):
+        setting, condition = one.cell.arm.setting, one.cell.arm.condition
+        if setting.kind == "fault" and setting.value:
+            continue
+        row = rows.setdefault(labels.setdefault(condition.key, f"P, {setting}"), {})
+        row[one.cell.policy] = wording.mean_p(one.cell)
+        row[f"{one.cell.policy} less"] = wording.bracketed(one.difference, 1)
+    for asked in indicators_against_baseline(found):
+        test = asked.test
+        row = rows.setdefault(f"{test.indicator}, {test.comparison}", {})
+        row |= {policy: with_sign(own) for policy, own in asked.tests.items()}
+        for policy, difference in asked.differences.items():
+            row[f"{policy} less"] = wording.bracketed(difference, 3)
+    head = ["", f"`{baseline}`"]
+    columns = [baseline]
+    for policy in others:
+        head += [f"`{policy}`", f"`{policy}` less `{baseline}`"]
+        columns += [policy, f"{policy} less"]
+    body = [(label, *(row.get(column, "") for column in columns)) for label, row in rows.items()]
+    return (
+        f"{table(tuple(head), body)}\n\n{over(found).capitalize()}. [95 %]; differences are paired "
+        f"by seed and unadjusted. {LEGEND}."
+    )
+
+
+def better_or_worse(found: StudyResults) -> str:
+    """Return for how many questions each indicator of a policy is clear of the first one's."""
+    baseline, *others = judged_policies(found)
+    counts = {policy: dict[str, Counter[str]]() for policy in others}
+    for asked in indicators_against_baseline(found):
+        for policy, difference in asked.differences.items():
+            counted = counts[policy].setdefault(asked.test.indicator, Counter())
+            counted[_side(difference)] += 1
+    symbols = list(dict.fromkeys(symbol for one in counts.values() for symbol in one))
+    body = [
+        (f"`{policy}`", *(_tally(own.get(symbol, Counter())) for symbol in symbols))
+        for policy, own in counts.items()
+    ]
+    return table(("than " + f"`{baseline}`", *symbols), body)
+
+
+def _side(difference: Interval | None) -> str:
+    if difference is None or difference.low is None or difference.high is None:
+        return "open"
+    return "higher" if difference.low > 0 else "lower" if difference.high < 0 else "open"
+
+
+def _tally(counted: Counter[str]) -> str:
+    return ", ".join(f"{counted[side]} {side}" for side in ("higher", "lower", "open"))
+
+
+# -- larger swarms ------------------------------------------------------------------------------
+
+
+def by_size(found: StudyResults) -> str:
+    """Return R of every failure mode against N, and its change from the first N to the last."""
+    tests: dict[tuple[str, str], list[Row]] = {}
+    for test in rows_of(found.indicators):
+        if test.indicator == "R":
+            tests.setdefault((test.policy, test.factor), []).append(test)
+    sizes = [test.n_robots for test in next(iter(tests.values()))]
+    head = ("policy", "mode", *(f"N = {n}" for n in sizes), f"N = {sizes[-1]} less N = {sizes[0]}")
+    body = [
+        (
+            f"`{policy}`",
+            mode,
+            *map(with_sign, own),
+            wording.bracketed(difference((found, own[-1]), (found, own[0])), 3),
+        )
+        for (policy, mode), own in tests.items()
+    ]
+    return table(head, body)
+
+
+def performances_by_size(found: StudyResults) -> str:
+    """Return P, P for each robot, and S of every policy against N."""
+    cells: dict[str, list[Row]] = {}
+    for cell in rows_of(found.performance):
+        if cell.kind == "size":
+            cells.setdefault(cell.policy, []).append(cell)
+    sizes = [cell.n_robots for cell in next(iter(cells.values()))]
+    body = []
+    for policy, own in cells.items():
+        body.append((f"P, `{policy}`", *map(wording.mean_p, own)))
+        body.append((f"P / N, `{policy}`", *(f"{c.mean / c.n_robots:.2f}" for c in own)))
+        steps = [
+            with_sign(test)
+            for test in rows_of(found.indicators)
+            if (test.policy, test.indicator) == (policy, "S")
+        ]
+        body.append((f"S up to this N, `{policy}`", "", *steps))
+    return table(("", *(f"N = {n}" for n in sizes)), body)
+
+
+# -- wear and repair ----------------------------------------------------------------------------
+
+REPAIRED_AT = 200.0  # [s]: failed at 100 s, for 100 s
+
+
+def repairs(found: StudyResults) -> str:
+    """Return what a repair brings, and whether anything of the fault is left after it."""
+    tests = {
+        (test.policy, test.factor, test.table): test
+        for test in rows_of(found.indicators)
+        if test.onset
+    }
+    body = []
+    for (policy, mode, where), repaired in tests.items():
+        if not where.startswith("Repaired"):
+            continue
+        broken = tests[policy, mode, "Not repaired"]
+        p = [_by_seed(found, test) for test in (broken, repaired)]
+        gain = spi.relative_change(*p)
+        after = [deliveries_after(found, test.compared.changed) for test in (broken, repaired)]
+        whole = deliveries_after(found, repaired.compared.original)
+        left = [spi.relative_change(whole, counts) for counts in after]
+        back = spi.equivalence(whole, after[1], margin=found.plan.specification.margin)
+        body.append(
+            (
+                f"`{policy}`",
+                mode,
+                with_sign(broken),
+                with_sign(repaired),
+                _share(gain),
+                *map(_share, left),
+                back.verdict,
+            )
+        )
+    head = (
+        "policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P",
+        "after 200 s, not repaired", "after 200 s, repaired", "all back",
+    )  # fmt: skip
+    return table(head, body)
+
+
+def _by_seed(found: StudyResults, test: Row) -> NDArray[np.float64]:
+    counts: NDArray[np.float64] = found.by_arm[
+        test.policy, test.table, test.compared.changed
+    ].by_seed
+    return counts
+
+
+def deliveries_after(found: StudyResults, arm: object) -> NDArray[np.float64]:
+    """Return the deliveries of every seed after the repair, shape (n_seeds,)."""
+    times = found.times_of(arm)  # type: ignore[arg-type]
+    assert times is not None  # the study has been played
+    return np.array([np.count_nonzero(run > REPAIRED_AT) for run in times], dtype=np.float64)
+
+
+def _share(change: Estimate) -> str:
+    """Return a relative change in percent."""
+    return wording.bracketed(
+        Interval(*(100 * (x or 0.0) for x in (change.value, change.low, change.high))), 1
+    )
+
+
+def wear(found: StudyResults) -> str:
+    """Return R of wearing motors beside motors that are slow from the start."""
+    rows: dict[str, dict[str, str]] = {}
+    columns: list[str] = []
+    for test in rows_of(found.indicators):
+        if test.table == "Wear":
+            column = f"`{test.policy}`"
+            columns += [] if column in columns else [column, f"P, {column}"]
+            row = rows.setdefault(test.comparison, {})
+            row[column] = with_sign(test)
+            row[f"P, {column}"] = f"{100 * test.change:.1f} %"
+    heads = [c if not c.startswith("P") else f"change of {c}" for c in columns]
+    body = [(label, *(row[column] for column in columns)) for label, row in rows.items()]
+    return table(("R", *heads), body)
+
+
+# -- mixed swarms -------------------------------------------------------------------------------
+
+
+def shares(found: StudyResults) -> str:
+    """Return P and R by share, the step from share to share, and what the mix adds to its parts."""
+    policies = judged_policies(found)
+    p = {
+        cell.policy: cell for cell in rows_of(found.performance) if cell.arm.setting.name == "none"
+    }
+    tests = {(test.policy, test.comparison): test for test in rows_of(found.indicators)}
+    asked = list(dict.fromkeys(comparison for _, comparison in tests))
+    first, last = (p[policies[place]].by_seed for place in (0, -1))
+    steps = [
+        spi.relative_change(p[before].by_seed, p[after].by_seed)
+        for before, after in itertools.pairwise(policies)
+    ]
+    verdicts = spi.adjust(steps)
+    body = []
+    for place, policy in enumerate(policies):
+        part = place / (len(policies) - 1)
+        step, more = "", ""
+        if place:
+            step = f"{_share(steps[place - 1])} {SIGNS[verdicts[place - 1]].mark}"
+        if 0 < part < 1:
+            straight = (1 - part) * first + part * last
+            more = wording.bracketed(t_interval(p[policy].by_seed - straight), 1)
+        body.append(
+            (
+                f"`{policy}`",
+                wording.mean_p(p[policy]),
+                step,
+                more,
+                *(with_sign(tests[policy, comparison]) for comparison in asked),
+            )
+        )
+    head = ("", "P", "step [%]", "P less the straight line", *(f"R, {one}" for one in asked))
+    return table(head, body)
+
+
+# -- two studies of the same questions ----------------------------------------------------------
+
+
+def beside_another_world(found: StudyResults, ideal: StudyResults) -> str:
+    """Return what each policy loses from one study's world to the other's, paired by seed."""
+    body = list(_lost(found, ideal))
+    return table(("policy", "", "ideal", "realistic", "realistic less ideal"), body)
+
+
+def _lost(found: StudyResults, ideal: StudyResults) -> Iterator[tuple[str, ...]]:
+    before = {
+        (cell.policy, cell.arm.setting): cell
+        for cell in rows_of(ideal.performance)
+        if cell.kind == "size"
+    }
+    for cell in rows_of(found.performance):
+        known = before.get((cell.policy, cell.arm.setting))
+        if known is not None:
+            change = spi.relative_change(known.by_seed, cell.by_seed)
+            means = wording.mean_p(known), wording.mean_p(cell)
+            yield f"`{cell.policy}`", f"P, {cell.cell}", *means, f"{_share(change)} %"
+    asked = {(test.policy, test.compared.question): test for test in rows_of(ideal.indicators)}
+    for test in rows_of(found.indicators):
+        same = asked.get((test.policy, test.compared.question))
+        if same is not None and test.indicator == "R":
+            less = difference((found, test), (ideal, same))
+            label = f"{test.indicator}, {test.comparison}"
+            values = with_sign(same), with_sign(test)
+            yield f"`{test.policy}`", label, *values, wording.bracketed(less, 3)

@@ -1,0 +1,80 @@
+"""The studies of the field's questions, and the pages that their results are written into."""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env.report import wording
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
+
+ROOT = Path(__file__).parents[1]
+FILES = sorted((ROOT / "examples" / "questions").glob("*.toml"))
+VARIED = ("sizes", "faults", "parameters")
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The script `docs/play_questions.py`."""
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    return importlib.import_module("play_questions")
+
+
+def in_small(name: str, out: Path) -> Study:
+    """The same questions over two seeds of a short run, of policies that soon deliver."""
+    asked = Study.from_file(ROOT / "examples" / "questions" / f"{name}.toml").specification
+    late = any(onset for part in asked.faults for onset in part.onsets)
+    return Study(
+        out=out / name,
+        policies=["homing"] if late else ["homing", "homing=20,swarm-dt=5"],
+        seeds=2,
+        scenario={**asked.scenario.model_dump(), "duration": 230.0 if late else 40.0},
+        indicators=asked.indicators,
+        **{part: [one.model_dump() for one in getattr(asked, part)] for part in VARIED},
+    )
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_seeds_are_clear_of_those_that_anything_was_fitted_on(file: Path) -> None:
+    plan = Study.from_file(file).plan()
+    assert min(plan.seeds) >= 20_000
+    assert max(plan.seeds) < FIRST_OF_TRAININGS
+    assert len(plan.seeds) >= 15
+    assert plan.conditions
+
+
+def test_every_question_has_a_page(script: Any) -> None:
+    assert sorted(script.QUESTIONS) == [file.stem for file in FILES]
+    for name in script.QUESTIONS:
+        page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+        assert f"`python docs/play_questions.py {name}`" in page
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_page_quotes_what_was_played(
+    file: Path, script: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib", reason="needs the extra study")
+    name = file.stem
+    (tmp_path / "media").mkdir()
+    page = tmp_path / f"{name}.md"
+    shutil.copy(ROOT / "docs" / page.name, page)
+    monkeypatch.setattr(script, "DOCS", tmp_path)
+    monkeypatch.setattr(script, "study", lambda asked: in_small(asked, tmp_path / "out"))
+    monkeypatch.setattr(importlib.import_module("play_tables"), "PROCESSES", 1)
+    script.main([name])
+    text = page.read_text(encoding="utf-8")
+    found = in_small(name, tmp_path / "out").findings()
+    for test in rows_of(found.indicators):
+        assert wording.ratio(test) in text, test.comparison
+    for cell in rows_of(found.performance):
+        if cell.kind == "size":
+            assert wording.mean_p(cell) in text
+    assert "<svg" in (tmp_path / "media" / f"{name}.svg").read_text(encoding="utf-8")
+    assert "## What this leans on" in text
