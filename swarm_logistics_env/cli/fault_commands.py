@@ -79,21 +79,37 @@ def blame_command(
     preset: PresetOption = "paper",
     file: ScenarioOption = None,
     changes: SetOption = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(help="Directory of a study: its scenario is played, its report tells it."),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Directory; results/blame-POLICY-FAULT if not given.")
+        Path | None, typer.Option(help="Directory; blame-POLICY-FAULT in --study or results.")
     ] = None,
     processes: ProcessesOption = None,
 ) -> None:
     """Tell which robots and which lost capabilities cost the deliveries that a fault costs."""
     import os
 
-    from swarm_logistics_env.fault_analysis.attribution_run import attribute_in, write_tables
+    from swarm_logistics_env.errors import SetupError
+    from swarm_logistics_env.fault_analysis.attribution_run import attribute_in, write_table
     from swarm_logistics_env.progress_bar import ProgressBar
+    from swarm_logistics_env.report.attributions import section_of
+    from swarm_logistics_env.report.drawing import images
+    from swarm_logistics_env.report.report_files import missing_packages
+    from swarm_logistics_env.scenario import Scenario
+    from swarm_logistics_env.studies import Study
 
     (chosen,) = faults_of([fault])
     chosen = chosen.replace(role=role)
-    place = out or Path("results") / f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    place = out or (study or Path("results")) / name
     scenario = scenario_of(preset, file, changes)
+    asked = Study.stored(study) if study else None
+    if asked:
+        if scenario != Scenario():
+            raise SetupError("--study has a scenario: should be without --set and the like")
+        scenario = asked.specification.scenario
     done = 0
     with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
 
@@ -115,7 +131,14 @@ def blame_command(
         except KeyboardInterrupt:
             _stopped(place)
     _show_blame(found, policy)
-    typer.echo(f"Written: {', '.join(map(str, write_tables(found, place)))}")
+    written = [write_table(found, policy, _in_words(chosen), place)]
+    if not missing_packages():
+        (figure,) = section_of(written[0]).figures
+        written.append(place / "attribution.png")
+        written[1].write_bytes(images(figure.draw, figure.height)[1])
+    typer.echo(f"Written: {', '.join(map(str, written))}")
+    if asked:
+        typer.echo(f"Report: {asked.report()[0]}")
 
 
 def _stopped(place: Path) -> None:

@@ -146,7 +146,9 @@ def stocking(world: Warehouse, before: Before) -> Earned:
         return None
     nearer = np.minimum(state.item_position[items, 0], edge)
     nearer -= np.minimum(before.item_x[items], edge)
-    return np.bincount(carriers[items], nearer, state.n_robots).astype(np.float64)
+    paid = np.zeros(state.n_robots)
+    np.add.at(paid, carriers[items], nearer)  # who lets go of one may lift another at once
+    return paid
 
 
 def carrying(world: Warehouse, before: Before) -> Earned:

@@ -18,6 +18,7 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
 
 from .answer import digest
+from .attributions import with_attributions
 from .document import Document, document
 from .drawing import INK, PAPER, images
 from .page_data import page_data
@@ -36,7 +37,7 @@ def write_report(
     Raises:
         StudyError: a file cannot be written.
     """
-    whole = whole or document(results)
+    whole = with_attributions(whole or document(results), directory)
     paths = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
     pictures, page = directory / "figures", directory / "report.html"
     try:
