@@ -82,8 +82,9 @@ def judgement(found: Found) -> str:
         f"Half {number}: {', '.join(str(CELLS[k]) for k in one.searched.cells)}."
         for number, one in enumerate(found.judged, start=1)
     ]
-    seeds = found.p_defaults.shape[1]
-    return "\n".join([table(head, rows), "", f"{seeds} fresh seeds.", "", *halves])
+    seeds = found.judged[0].p.shape[1]
+    text = f"{seeds} fresh seeds; difference: with its 95 % interval over the cells."
+    return "\n".join([table(head, rows), "", text, "", *halves])
 
 
 def _met(judged: Judged, p: Floats) -> str:
@@ -117,8 +118,9 @@ def constants(found: Found, told: Identified) -> str:
     of_defaults = errors(found.p_defaults.mean(axis=1), range(len(CELLS))).mean()
     text = (
         f"The model's best candidate is expected to have a loss of {told.loss:.3f} over all "
-        f"{len(CELLS)} cells, the defaults have {of_defaults:.3f}. Constants that are right would "
-        f"have {wording.bracketed(told.right, 3)} against tables of single runs."
+        f"{len(CELLS)} cells, the defaults have {of_defaults:.3f}. Constants that are right have a "
+        f"loss of {wording.bracketed(told.right, 3)} in simulated tables of single runs, and in "
+        f"95 % of them lie within {told.limit - told.loss:.3f} of the best candidate."
     )
     names = list(RANGES)
     pairs = [(abs(told.linked[a, b]), a, b) for a in range(len(names)) for b in range(a)]

@@ -63,12 +63,15 @@ class Budget(NamedTuple):
         first: candidates that are spread over the ranges, each with one seed.
         rounds: of each half: how many candidates stay, and how many seeds each has by then.
         fresh: seeds of the judgement.
+        reference: seeds of the defaults, the first `fresh` of them those of the judgement; they
+            tell how single runs spread.
         duration: of an episode [s].
     """
 
-    first: int = 48
-    rounds: tuple[tuple[int, int], ...] = ((6, 1), (3, 5))
-    fresh: int = 30
+    first: int = 46
+    rounds: tuple[tuple[int, int], ...] = ((4, 1), (2, 3))
+    fresh: int = 10
+    reference: int = 30
     duration: float = 500.0
 
 
@@ -273,7 +276,7 @@ class Found(NamedTuple):
         first: the candidates that are spread over the ranges.
         p_first: P of one run of each (n, cells).
         judged: of both halves.
-        p_defaults: P of the defaults on fresh seeds (cells, seeds).
+        p_defaults: P of the defaults on all fresh seeds (cells, seeds).
     """
 
     first: list[Candidate]
@@ -286,10 +289,16 @@ def play(players: Players, budget: Budget) -> Found:
     """Search on each half, and judge what was found and the defaults on the other one."""
     first, p_first = first_runs(players, budget)
     found = [search(players, budget, (first, p_first), cells) for cells in halves()]
-    fresh = range(FIRST_FRESH, FIRST_FRESH + budget.fresh)
-    p_defaults = players.played(defaults(), range(len(CELLS)), fresh)
+    seeds = range(FIRST_FRESH, FIRST_FRESH + budget.reference)
+    p_defaults = players.played(defaults(), range(len(CELLS)), seeds)
+    fresh = seeds[: budget.fresh]
     judged = tuple(
-        Judged(one, other, players.played(one.best, other, fresh), p_defaults[list(other)])
+        Judged(
+            one,
+            other,
+            players.played(one.best, other, fresh),
+            p_defaults[list(other), : len(fresh)],
+        )
         for one, other in zip(found, reversed(halves()))
     )
     return Found(first, p_first, judged, p_defaults)

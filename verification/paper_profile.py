@@ -104,6 +104,7 @@ def identify(model: Model, runs: Floats) -> Identified:
         table = np.maximum(means[truth] * drawn[:, 0], LEAST)
         lost = np.abs(np.log(means / table)).mean(axis=1)
         right.append(float(lost[truth]))
+        lost[truth] = np.inf  # constants that are right are no candidate themselves
         joint.append(right[-1] - float(lost.min()))
         profiles = _lowest(lost, bins)
         above.append(profiles[np.arange(len(RANGES)), bins[truth]] - lost.min())

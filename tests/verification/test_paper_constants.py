@@ -34,7 +34,7 @@ from verification.paper_model import Model, fitted
 from verification.paper_profile import identify
 
 NAMES = list(RANGES)
-TINY = Budget(first=8, rounds=((2, 1), (1, 2)), fresh=2, duration=2.0)
+TINY = Budget(first=8, rounds=((2, 1), (1, 2)), fresh=2, reference=3, duration=2.0)
 
 
 def test_each_half_has_its_share_of_every_table_and_mode() -> None:
