@@ -35,7 +35,7 @@ def study(name: str, out: Path = OUT / "questions") -> Study:
 
 def policies_compared(found: StudyResults) -> Answer:
     """Answer with all policies side by side, and the report's figure of R."""
-    blocks = {"answer": tables.side_by_side(found), "count": tables.better_or_worse(found)}
+    blocks = {"answer": tables.side_by_side(found), "differences": tables.differences(found)}
     figure = next(f for f in document(found).figures() if f.name.startswith("R-Two-robots"))
     return blocks, figure.draw, figure.height
 
@@ -44,7 +44,7 @@ def larger_swarms(found: StudyResults) -> Answer:
     """Answer with P and R against N."""
     blocks = {
         "performance": tables.performances_by_size(found),
-        "robustness": f"{tables.by_size(found)}\n\n{tables.over(found).capitalize()}. [95 %]; the "
+        "robustness": f"{tables.by_size(found)}\n\n{tables.over(found)}. [95 %]; the "
         f"last column is paired by seed and unadjusted. {tables.LEGEND}.",
     }
     rows = [test for test in rows_of(found.indicators) if test.indicator == "R"]
@@ -77,7 +77,7 @@ def wear_and_repair(found: StudyResults) -> Answer:
     """Answer with what wear costs and what a repair brings, drawn over time for FM4."""
     blocks = {
         "wear": tables.wear(found),
-        "repair": f"{tables.repairs(found)}\n\n{tables.over(found).capitalize()}. [95 %], the two "
+        "repair": f"{tables.repairs(found)}\n\n{tables.over(found)}. [95 %], the two "
         f"columns after 200 s in percent of the deliveries without a fault. {tables.LEGEND}.",
     }
     panels = {}
@@ -96,7 +96,7 @@ def wear_and_repair(found: StudyResults) -> Answer:
 def mixed_swarms(found: StudyResults) -> Answer:
     """Answer with P and R against the share."""
     blocks = {
-        "shares": f"{tables.shares(found)}\n\n{tables.over(found).capitalize()}. [95 %]. "
+        "shares": f"{tables.shares(found)}\n\n{tables.over(found)}. [95 %]. "
         f"{tables.LEGEND}; the steps are one family, straight lines are unadjusted."
     }
     policies = list(dict.fromkeys(found.indicators["policy"]))
@@ -131,6 +131,7 @@ def realistic_robots(found: StudyResults) -> Answer:
 
 QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
     "central_or_swarm": policies_compared,
+    "mixed_swarms": mixed_swarms,
 }
 
 

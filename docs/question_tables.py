@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,60 +63,58 @@ def difference(one: Judged, other: Judged) -> Interval:
 
 
 def side_by_side(found: StudyResults) -> str:
-    """Return P and the indicators of every policy, and how they differ from the first one's."""
+    """Return P and the indicators of every policy, a column a policy."""
+    rows: dict[str, dict[str, str]] = {}
+    for label, cell, _ in performances(found):
+        rows.setdefault(label, {})[cell.policy] = wording.mean_p(cell)
+    for asked in indicators_against_baseline(found):
+        label = f"{asked.test.indicator}, {asked.test.comparison}"
+        rows[label] = {policy: with_sign(own) for policy, own in asked.tests.items()}
+    return f"{_columns(rows, judged_policies(found))}\n\n{over(found)}. [95 %]; {LEGEND}."
+
+
+def differences(found: StudyResults) -> str:
+    """Return how P and the indicators of every other policy differ from the first one's."""
     baseline, *others = judged_policies(found)
     rows: dict[str, dict[str, str]] = {}
-    labels: dict[str, str] = {}  # of conditions, each of which may stand in several tables
-    cells = [one for own in cells_against_baseline(found).values() for one in own]
-    for one in sorted(cells, key=lambda one: one.cell.kind != "size"):
-        setting, condition = one.cell.arm.setting, one.cell.arm.condition
-        if setting.kind == "fault" and setting.value:
-            continue
-        row = rows.setdefault(labels.setdefault(condition.key, f"P, {setting}"), {})
-        row[one.cell.policy] = wording.mean_p(one.cell)
-        row[f"{one.cell.policy} less"] = wording.bracketed(one.difference, 1)
+    for label, cell, less in performances(found):
+        rows.setdefault(label, {})[cell.policy] = wording.bracketed(less, 1)
     for asked in indicators_against_baseline(found):
-        test = asked.test
-        row = rows.setdefault(f"{test.indicator}, {test.comparison}", {})
-        row |= {policy: with_sign(own) for policy, own in asked.tests.items()}
-        for policy, difference in asked.differences.items():
-            row[f"{policy} less"] = wording.bracketed(difference, 3)
-    head = ["", f"`{baseline}`"]
-    columns = [baseline]
-    for policy in others:
-        head += [f"`{policy}`", f"`{policy}` less `{baseline}`"]
-        columns += [policy, f"{policy} less"]
-    body = [(label, *(row.get(column, "") for column in columns)) for label, row in rows.items()]
+        label = f"{asked.test.indicator}, {asked.test.comparison}"
+        rows[label] = {
+            policy: f"{wording.bracketed(less, 3)} {_side(less)}"
+            for policy, less in asked.differences.items()
+        }
+    heads = [f"`{policy}` less `{baseline}`" for policy in others]
     return (
-        f"{table(tuple(head), body)}\n\n{over(found).capitalize()}. [95 %]; differences are paired "
-        f"by seed and unadjusted. {LEGEND}."
+        f"{_columns(rows, others, heads)}\n\n[95 %], paired by seed, unadjusted. An indicator is "
+        "higher or lower if its interval is clear of 0."
     )
 
 
-def better_or_worse(found: StudyResults) -> str:
-    """Return for how many questions each indicator of a policy is clear of the first one's."""
-    baseline, *others = judged_policies(found)
-    counts = {policy: dict[str, Counter[str]]() for policy in others}
-    for asked in indicators_against_baseline(found):
-        for policy, difference in asked.differences.items():
-            counted = counts[policy].setdefault(asked.test.indicator, Counter())
-            counted[_side(difference)] += 1
-    symbols = list(dict.fromkeys(symbol for one in counts.values() for symbol in one))
-    body = [
-        (f"`{policy}`", *(_tally(own.get(symbol, Counter())) for symbol in symbols))
-        for policy, own in counts.items()
-    ]
-    return table(("than " + f"`{baseline}`", *symbols), body)
+def performances(found: StudyResults) -> Iterator[tuple[str, Row, Interval | None]]:
+    """Yield label, row and difference of P, each condition once and those with faults not."""
+    labels: dict[str, str] = {}
+    cells = [one for own in cells_against_baseline(found).values() for one in own]
+    for one in sorted(cells, key=lambda one: one.cell.kind != "size"):
+        setting, key = one.cell.arm.setting, one.cell.arm.condition.key
+        if (setting.kind == "fault" and setting.value) or key in labels:
+            continue
+        labels[key] = f"P, {setting}"
+        yield labels[key], one.cell, one.difference
+
+
+def _columns(
+    rows: Mapping[str, Mapping[str, str]], policies: Sequence[str], heads: Sequence[str] = ()
+) -> str:
+    body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
+    return table(("", *(heads or [f"`{policy}`" for policy in policies])), body)
 
 
 def _side(difference: Interval | None) -> str:
     if difference is None or difference.low is None or difference.high is None:
         return "open"
     return "higher" if difference.low > 0 else "lower" if difference.high < 0 else "open"
-
-
-def _tally(counted: Counter[str]) -> str:
-    return ", ".join(f"{counted[side]} {side}" for side in ("higher", "lower", "open"))
 
 
 # -- larger swarms ------------------------------------------------------------------------------
