@@ -8,14 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.options import (
-    PresetOption,
-    ScenarioOption,
-    SetOption,
-    faults_of,
-    scenario_of,
-)
-from swarm_logistics_env.cli.study_commands import ProcessesOption
+from .options import PresetOption, ScenarioOption, SetOption, faults_of, scenario_of
+from .study_commands import ProcessesOption
 
 if TYPE_CHECKING:
     from swarm_logistics_env.fault_analysis.attack import AttackResult
@@ -155,7 +149,7 @@ def _stopped(place: Path) -> None:
 
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show_table
+    from .terminal_tables import show_table
 
     rows = [
         (
@@ -180,7 +174,7 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
 
 
 def _show_blame(found: Attribution, policy: str) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show_table
+    from .terminal_tables import show_table
 
     def show_shares(title: str, shares: tuple[Share, ...], *lines: str) -> None:
         rows = [

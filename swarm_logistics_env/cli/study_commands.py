@@ -61,9 +61,10 @@ def group() -> None:
 @study.command("list")
 def list_command() -> None:
     """List the studies that come with the package."""
-    from swarm_logistics_env.cli.terminal_tables import show_table
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.presets import PRESETS
+
+    from .terminal_tables import show_table
 
     rows = []
     for name in PRESETS:
@@ -84,8 +85,9 @@ def plan_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
-    from swarm_logistics_env.cli.terminal_tables import show_table
     from swarm_logistics_env.studies.engines import expected_seconds
+
+    from .terminal_tables import show_table
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     seconds = expected_seconds(plan)
@@ -293,12 +295,13 @@ def show_report(
     results: StudyResults, whole: Document, out: Path | None, *, full: bool = False
 ) -> None:
     """Write a study's report into a directory, and print the answer; the tables too if `full`."""
-    from swarm_logistics_env.cli.terminal_tables import show, show_digest
     from swarm_logistics_env.report.report_files import (
         how_to_get_figures,
         missing_packages,
         write_report,
     )
+
+    from .terminal_tables import show, show_digest
 
     for section in whole.summary if full else ():
         show(section)

@@ -101,7 +101,7 @@ def _show_search(asked: Tuning, trials: list[Trial], path: Path) -> None:
 
 
 def _show_trials(what: str, objectives: tuple[str, ...], trials: list[Trial], *lines: str) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show_table
+    from .terminal_tables import show_table
 
     names = list(trials[0].parameters)
     shown = [trial for place, trial in enumerate(trials) if trial.is_best or place == 0]
@@ -118,9 +118,10 @@ def _show_trials(what: str, objectives: tuple[str, ...], trials: list[Trial], *l
 
 
 def _show_training(path: Path) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show_table
     from swarm_logistics_env.policies import read_card
     from swarm_logistics_env.train.curve import BEST, PICTURE
+
+    from .terminal_tables import show_table
 
     card = read_card(path)
     rows = tuple(

@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.document import Chapter, Document
-from swarm_logistics_env.report.drawing import COLOURS, INK
-from swarm_logistics_env.report.figures import Figure
-from swarm_logistics_env.report.result_tables import Column, Section, table_section
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+
+from . import wording
+from .document import Chapter, Document
+from .drawing import COLOURS, INK
+from .figures import Figure
+from .result_tables import Column, Section, table_section
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,31 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.answer import Answer, answer
-from swarm_logistics_env.report.figures import Figure, indicator_figures, scaling_figure
-from swarm_logistics_env.report.further_measures import (
-    budget_sections,
-    load_sections,
-    look_sections,
-    size_sections,
-)
-from swarm_logistics_env.report.policies_compared import policy_sections
-from swarm_logistics_env.report.resilience_sections import resilience_sections
-from swarm_logistics_env.report.result_tables import (
-    Column,
-    Section,
-    table_section,
-    tables,
-    warnings,
-)
-from swarm_logistics_env.report.setup_sheet import glossary, methods, setup_sheet
-from swarm_logistics_env.report.wording import sentence
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.studies.few_real_runs import narrowed, replays
 from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import size_series
+
+from . import wording
+from .answer import Answer, answer
+from .figures import Figure, indicator_figures, scaling_figure
+from .further_measures import budget_sections, load_sections, look_sections, size_sections
+from .policies_compared import policy_sections
+from .resilience_sections import resilience_sections
+from .result_tables import Column, Section, table_section, tables, warnings
+from .setup_sheet import glossary, methods, setup_sheet
+from .wording import sentence
 
 
 @dataclass(frozen=True)

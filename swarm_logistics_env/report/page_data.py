@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import SwarmLogisticsError
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.verdict_matrix import VerdictMatrix
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.tasks.replay import Recording, can_be_recorded, record_run
+from swarm_logistics_env.tasks.policy_choice import runs_code
+from swarm_logistics_env.tasks.replay import Recording, record_run
 from swarm_logistics_env.tasks.task_choice import DEFAULT
+
+from . import wording
+from .verdict_matrix import VerdictMatrix
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -267,7 +269,8 @@ def _recorded(results: StudyResults, arm: Arm, seed: int) -> dict[str, Any] | No
     source = condition.policy.source
     if condition.task.name != DEFAULT or outcome is None or outcome.digest is None:
         return None
-    if results.plan.code != condition.task.code() or not can_be_recorded(source):
+    # A store's text must run no code.
+    if results.plan.code != condition.task.code() or runs_code(source):
         return None
     run = condition.run(results.plan.code, seed)
     try:

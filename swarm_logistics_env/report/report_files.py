@@ -13,16 +13,17 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.report.answer import digest
-from swarm_logistics_env.report.attributions import with_attributions
-from swarm_logistics_env.report.document import Document, document
-from swarm_logistics_env.report.drawing import INK, PAPER, images
-from swarm_logistics_env.report.page_data import page_data
-from swarm_logistics_env.report.result_tables import Section
-from swarm_logistics_env.report.verdict_matrix import matrix_lines
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
+
+from .answer import digest
+from .attributions import with_attributions
+from .document import Document, document
+from .drawing import INK, PAPER, images
+from .page_data import page_data
+from .result_tables import Section
+from .verdict_matrix import matrix_lines
 
 WIDTH = 100  # of the answer [characters]
 

@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.figures import Figure
-from swarm_logistics_env.report.wording import NOTHING, Sentence
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.policy_comparison import Agreement, agreements
 from swarm_logistics_env.studies.results import StudyResults
+
+from . import wording
+from .figures import Figure
+from .wording import NOTHING, Sentence
 
 if TYPE_CHECKING:
     import pandas as pd

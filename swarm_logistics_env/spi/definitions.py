@@ -11,13 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 from .estimate import Estimate
-from .indicators import (
-    adaptability,
-    fault_tolerance,
-    relative_change,
-    robustness,
-    scalability,
-)
+from .indicators import adaptability, fault_tolerance, relative_change, robustness, scalability
 
 Factor = Literal["size", "fault", "parameter", "policy"]
 

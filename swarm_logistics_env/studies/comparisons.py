@@ -13,7 +13,8 @@ from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
 from swarm_logistics_env.spi.equivalence import Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.runs import Condition
+
+from .runs import Condition
 
 Performance = Callable[["Arm"], NDArray[np.float64]]
 
@@ -51,26 +52,6 @@ class Arm:
 
     setting: Setting
     condition: Condition
-
-
-@dataclass(frozen=True)
-class NullPair:
-    """Two arms without fault that share worlds, not behaviour: what chance alone makes of them.
-
-    Attributes:
-        table: heading of the report's table of the faults whose null this is.
-        original: the arm of P_o.
-        other: the same with other behaviour seeds.
-    """
-
-    table: str
-    original: Arm
-    other: Arm
-
-    @property
-    def policy(self) -> str:
-        """Label of the policy."""
-        return self.original.condition.policy.label
 
 
 class Question(NamedTuple):
@@ -240,7 +221,7 @@ def load_reference(name: str | None) -> Reference | None:
     """
     if name is None:
         return None
-    from swarm_logistics_env.studies.presets import PAPER
+    from .presets import PAPER
 
     known = {"paper": PAPER}
     if name not in known:

@@ -22,9 +22,10 @@ from multiprocessing.connection import Connection
 from unittest.mock import patch
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import Condition, Run
 from swarm_logistics_env.tasks.task import Outcome
+
+from .plan import Plan
+from .runs import Condition, Run
 
 # Simulated seconds that are played to know how long a study takes.
 PILOT = 3.0
@@ -63,7 +64,7 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
         return serial
     if name == "process":
         return ProcessPool(processes or os.cpu_count() or 1)
-    from swarm_logistics_env.studies.ray_cluster import Cluster
+    from .ray_cluster import Cluster
 
     if address is not None and processes is not None:
         raise StudyError("engine ray: a cluster that runs already has its own number of cores")

@@ -13,8 +13,9 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.comparisons import Arm, Comparison
-from swarm_logistics_env.studies.results import StudyResults
+
+from .comparisons import Arm, Comparison
+from .results import StudyResults
 
 
 class Narrowed(NamedTuple):

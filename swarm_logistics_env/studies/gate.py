@@ -25,11 +25,12 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
-from swarm_logistics_env.studies.judged_comparisons import estimate_of, same_runs
-from swarm_logistics_env.studies.matching import Match, match
-from swarm_logistics_env.studies.performance_table import played, rows_of
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.runs import seeds_in_words
+
+from .judged_comparisons import estimate_of, same_runs
+from .matching import Match, match
+from .performance_table import played, rows_of
+from .results import StudyResults
+from .runs import seeds_in_words
 
 SUBJECTS = "|".join(DEFINITIONS)
 _GATE = re.compile(

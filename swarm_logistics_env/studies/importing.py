@@ -14,15 +14,15 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
-from swarm_logistics_env.studies import comparisons, metadata
-from swarm_logistics_env.studies.comparisons import Arm, Comparison, NullPair, Setting
-from swarm_logistics_env.studies.metadata import Declaration, Origin
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
-from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.studies.store import new_store, refuse_study_in
 from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, RecordedScenario
 from swarm_logistics_env.tasks.task import Outcome
+
+from .comparisons import OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .metadata import Declaration, Origin, rows_of
+from .plan import Plan
+from .runs import Condition, StudiedPolicy
+from .specification import Specification
+from .store import new_store, refuse_study_in
 
 
 def import_results(
@@ -82,7 +82,7 @@ def import_results(
                 run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
                 store.add(run, _outcome(run.key, row))
         declared = Declaration.model_validate(specification)
-        notes = metadata.rows_of(specification, RECORDED.code(), {}, declared)
+        notes = rows_of(specification, RECORDED.code(), {}, declared)
         store.note({**notes, "imported": origin.model_dump_json()})
     return len(trials.rows)
 
@@ -93,13 +93,18 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     Raises:
         StudyError: something has nothing that it can be relative to.
     """
-    found = [item for title, arms in _tables(origin) for item in _compared(title, arms)]
+    tables = list(_tables(origin))
     return Plan(
         specification,
-        tuple(item for item in found if isinstance(item, Comparison)),
+        tuple(comparison for title, arms in tables for comparison in _compared(title, arms)),
         RECORDED.code(),
         {},
-        null_pairs=tuple(item for item in found if isinstance(item, NullPair)),
+        nulls={
+            (arm.condition.policy.label, title): arm
+            for title, arms in tables
+            for arm in arms[1:]
+            if arm.setting == OTHER_BEHAVIOUR
+        },
         paired=origin.paired,
         imported_from=origin.file,
         imported_seeds=origin.seeds,
@@ -107,7 +112,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     )
 
 
-def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison | NullPair]:
+def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
     original, *others = arms
     kind = original.setting.kind
     if kind == "size":
@@ -118,8 +123,6 @@ def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison | NullPair
     by_setting = {arm.setting: arm for arm in arms}
     for arm in others:
         setting = arm.setting
-        if setting == comparisons.OTHER_BEHAVIOUR:
-            yield NullPair(title, original, arm)
         if kind == "fault" and setting.name in (REPEATED, RECORDED.removed):
             continue
         removed = by_setting.get(setting._replace(name=str(RECORDED.removed)))

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.comparisons import Comparison, Reference
-from swarm_logistics_env.studies.judged_comparisons import Judged
-from swarm_logistics_env.studies.performance_table import Columns, table_of
+
+from .comparisons import Comparison, Reference
+from .judged_comparisons import Judged
+from .performance_table import Columns, table_of
 
 if TYPE_CHECKING:
     import pandas as pd

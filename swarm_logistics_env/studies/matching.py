@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from swarm_logistics_env.studies.performance_table import Row, rows_of
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.runs import seeds_in_words
+from .performance_table import Row, rows_of
+from .results import StudyResults
+from .runs import seeds_in_words
 
 _Content = tuple[object, ...]  # everything about a condition but its policy
 _Judged = dict[str, dict[_Content, Row]]  # keyed by the policy's label

@@ -12,12 +12,13 @@ from pydantic_core import to_json
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.spi.trials import Trial
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import seeds_in_words
-from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import NAMES, refuse_untrusted
+
+from .plan import Plan
+from .runs import seeds_in_words
+from .specification import Specification
+from .store import FILE_NAME, Store, new_store, refuse_study_in
 
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]

@@ -3,30 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.definitions import DEFINITIONS, comparing
-from swarm_logistics_env.studies.comparisons import (
-    NO_FAULT,
-    OTHER_BEHAVIOUR,
-    Arm,
-    Comparison,
-    NullPair,
-    Setting,
-)
-from swarm_logistics_env.studies.runs import Condition, Run, StudiedPolicy
-from swarm_logistics_env.studies.specification import (
-    Ablation,
-    Factor,
-    Faults,
-    Parameter,
-    Sizes,
-    Specification,
-)
+from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
+
+from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .runs import Condition, Run, StudiedPolicy
+from .specification import Ablation, Factor, Faults, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -40,7 +27,9 @@ class Plan:
         comparisons: all comparisons, in the order of the report.
         code: the version of the code that decides the result of a run.
         identities: the identities of the policies, by their names in the specification.
-        null_pairs: pairs without fault, one for each policy whose faults begin during the run.
+        nulls: by label of the policy and table, an arm without fault that shares the worlds of the
+            original one, not its behaviour: what chance alone makes of the two. For faults that
+            begin during the run.
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.
         imported_seeds: those that the file names; empty: it names none, or results are run here.
@@ -51,7 +40,7 @@ class Plan:
     comparisons: tuple[Comparison, ...]
     code: str
     identities: Mapping[str, str]
-    null_pairs: tuple[NullPair, ...] = ()
+    nulls: Mapping[tuple[str, str], Arm] = field(default_factory=dict)
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
@@ -70,9 +59,7 @@ class Plan:
             for comparison in self.comparisons
             for arm in comparison.arms
         ]
-        cells += [
-            (null_pair.policy, null_pair.table, null_pair.other) for null_pair in self.null_pairs
-        ]
+        cells += [(policy, table, arm) for (policy, table), arm in self.nulls.items()]
         return tuple(dict.fromkeys(cells))
 
     @cached_property
@@ -128,29 +115,28 @@ def make_plan(
         known[part] = policy.identity
         return policy
 
-    found = list(_asked(specification, policy_of))
     comparisons = tuple(
-        item
-        for item in found
-        if isinstance(item, Comparison) and item.indicator in specification.indicators
+        comparison
+        for comparison in _asked(specification, policy_of)
+        if comparison.indicator in specification.indicators
     )
     if not comparisons:
         raise StudyError(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
-    # Only comparisons with the robots removed have a self-repair time, which needs the null pair.
-    null_pairs = [item for item in found if isinstance(item, NullPair)]
-    if not any(DEFINITIONS[symbol].needs_removed for symbol in specification.indicators):
-        null_pairs = []
-    return Plan(
-        specification, comparisons, code or specification.played.code(), known, tuple(null_pairs)
-    )
+    # Only comparisons with the robots removed have a self-repair time, which needs the null.
+    nulls = {
+        (one.policy, one.table): Arm(OTHER_BEHAVIOUR, replace(one.original.condition, behaviour=1))
+        for one in comparisons
+        if one.removed and one.changed.setting.onset
+    }
+    return Plan(specification, comparisons, code or specification.played.code(), known, nulls)
 
 
 def _asked(
     specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
-) -> Iterator[Comparison | NullPair]:
+) -> Iterator[Comparison]:
     lesser = [
         (ablation, policy_of(f"ablation {number}", ablation.policy))
         for number, ablation in enumerate(specification.ablations, start=1)
@@ -199,8 +185,8 @@ def _scalability(asked: Specification, sizes: Sizes, policy: StudiedPolicy) -> I
 
 def _robustness(
     asked: Specification, faults: Faults, policy: StudiedPolicy
-) -> Iterator[Comparison | NullPair]:
-    """Yield the indicators of every mode, m and onset; the null pair where faults start late.
+) -> Iterator[Comparison]:
+    """Yield the indicators of every mode, m and onset.
 
     An indicator that needs robots removed is left out where the task cannot remove any.
     """
@@ -219,9 +205,6 @@ def _robustness(
                 f"{scenario.duration:g} s, or nothing fails"
             )
     original = Arm(NO_FAULT, Condition(policy, scenario, task=task))
-    if any(faults.onsets):
-        other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1, task=task))
-        yield NullPair(table, original, other)
 
     def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
         fault = task.fault(mode, m, onset, duration)

@@ -12,20 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.studies.comparisons import Arm, Reference, load_reference
-from swarm_logistics_env.studies.indicator_table import indicator_table
-from swarm_logistics_env.studies.judged_comparisons import (
-    CONFIDENCE,
-    CellKey,
-    Level,
-    judge_all,
-    level_at,
-)
-from swarm_logistics_env.studies.metadata import Declaration
-from swarm_logistics_env.studies.performance_table import Row, performance_table, rows_of
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.until_clear import standing
 from swarm_logistics_env.tasks.task import Outcome
+
+from .comparisons import Arm, Reference, load_reference
+from .indicator_table import indicator_table
+from .judged_comparisons import CONFIDENCE, CellKey, Level, judge_all, level_at
+from .metadata import Declaration
+from .performance_table import Row, performance_table, rows_of
+from .plan import Plan
+from .until_clear import standing
 
 if TYPE_CHECKING:
     import pandas as pd

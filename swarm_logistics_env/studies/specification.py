@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -21,15 +20,10 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import Record, read_toml
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.tasks.policy_choice import (
-    PolicySource,
-    policy_name,
-    runs_code,
-    told_apart,
-)
+from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, refuse_untrusted, task_of
 
@@ -281,15 +275,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
             it is unknown or cannot be.
     """
-    try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise StudyError(f"cannot read the study file {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = str(error).splitlines()[0]
-        raise StudyError(f"the study file {path} is not TOML: {reason}") from error
-    except RecursionError:
-        raise StudyError(f"the study file {path} is nested too deep") from None
+    fields = read_toml(path, "study file", StudyError)
     refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
     try:
         specification = Specification(**{"name": path.stem, **fields})

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.database import Database
-from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
+
+from .database import Database
+from .runs import Run
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,17 +12,18 @@ from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.studies.engines import Engine, engine_named
-from swarm_logistics_env.studies.importing import imported_plan
-from swarm_logistics_env.studies.metadata import Declaration, Metadata, of_existing, rows_of
-from swarm_logistics_env.studies.plan import Plan, make_plan
-from swarm_logistics_env.studies.presets import load_preset
-from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.runs import Run, Shard
-from swarm_logistics_env.studies.specification import Specification, read_study_file
-from swarm_logistics_env.studies.store import FILE_NAME, Store
-from swarm_logistics_env.studies.until_clear import standing
 from swarm_logistics_env.tasks.task import Task
+
+from .engines import Engine, engine_named
+from .importing import imported_plan
+from .metadata import Declaration, Metadata, of_existing, rows_of
+from .plan import Plan, make_plan
+from .presets import load_preset
+from .results import StudyResults, judge
+from .runs import Run, Shard
+from .specification import Specification, read_study_file
+from .store import FILE_NAME, Store
+from .until_clear import standing
 
 if TYPE_CHECKING:
     import pandas as pd

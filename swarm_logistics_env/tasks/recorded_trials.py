@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.tasks.task import Outcome, Playable
+
+from .task import Outcome, Playable
 
 
 class RecordedScenario(Record):

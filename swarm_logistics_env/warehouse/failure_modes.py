@@ -8,7 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 from swarm_logistics_env.errors import FaultError, suggest
-from swarm_logistics_env.warehouse.structs import LONGEST_RADIO_DELAY, Capabilities
+
+from .structs import LONGEST_RADIO_DELAY, Capabilities
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,10 @@ from swarm_logistics_env.errors import FaultError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
-from swarm_logistics_env.warehouse.failure_modes import (
-    FAILURE_MODES,
-    LOST_AS_A_WHOLE,
-    failure_mode,
-)
-from swarm_logistics_env.warehouse.roles import ROLES, robots_in_role
-from swarm_logistics_env.warehouse.state import WarehouseState
+
+from .failure_modes import FAILURE_MODES, LOST_AS_A_WHOLE, failure_mode
+from .roles import ROLES, robots_in_role
+from .state import WarehouseState
 
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
