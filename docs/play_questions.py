@@ -131,6 +131,8 @@ def realistic_robots(found: StudyResults) -> Answer:
 
 QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
     "central_or_swarm": policies_compared,
+    "larger_swarms": larger_swarms,
+    "wear_and_repair": wear_and_repair,
     "mixed_swarms": mixed_swarms,
 }
 
