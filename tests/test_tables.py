@@ -117,7 +117,7 @@ def test_the_blocks_quote_what_was_played(tables: Any, small: Path, tmp_path: Pa
     change = spi.relative_change(unbroken["homing"], unbroken["ppo-delivery"])
     assert f"`ppo-delivery` {abs(100 * change.value):.1f} %" in policies
     assert policies.rstrip().endswith("less." if change.value < 0 else "more.")
-    assert "Than the script `homing`" in policies
+    assert "Compared with the script `homing`" in policies
     # FM4 of swarm-dt comes from the study with more seeds, of the others from the first.
     row = next(line for line in policies.splitlines() if line.startswith("| R, FM4, m = 2"))
     values = {j.policy: j for j in rows_of(main.indicators) if j.indicator == "R"}

@@ -70,7 +70,7 @@ class Budget(NamedTuple):
 
     first: int = 46
     rounds: tuple[tuple[int, int], ...] = ((3, 1),)
-    fresh: int = 4
+    fresh: int = 20
     reference: int = 30
     duration: float = 500.0
 
