@@ -49,13 +49,13 @@ def suggest(name: str, known: Iterable[str]) -> str:
     """Return the end of an error message about an unknown `name`.
 
     "; did you mean 'x'?" where one of `known` is close to it; "; did you mean 'x' or 'y'?" where
-    one to four of them contain it, whatever its case; else the list of what is known.
+    one to five of them contain it, whatever its case; else the list of what is known.
     """
     names = sorted(known)
     meant = difflib.get_close_matches(name, names, n=1)
     if not meant and name:
         meant = [known for known in names if name.casefold() in known.casefold()]
-    if 1 <= len(meant) <= 4:
+    if 1 <= len(meant) <= 5:
         *others, last = map(repr, meant)
         return f"; did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
     return f"; known: {', '.join(names)}"

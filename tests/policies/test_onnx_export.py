@@ -56,7 +56,7 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
     network = trained.card.network.replace(exploration=0.0)
     policy = LearnedPolicy(trained.card.replace(network=network), trained.tensors)
     session = session_of(policy, tmp_path / "p.onnx")
-    scenario = Scenario(n_robots=25, duration=100.0)
+    scenario = Scenario(n_robots=25, duration=100.0, restock=True)
     world = Warehouse(scenario)
     rows = world.reset(3, [Fault("FM1", 2), Fault("motor_dead", 2, onset=50.0)])
     policy.configure(scenario)
