@@ -131,7 +131,7 @@ $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
 $(TASKS)/installed: EXTRAS := study,tasks
 $(TASKS)/installed: OTHERS := hypothesis pytest
 $(AGILERL)/installed: OTHERS := torch agilerl peft
-$(MINARI)/installed: OTHERS := "minari[create,hdf5]"
+$(MINARI)/installed: OTHERS := "minari[create,hdf5]" pillow
 $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit mpe2
 

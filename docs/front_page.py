@@ -113,8 +113,8 @@ def _learned(rows: Rows) -> Iterator[str]:
     best = max((name for name in p if name.startswith(_LEARNED)), key=lambda name: p[name].value)
     yield (
         f"**A learned swarm delivers {p[best].value / p[_REFERENCE].value:.1f} times as much**: "
-        f"25 robots with `{best}` bring {p[best].text} items in 500 s, the paper's Swarm D-T "
-        f"{p[_REFERENCE].text}."
+        f"25 robots with `{best}` bring {p[best].text} items in 500 s, where items come back; the "
+        f"paper's Swarm D-T brings {p[_REFERENCE].text}."
     )
 
 
@@ -125,10 +125,11 @@ def _faults(rows: Rows) -> Iterator[str]:
     best = {mode: max(row, key=lambda name: row[name].low) for mode, row in r.items()}
     mode = max(r, key=lambda mode: r[mode][best[mode]].value - r[mode][worst[mode]].value)
     lost, kept = worst[mode], best[mode]
+    bears = "withstands it" if r[mode][kept].low > 0.0 else "loses least"
     yield (
         f"**One collapses under a fault that another shrugs off**: with two of 25 robots in mode "
         f"{mode} ({_MODES[mode]}) `{lost}` delivers {100 * (_SHARE - r[mode][lost].value):.0f} % "
-        f"less (robustness R = {r[mode][lost].text}), while `{kept}` withstands it "
+        f"less (robustness R = {r[mode][lost].text}), while `{kept}` {bears} "
         f"({r[mode][kept].text})."
     )
     for other, row in r.items():
@@ -149,8 +150,11 @@ def _sizes(rows: Rows) -> Iterator[str]:
     most = max(s, key=lambda name: s[name].value)
     least = min(s, key=lambda name: s[name].value)
     less = "delivers less with them" if s[least].high < 0 else "gains least"
+    title = "Four times the robots do not deliver four times as much"
+    if max(one.high for one in s.values()) >= 1.0:
+        title = "More robots help some swarms more than others"
     yield (
-        f"**More robots are not more deliveries**: from 25 to 100, `{most}` scales best "
+        f"**{title}**: from 25 to 100, `{most}` scales best "
         f"(S = {s[most].text}), and `{least}` {less} ({s[least].text})."
     )
 
@@ -259,6 +263,7 @@ _PAGES = {
     "a recorded run": "docs/media/run.html",
     "the environment": "docs/environment.md",
     "results": "docs/results.md",
+    "questions of the field": "docs/questions.md",
     "indicators": "docs/indicators.md",
     "faults": "docs/faults.md",
     "studies": "docs/studies.md",
@@ -288,10 +293,12 @@ def pictures_and_links(address: str | None) -> dict[str, str]:
         "pages lie in `docs/` of the source distribution.\n\n"
     )
     film = "Two runs of one seed. Left: 25 robots. Right: five of them, marked 4, cannot deliver."
+    stock = "25 robots with ppo-delivery after 300 s: most items lie along the delivery area"
     picture = "A row a policy: P, S and R in four failure modes, each with its 95 % interval"
     links = "\n".join(f"[{name}]: {blob}{path}" for name, path in _PAGES.items())
     return {
         "film": f'<img align="right" width="390" src="{raw}docs/media/fm4.gif" alt="{film}">',
+        "stock": f'<img align="right" width="280" src="{raw}docs/media/stock.png" alt="{stock}">',
         "picture": f"![{picture}]({raw}docs/media/policies.svg)",
         "links": links if address else f"{note}{links}",
     }

@@ -21,16 +21,22 @@ from verification.browser import Browser
 
 MEDIA = Path(__file__).parent / "media"
 SIZE = 560  # px
+SMALL = Scenario(n_robots=16, warehouse_width=8.0, warehouse_height=6.0, n_items=30)
 
 
-def scene(seconds: float, faults: tuple[Fault, ...] = ()) -> NDArray[np.uint8]:
-    """Return a picture of Swarm D-T after some time."""
-    scenario = Scenario(n_robots=16, warehouse_width=8.0, warehouse_height=6.0, n_items=30)
+def scene(
+    seconds: float,
+    faults: tuple[Fault, ...] = (),
+    scenario: Scenario = SMALL,
+    name: str = "swarm-dt",
+    show_beams_of: int | None = 3,
+) -> NDArray[np.uint8]:
+    """Return a picture of a policy's swarm after some time."""
     world = Warehouse(scenario)
     observations = world.reset(seed=4, faults=faults)
-    policy = policies.load("swarm-dt")
+    policy = policies.load(name)
     start(policy, scenario, 4)
-    renderer = Renderer(scenario, "rgb_array", SIZE, trails=True, show_beams_of=3)
+    renderer = Renderer(scenario, "rgb_array", SIZE, trails=True, show_beams_of=show_beams_of)
     while world.state.time < seconds:
         observations = world.step(decide(policy, observations, world.state))
         picture = renderer.frame(world.state, scenario)
@@ -90,5 +96,7 @@ if __name__ == "__main__":
     MEDIA.mkdir(exist_ok=True)
     save(scene(30.0), "warehouse.png")
     save(scene(60.0, (Fault("FM1", 2), Fault("FM4", [0, 5]))), "faults.png")
+    learned = scene(300.0, scenario=Scenario(restock=True), name="ppo-delivery", show_beams_of=None)
+    save(learned, "stock.png")
     browser_view("watch.png")
     figures()

@@ -14,7 +14,9 @@ from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.wrappers import MotionFrame
 
-REWARDS = {"own_delivery": 1.0, "lift_requested": 0.5, "approach": 0.1, "contact": -0.05}
+REWARDS = {
+    "own_delivery": 1.0, "lift_requested": 0.5, "approach": 0.1, "stocking": 0.1, "contact": -0.05
+}  # fmt: skip
 SMALL: dict[str, Any] = {"warehouse_width": 6.0, "warehouse_height": 5.0, "delivery_width": 1.5}
 WORLDS, STEPS, EPOCHS, BATCH, DISCOUNT, TRACE, CLIP = 12, 128, 4, 480, 0.99, 0.95, 0.2
 

@@ -16,7 +16,9 @@ from torchrl.objectives import ClipPPOLoss, ValueEstimators
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
 from swarm_logistics_env.wrappers import MotionFrame
 
-REWARDS = {"own_delivery": 1.0, "lift_requested": 0.5, "approach": 0.1, "contact": -0.05}
+REWARDS = {
+    "own_delivery": 1.0, "lift_requested": 0.5, "approach": 0.1, "stocking": 0.1, "contact": -0.05
+}  # fmt: skip
 SMALL: dict[str, Any] = {"warehouse_width": 6.0, "warehouse_height": 5.0, "delivery_width": 1.5}
 N_ROBOTS, STEPS, EPOCHS, BATCH = 10, 2000, 4, 125
 

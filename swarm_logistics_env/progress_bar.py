@@ -109,7 +109,8 @@ class ProgressBar:
             return "just begun"
         shown = f"{rate:,.2f}" if rate < 10 else f"{rate:,.0f}"
         left = self._total - self._done
-        until_end = f", {clock(left / rate)} left" if left else ""
+        # A training ends with a whole round, so that more may be done than was to do.
+        until_end = f", {clock(left / rate)} left" if left > 0 else ""
         return f"{shown} {self._unit}/s{until_end}"
 
 

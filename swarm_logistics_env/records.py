@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -32,7 +35,7 @@ class Record(BaseModel):
 
     def replace(self, **fields: Any) -> Self:
         """Return a copy with `fields` changed, validated like a new record."""
-        return type(self)(**{**self._given(), **fields})
+        return type(self)(**{**dict(self), **fields})
 
     def to_json(self) -> str:
         """Return the record as JSON text; `from_json` reads it back unchanged."""
@@ -49,9 +52,6 @@ class Record(BaseModel):
             return cls.model_validate_json(text)
         except ValidationError as error:
             raise cls.error_type(cls._sentence(error)) from None
-
-    def _given(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in type(self).model_fields}
 
     @classmethod
     def _sentence(cls, error: ValidationError) -> str:
@@ -84,6 +84,31 @@ class Record(BaseModel):
         return f"{field} = {_short(problem['input'])}: {message}"
 
 
+def read_toml(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> dict[str, Any]:
+    """Return the table in a TOML file.
+
+    Args:
+        what: names it in errors, e.g. "study file".
+
+    Raises:
+        The `error_type`: the file cannot be read, or is not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise error_type(f"cannot read the {what} {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = str(error).splitlines()[0]
+        raise error_type(f"the {what} {path} is not TOML: {reason}") from error
+    except RecursionError:
+        raise error_type(f"the {what} {path} is nested too deep") from None
+
+
+def canonical_json(value: object) -> str:
+    """Return JSON in one form: equal values give equal texts."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"))
+
+
 def _in_plain_words(problem: dict[str, Any]) -> str:
     if problem["type"] == "tuple_type":
         return "should be a list"
@@ -94,6 +119,6 @@ def _in_plain_words(problem: dict[str, Any]) -> str:
     return message.replace("Input should", "should")
 
 
-def _short(value: object, limit: int = 80) -> str:
+def _short(value: object) -> str:
     text = repr(value)
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -110,7 +110,7 @@ def test_the_caption_of_the_front_page_tells_what_the_picture_shows() -> None:
     drawn = (DOCS / "pictures.py").read_text(encoding="utf-8")
     assert 'save(scene(30.0), "warehouse.png")' in drawn
     assert "n_robots=16" in drawn
-    assert "show_beams_of=3" in drawn
+    assert "show_beams_of: int | None = 3" in drawn
     assert "trails=True" in drawn
     caption = PAGES["index.md"].partition("media/warehouse.png")[2].partition("```")[0]
     for words in ("Sixteen robots", "thirty seconds", "crosshairs", "orange beams", "grey lines"):

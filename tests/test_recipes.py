@@ -252,8 +252,8 @@ def test_a_wrapper(copy: Copy) -> None:
     copy.write("wrappers/half_speed.py", WRAPPER)
     copy.insert(
         "wrappers/__init__.py",
-        "from swarm_logistics_env.wrappers.indicator_reward",
-        "from swarm_logistics_env.wrappers.half_speed import HalfSpeed",
+        "from .indicator_reward",
+        "from .half_speed import HalfSpeed",
     )
     copy.insert("wrappers/__init__.py", '    "IndicatorReward",', '    "HalfSpeed",')
     copy.run("-c", DRIVES)
@@ -262,7 +262,7 @@ def test_a_wrapper(copy: Copy) -> None:
 
 def test_a_failure_mode(copy: Copy) -> None:
     row = '    "weak": FailureMode("drives slowly and lifts nothing", speed=0.2, lifts=False),'
-    copy.insert("warehouse/faults.py", '    "dead": ', row)
+    copy.insert("warehouse/failure_modes.py", '    "dead": ', row)
     printed = copy.command("run", "--fault", "weak:2@1")
     assert "failed robots " in printed
     assert copy.changed == files_of("A failure mode")
@@ -315,7 +315,7 @@ def test_an_observation_column(copy: Copy) -> None:
 
 def test_an_indicator(copy: Copy) -> None:
     copy.insert("spi/indicators.py", "def scalability(", INDICATOR)
-    copy.insert("spi/definitions.py", "    relative_change,", "    kept,")
+    copy.replace("spi/definitions.py", ", relative_change,", ", kept, relative_change,")
     copy.insert("spi/definitions.py", '        Definition(\n            symbol="S"', DEFINITION)
     report = copy.run("-c", STUDY)
     assert "swarm-dt, alive? Failure mode FM4, m = 1 of N = 4." in report

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
 ROOT = Path(__file__).parents[1]
@@ -114,7 +117,7 @@ def test_the_blocks_quote_what_was_played(tables: Any, small: Path, tmp_path: Pa
     change = spi.relative_change(unbroken["homing"], unbroken["ppo-delivery"])
     assert f"`ppo-delivery` {abs(100 * change.value):.1f} %" in policies
     assert policies.rstrip().endswith("less." if change.value < 0 else "more.")
-    assert "Than the script `homing`" in policies
+    assert "Compared with the script `homing`" in policies
     # FM4 of swarm-dt comes from the study with more seeds, of the others from the first.
     row = next(line for line in policies.splitlines() if line.startswith("| R, FM4, m = 2"))
     values = {j.policy: j for j in rows_of(main.indicators) if j.indicator == "R"}
@@ -193,3 +196,28 @@ def test_foraging_stands_beside_the_warehouse(
     assert second.scenario.restock
     page = script.PAGE.read_text(encoding="utf-8")
     assert script.rewritten(page, {"foraging": "x"}).count("| ---") < page.count("| ---")
+
+
+def test_the_seeds_that_claims_take_stand_beside_the_fixed_plan(tables: Any) -> None:
+    def made_up(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        """Counts around 40, and around 10 under FM4."""
+        for run in runs:
+            mean = 10.0 if any(fault.mode == "FM4" for fault in run.condition.faults) else 40.0
+            count = np.random.default_rng(int(run.key[:8], 16)).poisson(mean)
+            yield run, Outcome(run.key, np.arange(float(count)), digest=run.key)
+
+    script = importlib.import_module("play_until_clear")
+    asked: dict[str, Any] = {
+        "seeds": 30,
+        "reference": "paper",
+        "faults": [{"modes": ["FM2", "FM4"], "robots": [1]}],
+    }
+    both = (Study(until_clear=True, looks=(20, 30), **asked), Study(**asked))
+    played = [study.run(made_up).played for study in both]
+    text = script.spent(*(study.findings() for study in both))
+    assert "| robust, FM4 | m = 1 | 20 | refuted | the same |" in text
+    assert "| robust, FM2 | m = 1 | 30 (open) | inconclusive | the same |" in text
+    assert f"{played[0]:,} runs instead of the fixed plan's {played[1]:,}. 2 of 4" in text
+    assert played == [4 * 30 - 10, 4 * 30]
+    page = script.STUDIES.read_text(encoding="utf-8")
+    assert script.rewritten(page, {"spent": "x"}).count("| ---") < page.count("| ---")

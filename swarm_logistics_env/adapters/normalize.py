@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 from swarm_logistics_env.errors import SetupError
+
+from .sb3 import SwarmVecEnv
 
 
 class SwarmVecNormalize(VecNormalize):  # type: ignore[misc]  # not in the environment of the type check

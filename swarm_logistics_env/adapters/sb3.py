@@ -8,11 +8,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.adapters.worlds import RowsStep, World, Worlds, layers_of, maker
 from swarm_logistics_env.environment.reset_options import checked_count, checked_seed
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
+
+from .worlds import RowsStep, World, Worlds, layers_of, maker
 
 try:
     from stable_baselines3.common.vec_env import VecEnv

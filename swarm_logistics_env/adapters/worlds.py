@@ -9,7 +9,6 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.adapters.buffers import Buffers
 from swarm_logistics_env.environment.commands import as_array
 from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
@@ -19,6 +18,8 @@ from swarm_logistics_env.warehouse.kinematics import first_not_finite
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers import Wrapper
+
+from .buffers import Buffers
 
 World: TypeAlias = SwarmLogisticsEnv | Wrapper
 

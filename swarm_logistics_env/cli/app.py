@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
-from swarm_logistics_env.cli.application import Application
-from swarm_logistics_env.cli.fault_commands import attack_command, blame_command
-from swarm_logistics_env.cli.film_command import film_command
-from swarm_logistics_env.cli.judging import judge_command
-from swarm_logistics_env.cli.options import (
+from .application import Application
+from .fault_commands import attack_command, blame_command
+from .film_command import film_command
+from .judging import judge_command
+from .options import (
     FaultOption,
     PolicyOption,
     PresetOption,
@@ -21,9 +21,9 @@ from swarm_logistics_env.cli.options import (
     faults_of,
     scenario_of,
 )
-from swarm_logistics_env.cli.study_commands import study
-from swarm_logistics_env.cli.train import train_command
-from swarm_logistics_env.cli.watch import watch_command
+from .study_commands import study
+from .train import train_command
+from .watch import watch_command
 
 app = Application(
     name="swarm-logistics",
@@ -71,9 +71,9 @@ def scenario_command(
     ] = False,
 ) -> None:
     """Print every condition of a run: value, unit, and whether the default is sourced or fitted."""
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.scenario import SOURCES
+
+    from .terminal_tables import show_table
 
     chosen = scenario_of(preset, scenario_file, changes)
     if as_json:
@@ -85,25 +85,18 @@ def scenario_command(
     )
     sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
     columns = ("condition", "value", "unit, meaning; source")
-    show(
-        Section(
-            f"Scenario, from the preset {preset}",
-            columns,
-            tuple(chosen.conditions()),
-            (marks, sources),
-        )
-    )
+    show_table(f"Scenario, from the preset {preset}", columns, chosen.conditions(), marks, sources)
 
 
 @app.command("policies")
 def policies_command() -> None:
     """List the policies that can be called by name."""
-    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies import known_policies
-    from swarm_logistics_env.report.result_tables import Section
+
+    from .terminal_tables import show_table
 
     line = "A policy of your own is package.module:Class, or the path of a file that `train` wrote."
-    show(Section("Policies", ("name", "kind", "about"), tuple(known_policies()), (line,)))
+    show_table("Policies", ("name", "kind", "about"), known_policies(), line)
 
 
 @app.command("run")

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.options import (
-    PresetOption,
-    ScenarioOption,
-    SetOption,
-    faults_of,
-    scenario_of,
-)
-from swarm_logistics_env.cli.study_commands import ProcessesOption
+from .options import PresetOption, ScenarioOption, SetOption, faults_of, scenario_of
+from .study_commands import ProcessesOption
 
 if TYPE_CHECKING:
     from swarm_logistics_env.fault_analysis.attack import AttackResult
     from swarm_logistics_env.fault_analysis.attribution import Attribution, Share
-    from swarm_logistics_env.spi import Interval
+    from swarm_logistics_env.spi import Estimate, Interval
     from swarm_logistics_env.warehouse import Fault
 
 PolicyArgument = Annotated[
@@ -84,21 +79,37 @@ def blame_command(
     preset: PresetOption = "paper",
     file: ScenarioOption = None,
     changes: SetOption = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(help="Directory of a study: its scenario is played, its report tells it."),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Directory; results/blame-POLICY-FAULT if not given.")
+        Path | None, typer.Option(help="Directory; blame-POLICY-FAULT in --study or results.")
     ] = None,
     processes: ProcessesOption = None,
 ) -> None:
     """Tell which robots and which lost capabilities cost the deliveries that a fault costs."""
     import os
 
-    from swarm_logistics_env.fault_analysis.attribution_run import attribute_in, write_tables
+    from swarm_logistics_env.errors import SetupError
+    from swarm_logistics_env.fault_analysis.attribution_run import attribute_in, write_table
     from swarm_logistics_env.progress_bar import ProgressBar
+    from swarm_logistics_env.report.attributions import section_of
+    from swarm_logistics_env.report.drawing import images
+    from swarm_logistics_env.report.report_files import missing_packages
+    from swarm_logistics_env.scenario import Scenario
+    from swarm_logistics_env.studies import Study
 
     (chosen,) = faults_of([fault])
     chosen = chosen.replace(role=role)
-    place = out or Path("results") / f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    place = out or (study or Path("results")) / name
     scenario = scenario_of(preset, file, changes)
+    asked = Study.stored(study) if study else None
+    if asked:
+        if scenario != Scenario():
+            raise SetupError("--study has a scenario: should be without --set and the like")
+        scenario = asked.specification.scenario
     done = 0
     with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
 
@@ -120,7 +131,14 @@ def blame_command(
         except KeyboardInterrupt:
             _stopped(place)
     _show_blame(found, policy)
-    typer.echo(f"Written: {', '.join(map(str, write_tables(found, place)))}")
+    written = [write_table(found, policy, _in_words(chosen), place)]
+    if not missing_packages():
+        (figure,) = section_of(written[0]).figures
+        written.append(place / "attribution.png")
+        written[1].write_bytes(images(figure.draw, figure.height)[1])
+    typer.echo(f"Written: {', '.join(map(str, written))}")
+    if asked:
+        typer.echo(f"Report: {asked.report()[0]}")
 
 
 def _stopped(place: Path) -> None:
@@ -131,53 +149,47 @@ def _stopped(place: Path) -> None:
 
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
+    from .terminal_tables import show_table
 
-    rows = tuple(
+    rows = [
         (
             found.by,
             _in_words(found.fault),
             f"{found.robustness.value:+.3f}",
-            f"[{found.robustness.low:.3f}, {found.robustness.high:.3f}]"
-            if found.robustness.low is not None
-            else "",
+            _limits(found.robustness, 3),
             str(found.runs),
         )
         for found in result.found
-    )
+    ]
     worst = min(result.found, key=lambda found: found.robustness.value)
-    lines = (
-        (
-            f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
-            f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met."
-        ),
-        (
-            f"{len(result.tried)} of {result.searched} faults were tried. What is found bounds "
-            "the worst from one side: it proves no other fault harmless."
-        ),
+    show_table(
+        f"{policy}: worst faults found",
+        ("found by", "fault", "R", "95 % interval", "runs"),
+        rows,
+        f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
+        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.",
+        f"{result.tried} of {result.searched} faults were tried. What is found bounds "
+        "the worst from one side: it proves no other fault harmless.",
     )
-    columns = ("found by", "fault", "R", "95 % interval", "runs")
-    show(Section(f"{policy}: worst faults found", columns, rows, lines))
 
 
 def _show_blame(found: Attribution, policy: str) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
+    from .terminal_tables import show_table
 
-    def rows(shares: tuple[Share, ...]) -> tuple[tuple[str, ...], ...]:
-        return tuple(
+    def show_shares(title: str, shares: tuple[Share, ...], *lines: str) -> None:
+        rows = [
             (
                 share.name.replace("_", " "),
                 share.meaning,
                 "" if share.robots is None else str(share.robots),
-                *_limits(share.lost),
+                f"{share.lost.value:.2f}",
+                _limits(share.lost, 2),
             )
             for share in shares
             if share.robots != 0
-        )
+        ]
+        show_table(title, ("part", "meaning", "robots", "lost", "95 % interval"), rows, *lines)
 
-    columns = ("part", "meaning", "robots", "lost", "95 % interval")
     means = [f"Means over {len(found.seeds)} seeds."]
     if capped := sum(each.is_capped for each in found.seeds):
         means.append(
@@ -185,39 +197,27 @@ def _show_blame(found: Attribution, policy: str) -> None:
             "more than is shown. --set restock=true has no cap."
         )
     heading = f"{policy}: deliveries that {_in_words(found.fault)} costs, per episode"
-    sections = (
-        (heading, (found.total, *found.parts), tuple(means)),
-        (
-            "By role at the onset",
-            found.roles,
-            ("robots: how many failed in that role, over all seeds. The rows sum to all.",),
-        ),
-        (
-            "By lost capability",
-            found.capabilities,
-            (
-                "Shapley values over copies of the world at the onset; the rows sum to all.",
-                (
-                    "The requested item was held by a failed robot for "
-                    f"{_mean([each.blocked_seconds for each in found.seeds]):.0f} s, and working "
-                    "robots touched failed ones for "
-                    f"{_mean([each.anchoring_seconds for each in found.seeds]):.0f} robot-seconds."
-                ),
-            ),
-        ),
+    show_shares(heading, (found.total, *found.parts), *means)
+    show_shares(
+        "By role at the onset",
+        found.roles,
+        "robots: how many failed in that role, over all seeds. The rows sum to all.",
     )
-    for title, shares, lines in sections:
-        show(Section(title, columns, rows(shares), lines))
+    show_shares(
+        "By lost capability",
+        found.capabilities,
+        "Shapley values over copies of the world at the onset; the rows sum to all.",
+        "The requested item was held by a failed robot for "
+        f"{fmean(each.blocked_seconds for each in found.seeds):.0f} s, and working "
+        "robots touched failed ones for "
+        f"{fmean(each.anchoring_seconds for each in found.seeds):.0f} robot-seconds.",
+    )
 
 
-def _mean(values: list[float]) -> float:
-    return sum(values) / len(values)
-
-
-def _limits(lost: Interval) -> tuple[str, str]:
-    if lost.low is None or lost.high is None:
-        return f"{lost.value:.2f}", ""
-    return f"{lost.value:.2f}", f"[{lost.low:.2f}, {lost.high:.2f}]"
+def _limits(found: Interval | Estimate, digits: int) -> str:
+    if found.low is None or found.high is None:
+        return ""
+    return f"[{found.low:.{digits}f}, {found.high:.{digits}f}]"
 
 
 def _in_words(fault: Fault) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.options import (
+from .options import (
     FaultOption,
     PresetOption,
     ScenarioOption,

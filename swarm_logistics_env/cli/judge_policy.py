@@ -40,13 +40,6 @@ def judge_policy(
     Raises:
         PolicyError, StudyError: the policy cannot be loaded, or the store cannot be used.
     """
-    from swarm_logistics_env.cli.study_commands import (
-        in_one_line,
-        run_study,
-        show_report,
-        study_of,
-    )
-    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies import called, load
     from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.figures import slug
@@ -54,6 +47,9 @@ def judge_policy(
     from swarm_logistics_env.report.score_card import STUDY, card_section, score_card
     from swarm_logistics_env.report.score_card_page import write_card
     from swarm_logistics_env.studies.engines import engine_named
+
+    from .study_commands import in_one_line, run_study, show_report, study_of
+    from .terminal_tables import show
 
     load(asked, trust_code=trust_code)  # what is wrong with it is said before anything is written
     out = out or Path("results", "scorecards", slug(called(asked)))

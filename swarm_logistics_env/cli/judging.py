@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_logistics_env.cli.judge_policy import judge_policy, names_policy
-from swarm_logistics_env.cli.options import TrustPolicyOption
-from swarm_logistics_env.cli.study_commands import (
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi.definitions import DEFINITIONS
+
+from .judge_policy import judge_policy, names_policy
+from .options import TrustPolicyOption
+from .study_commands import (
     FullOption,
     PolicyOption,
     ProcessesOption,
@@ -18,8 +21,6 @@ from swarm_logistics_env.cli.study_commands import (
     study,
     study_of,
 )
-from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.definitions import DEFINITIONS
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.gate import Answer
@@ -91,11 +92,12 @@ def judge_command(
     """
     from tempfile import TemporaryDirectory
 
-    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.report.document import document, with_simulation
     from swarm_logistics_env.report.report_files import latex_tables, write_text
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.importing import import_results
+
+    from .terminal_tables import show
 
     if names_policy(asked):
         of_trials = {
@@ -188,9 +190,10 @@ def power_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print how many seeds each verdict needs, from a pilot or a study that was run."""
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
+    from swarm_logistics_env.report.wording import number
     from swarm_logistics_env.studies.results import demands
+
+    from .terminal_tables import show_table
 
     results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
     rows = []
@@ -203,11 +206,11 @@ def power_command(
             (
                 comparison.policy,
                 name,
-                "–" if demand.effect is None else f"{demand.effect:.3f}",
+                number(demand.effect),
                 demand.problem or str(demand.seeds),
                 "–" if demand.least_power is None else f"{demand.least_power:.0%}",
-                "–" if demand.detectable is None else f"{demand.detectable:.3f}",
-                "–" if demand.unchanged is None else str(demand.unchanged),
+                number(demand.detectable),
+                number(demand.unchanged, 0),
             )
         )
     if not rows:
@@ -225,7 +228,7 @@ def power_command(
         f"distance that {n_seeds} seeds find",
         f"seeds for equivalent at {results.plan.specification.margin:.0%}",
     )  # fmt: skip
-    show(Section(f"Seeds needed, from {n_seeds} seeds", columns, tuple(rows)))
+    show_table(f"Seeds needed, from {n_seeds} seeds", columns, rows)
 
 
 @study.command("compare")
@@ -291,8 +294,7 @@ def _pilot(
 
 
 def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
+    from .terminal_tables import show_table
 
     rows = []
     for answer in said:
@@ -305,5 +307,4 @@ def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...
             if estimate.low is not None and estimate.high is not None:
                 value += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
         rows.append((answer.name, value, says))
-    columns = ("", "value [95 %]", "verdict under Holm")
-    show(Section(title, columns, tuple(rows), left_out))
+    show_table(title, ("", "value [95 %]", "verdict under Holm"), rows, *left_out)

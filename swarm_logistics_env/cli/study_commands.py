@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm_logistics_env.errors import StudyError
+
 if TYPE_CHECKING:
     from swarm_logistics_env.report.document import Document
-    from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.engines import Engine
-    from swarm_logistics_env.studies.plan import Plan
     from swarm_logistics_env.studies.results import StudyResults
     from swarm_logistics_env.studies.runs import Shard
     from swarm_logistics_env.studies.study import Tally
@@ -61,10 +61,10 @@ def group() -> None:
 @study.command("list")
 def list_command() -> None:
     """List the studies that come with the package."""
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.presets import PRESETS
+
+    from .terminal_tables import show_table
 
     rows = []
     for name in PRESETS:
@@ -73,7 +73,7 @@ def list_command() -> None:
         n_runs = len(plan.conditions) * len(plan.seeds)
         rows.append((name, str(len(plan.seeds)), str(n_runs), "; ".join(asked)))
     line = "`study plan NAME` says how long one takes; `study run NAME` plays it."
-    show(Section("Studies", ("name", "seeds", "runs", "tables"), tuple(rows), (line,)))
+    show_table("Studies", ("name", "seeds", "runs", "tables"), rows, line)
 
 
 @study.command("plan")
@@ -85,12 +85,20 @@ def plan_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print the conditions, shared ones once, and what they will take; nothing is run."""
-    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.studies.engines import expected_seconds
+
+    from .terminal_tables import show_table
 
     plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     seconds = expected_seconds(plan)
-    show(_conditions(plan))
+    uses: dict[str, list[str]] = {}
+    for _, table, arm in plan.cells:
+        uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.setting})")
+    rows = (
+        (condition.policy.label, str(condition.size), "; ".join(uses[condition.key]))
+        for condition in plan.conditions
+    )
+    show_table("Conditions", ("policy", "N", "stands in"), rows)
     typer.echo(plan)
     typer.echo(f"On one process of this machine at most {duration(seconds)}")
 
@@ -141,11 +149,17 @@ def run_command(
 
     from swarm_logistics_env.studies.engines import engine_named
     from swarm_logistics_env.studies.runs import Shard
+    from swarm_logistics_env.studies.until_clear import FIRST_LOOK, MOST_SEEDS, looks_up_to
 
     part = Shard.parse(shard) if shard else None
     looks: dict[str, object] = {}
     if until_clear:
-        seeds, looks = _until_clear(seeds)
+        seeds = MOST_SEEDS if seeds is None else seeds
+        if seeds <= FIRST_LOOK:
+            raise StudyError(
+                f"--most {seeds}: should be more than {FIRST_LOOK} seeds, where the first look is"
+            )
+        looks = {"looks": looks_up_to(seeds), "until_clear": True}
     chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
     out = out or Path("results", chosen.specification.name)
     chosen.out = out / part.directory if part else out
@@ -208,23 +222,6 @@ def merge_command(
     typer.echo(f"{merge(directories, out)} runs in {out}")
 
 
-def _until_clear(most: int | None) -> tuple[int, dict[str, object]]:
-    """Return the most seeds of a study that runs until it is clear, and its looks as fields.
-
-    Raises:
-        StudyError: there is no room for a look before the last.
-    """
-    from swarm_logistics_env.errors import StudyError
-    from swarm_logistics_env.studies.until_clear import FIRST_LOOK, MOST_SEEDS, looks_up_to
-
-    most = MOST_SEEDS if most is None else most
-    if most <= FIRST_LOOK:
-        raise StudyError(
-            f"--most {most}: should be more than {FIRST_LOOK} seeds, where the first look is"
-        )
-    return most, {"looks": looks_up_to(most), "until_clear": True}
-
-
 def study_of(
     asked: str,
     out: Path | None,
@@ -240,7 +237,6 @@ def study_of(
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
-    from swarm_logistics_env.errors import StudyError
     from swarm_logistics_env.studies import Study
 
     if seeds is not None:
@@ -268,28 +264,18 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes} min" if hours else f"{minutes} min"
 
 
-def _conditions(plan: Plan) -> Section:
-    from swarm_logistics_env.report.result_tables import Section
-
-    uses: dict[str, list[str]] = {}
-    for _, table, arm in plan.cells:
-        uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.setting})")
-    rows = (
-        (condition.policy.label, str(condition.size), "; ".join(uses[condition.key]))
-        for condition in plan.conditions
-    )
-    return Section("Conditions", ("policy", "N", "stands in"), tuple(rows))
-
-
 def run_study(asked: Study, engine: Engine, shard: Shard | None = None) -> Tally:
     """Run a study; Ctrl-C ends the command and says how to go on."""
     try:
         return asked.run(engine, shard=shard)
     except KeyboardInterrupt:
         done, total = asked.finished(shard)
+        left = f"the other {total - done}"
+        if asked.specification.until_clear:
+            left += ", and with what later looks need"
         typer.echo(
             f"\nStopped. {done} of {total} runs are finished and kept in {asked.out}; the same "
-            f"command goes on with the other {total - done}.",
+            f"command goes on with {left}.",
             err=True,
         )
         raise typer.Exit(130) from None
@@ -309,12 +295,13 @@ def show_report(
     results: StudyResults, whole: Document, out: Path | None, *, full: bool = False
 ) -> None:
     """Write a study's report into a directory, and print the answer; the tables too if `full`."""
-    from swarm_logistics_env.cli.terminal_tables import show, show_digest
     from swarm_logistics_env.report.report_files import (
         how_to_get_figures,
         missing_packages,
         write_report,
     )
+
+    from .terminal_tables import show, show_digest
 
     for section in whole.summary if full else ():
         show(section)

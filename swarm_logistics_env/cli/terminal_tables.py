@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -41,6 +42,13 @@ def show(section: Section) -> None:
     for line in section.lines:
         console.print(escape(line))
     console.print()
+
+
+def show_table(
+    title: str, columns: Sequence[str], rows: Iterable[tuple[str, ...]], *lines: str
+) -> None:
+    """Print a table, and lines of text below it."""
+    show(Section(title, tuple(columns), tuple(rows), lines))
 
 
 def show_digest(found: Answer, where: Path | None, *, whole: bool = False) -> None:

@@ -74,7 +74,7 @@ def train_command(
                 _show_training(path)
             else:
                 tried, path = search_as_asked(preset, trials, out, seed, steps)
-                _show_trials(f"{preset}, factors of its weights", ("P", "worst R"), tried, ())
+                _show_trials(f"{preset}, factors of its weights", ("P", "worst R"), tried)
         else:
             fields = {
                 "objectives": tuple(objectives) if objectives else None,
@@ -91,24 +91,21 @@ def train_command(
 def _show_search(asked: Tuning, trials: list[Trial], path: Path) -> None:
     from swarm_logistics_env.policies.tuned import read_tuned
 
-    lines = tuple(
+    lines = (
         f"{score.measure} ({score.condition}, {score.seeds} other seeds) = {score.value:.3g}, "
         f"95 % interval {score.low:.3g} to {score.high:.3g}"
         for score in read_tuned(path).scores
         if score.low is not None and score.high is not None
     )
-    _show_trials(asked.policy, asked.objectives, trials, lines)
+    _show_trials(asked.policy, asked.objectives, trials, *lines)
 
 
-def _show_trials(
-    what: str, objectives: tuple[str, ...], trials: list[Trial], lines: tuple[str, ...]
-) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show
-    from swarm_logistics_env.report.result_tables import Section
+def _show_trials(what: str, objectives: tuple[str, ...], trials: list[Trial], *lines: str) -> None:
+    from .terminal_tables import show_table
 
     names = list(trials[0].parameters)
     shown = [trial for place, trial in enumerate(trials) if trial.is_best or place == 0]
-    rows = tuple(
+    rows = (
         (
             "own" if trial is trials[0] else f"trial {trial.number}",
             *(f"{value:.3g}" for value in trial.values),
@@ -117,14 +114,14 @@ def _show_trials(
         for trial in sorted(shown, key=lambda trial: -trial.values[0])
     )
     title = f"{what}: best of {len(trials)} trials (Pareto front) and its own parameters"
-    show(Section(title, ("parameters", *objectives, *names), rows, lines))
+    show_table(title, ("parameters", *objectives, *names), rows, *lines)
 
 
 def _show_training(path: Path) -> None:
-    from swarm_logistics_env.cli.terminal_tables import show
     from swarm_logistics_env.policies import read_card
-    from swarm_logistics_env.report.result_tables import Section
     from swarm_logistics_env.train.curve import BEST, PICTURE
+
+    from .terminal_tables import show_table
 
     card = read_card(path)
     rows = tuple(
@@ -138,9 +135,12 @@ def _show_training(path: Path) -> None:
         for score in card.scores
     )
     if rows:
-        columns = ("measure", "condition", "value", "low", "high", "seeds")
-        lines = ("low, high: limits of the 95 % interval",)
-        show(Section(f"{card.name}: scores on seeds it was not trained on", columns, rows, lines))
+        show_table(
+            f"{card.name}: scores on seeds it was not trained on",
+            ("measure", "condition", "value", "low", "high", "seeds"),
+            rows,
+            "low, high: limits of the 95 % interval",
+        )
     typer.echo(f"Curve: {path.parent / PICTURE}")
     typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
 

@@ -10,9 +10,10 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
-from swarm_logistics_env.environment.commands import gathered
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse import Warehouse
+
+from .commands import gathered
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, float]]

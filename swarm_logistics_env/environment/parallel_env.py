@@ -10,10 +10,15 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.environment.central_state import global_state
-from swarm_logistics_env.environment.commands import as_array
-from swarm_logistics_env.environment.dict_view import ArrayStep, DictView, agent_names
-from swarm_logistics_env.environment.reset_options import (
+from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.streams import key
+from swarm_logistics_env.warehouse import Fault, Warehouse
+
+from .central_state import global_state
+from .commands import as_array
+from .dict_view import ArrayStep, DictView, agent_names
+from .reset_options import (
     OPTIONS,
     check_somebody_is_there,
     checked_faults,
@@ -22,12 +27,8 @@ from swarm_logistics_env.environment.reset_options import (
     faults_among,
     scenario_fields,
 )
-from swarm_logistics_env.environment.rewards import RewardTerms
-from swarm_logistics_env.environment.spaces import Spaces
-from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import key
-from swarm_logistics_env.warehouse import Fault, Warehouse
+from .rewards import RewardTerms
+from .spaces import Spaces
 
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer

@@ -8,7 +8,8 @@ from typing import Any
 
 from swarm_logistics_env.errors import FaultError, SetupError, suggest
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.faults import GRACE, failed_robots, failure_mode
+from swarm_logistics_env.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
 
 OPTIONS = ("faults", "scenario")
 

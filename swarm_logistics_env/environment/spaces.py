@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from gymnasium.spaces import Box
 
-from swarm_logistics_env.environment.central_state import global_state_bounds
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.scenario import Scenario
+
+from .central_state import global_state_bounds
 
 # These fields bound the state: an episode may have at most the largest value declared.
 _BOUND_THE_STATE = (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError, StudyError, suggest
-from swarm_logistics_env.fault_analysis.fault_search import Play, Trials, random_search, search
+from swarm_logistics_env.fault_analysis.fault_search import Play, random_search, search
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi import Estimate, robustness
 from swarm_logistics_env.studies.engines import Engine
@@ -95,15 +95,15 @@ class Found:
 
 @dataclass(frozen=True)
 class AttackResult:
-    """The worst faults found, the search's first; and every fault that the search has tried.
+    """The worst faults found, the search's first.
 
     Attributes:
-        tried: fault, runs and mean of P_F / P_o - 1 on the search's seeds, worst first.
-        searched: how many different faults there were to search.
+        tried: how many different faults the search has tried.
+        searched: how many there were to search.
     """
 
     found: tuple[Found, ...]
-    tried: tuple[tuple[Fault, int, float], ...]
+    tried: int
     searched: int
 
 
@@ -143,7 +143,7 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
             Found(by, fault, robustness(p_o, p, n=n, m=asked.robots), runs)
             for (by, fault, runs), p in zip(chosen, p_f, strict=True)
         ),
-        tried=_tried(faults, trials),
+        tried=len(set(trials.tried)),
         searched=len(faults),
     )
 
@@ -175,7 +175,7 @@ class _Players:
                     "anything: should be another policy, a longer duration or more robots"
                 )
             failed = self._delivered([(faults[place], seed) for place, seed in pairs])
-            return list((failed - sound[[seed for _, seed in pairs]]) / sound.mean())
+            return list(failed - sound[[seed for _, seed in pairs]])
 
         return play
 
@@ -195,9 +195,3 @@ class _Players:
                 raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
         outcomes = self._store.outcomes(runs)
         return np.array([outcomes[run.key].delivered for run in runs], dtype=np.float64)
-
-
-def _tried(faults: Sequence[Fault], trials: Trials) -> tuple[tuple[Fault, int, float], ...]:
-    means = trials.means()
-    order = sorted(means, key=means.__getitem__)
-    return tuple((faults[place], trials.tried.count(place), means[place]) for place in order)

@@ -16,7 +16,7 @@ from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.spi.shapley import coalitions, shapley_values
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.faults import failure_mode, lost_capabilities
+from swarm_logistics_env.warehouse.failure_modes import failure_mode, lost_capabilities
 from swarm_logistics_env.warehouse.roles import ROLES
 
 MOST_CAUSES = 6  # 2^6 copies of a world

@@ -1,4 +1,4 @@
-"""Attributions over many seeds: worker processes, a file of finished seeds, tables, a picture."""
+"""Attributions over many seeds: worker processes, a file of finished seeds, and a table."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.fault_analysis.attribution import (
     Attribution,
     Losses,
-    Share,
     check_fault,
     losses,
 )
+from swarm_logistics_env.policies.code_identity import code_digest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.engines import workers
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_of
 from swarm_logistics_env.warehouse import Fault
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-FINISHED, TABLE, PICTURE = "losses.jsonl", "attribution.csv", "attribution.png"
-HEADINGS = ("part", "meaning", "robots", "lost", "low", "high")
+FINISHED, TABLE = "losses.jsonl", "attribution.csv"
+HEADINGS = (
+    *("policy", "fault", "seeds", "capped", "group"),
+    *("part", "meaning", "robots", "lost", "low", "high"),
+)
 
 
 def attribute_in(
@@ -58,7 +58,7 @@ def attribute_in(
         "scenario": json.loads(scenario.to_json()),
         "policy": policy_identity(policy),
         "fault": json.loads(fault.to_json()),
-        "code": code_version(),
+        "code": f"{code_version()}, {code_digest(Losses)}",
     }
     finished = _finished(out / FINISHED, about)
     missing = [seed for seed in seeds if seed not in finished]
@@ -78,20 +78,27 @@ def attribute_in(
     return Attribution(fault, tuple(finished[seed] for seed in seeds))
 
 
-def write_tables(found: Attribution, out: Path) -> list[Path]:
-    """Write attribution.csv, and with matplotlib attribution.png; return their paths."""
+def write_table(found: Attribution, policy: str, fault: str, out: Path) -> Path:
+    """Write attribution.csv, which a study's report reads; return its path.
+
+    Args:
+        policy, fault: in words.
+    """
+    capped = sum(each.is_capped for each in found.seeds)
+    groups = {
+        "in all": (found.total, *found.parts),
+        "by role at the onset": found.roles,
+        "by lost capability": found.capabilities,
+    }
     with (out / TABLE).open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(HEADINGS)
-        writer.writerows(
-            (row.name, row.meaning, row.robots, *row.lost)
-            for row in (found.total, *found.parts, *found.roles, *found.capabilities)
-        )
-    try:
-        _draw(found, out / PICTURE)
-    except ImportError:
-        return [out / TABLE]
-    return [out / TABLE, out / PICTURE]
+        for group, rows in groups.items():
+            for row in rows:
+                part = row.name.replace("_", " ")
+                about = policy, fault, len(found.seeds), capped, group
+                writer.writerow((*about, part, row.meaning, row.robots, *row.lost))
+    return out / TABLE
 
 
 def _losses(arguments: tuple[Scenario, object, Fault, int]) -> Losses:
@@ -134,39 +141,3 @@ def _finished(path: Path, about: Mapping[str, Any]) -> dict[int, Losses]:
         )
         for each in found
     }
-
-
-def _draw(found: Attribution, path: Path) -> None:
-    from matplotlib.figure import Figure
-
-    roles = [row for row in found.roles if row.robots]
-    groups = (("by role at the onset", roles), ("by lost capability", list(found.capabilities)))
-    figure = Figure(figsize=(8.0, 1.6 + 0.38 * (len(roles) + len(found.capabilities) + 3)))
-    heights = [3.0, *(max(len(rows), 1) for _, rows in groups)]
-    panels = figure.subplots(3, 1, sharex=True, height_ratios=heights)
-    _bars(panels[0], [found.total, *found.parts], "in all")
-    for panel, (title, rows) in zip(panels[1:], groups):
-        _bars(panel, rows, title)
-    panels[-1].set_xlabel(
-        f"deliveries lost after the onset, per episode (mean and 95 % interval, "
-        f"{len(found.seeds)} seeds)"
-    )
-    fault = found.fault
-    figure.suptitle(f"What {fault.mode} costs from {fault.onset:g} s on")
-    figure.tight_layout()
-    figure.savefig(path, dpi=150)
-
-
-def _bars(panel: Axes, rows: Sequence[Share], title: str) -> None:
-    for place, row in enumerate(rows):
-        value, low, high = row.lost
-        panel.barh(place, value, color="#4477aa", height=0.6)
-        if low is not None and high is not None:
-            panel.plot([low, high], [place, place], color="#222222", linewidth=1.5)
-    labels = [row.name.replace("_", " ") for row in rows]
-    panel.set_yticks(range(len(rows)), labels)
-    panel.invert_yaxis()
-    panel.axvline(0.0, color="#888888", linewidth=0.8)
-    panel.set_title(title, loc="left", fontsize="medium")
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)

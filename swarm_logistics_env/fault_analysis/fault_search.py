@@ -13,8 +13,8 @@ from scipy.linalg import cho_factor, cho_solve
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 
-# Plays pairs of a fault's place in the list and the number of its run, 0, 1, ..; returns the
-# relative change of performance, P_F / P_o - 1, of each: the lower, the worse the fault.
+# Plays pairs of a fault's place in the list and the number of its run, 0, 1, ..; returns the change
+# of performance, P_F - P_o, of each: the lower, the worse the fault.
 Play: TypeAlias = Callable[[Sequence[tuple[int, int]]], Sequence[float]]
 
 _FIRST_SHARE = (
@@ -34,7 +34,7 @@ class Trials:
 
     Attributes:
         tried: place of the fault of each run in the list of faults.
-        change: the relative change of performance of each run.
+        change: P_F - P_o of each run [items].
     """
 
     tried: list[int] = field(default_factory=list)
@@ -48,11 +48,6 @@ class Trials:
             pairs.append((place, self.tried.count(place) + earlier.count(place)))
         self.change += [float(change) for change in play(pairs)]
         self.tried += [place for place, _ in pairs]
-
-    def means(self) -> dict[int, float]:
-        """Return the mean change of every fault that was tried."""
-        tried, change = np.array(self.tried), np.array(self.change)
-        return {int(place): float(change[tried == place].mean()) for place in np.unique(tried)}
 
 
 def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple[int, Trials]:
@@ -96,8 +91,8 @@ def random_search(
     count = min(len(faults), max(1, budget // _SEEDS_AT_RANDOM))
     chosen = [int(place) for place in rng.choice(len(faults), count, replace=False)]
     trials.add([chosen[number % count] for number in range(budget)], play)
-    means = trials.means()
-    return min(means, key=means.__getitem__), trials
+    tried, change = np.array(trials.tried), np.array(trials.change)
+    return min(chosen, key=lambda place: float(change[tried == place].mean())), trials
 
 
 def _covariance(faults: Sequence[Fault]) -> NDArray[np.float64]:

@@ -46,22 +46,30 @@ def identity(policy: Policy) -> str:
 
 
 @functools.cache
-def code_digest(kind: type) -> str:
-    """Return 16 hexadecimal digits that change with the code which a class uses.
+def code_digest(*kinds: type) -> str:
+    """Return 16 hexadecimal digits that change with the code which classes use.
 
-    That code is the modules of the class and of its base classes, and whatever these import from
-    their own package and from this one, directly or not. Docstrings, lines that only comment and
-    blank lines do not count. The digest is empty if the source of the class cannot be found.
+    That code is the modules of `modules_used`. Docstrings, lines that only comment and blank lines
+    do not count. The digest is empty if the source of no class can be found.
     """
-    packages = {OWN_PACKAGE, kind.__module__.partition(".")[0]}
+    return _digest(modules_used(*kinds))
+
+
+def modules_used(*kinds: type) -> dict[str, Path]:
+    """Return name and file of the modules of classes and of their base classes.
+
+    Whatever these import from their own package and from this one, directly or not, is among them.
+    """
     used: dict[str, Path] = {}
-    for base in kind.__mro__:
-        if base.__module__.partition(".")[0] in packages:
-            try:
-                _follow(base.__module__, Path(inspect.getfile(base)), packages, used)
-            except (TypeError, OSError):  # typed into an interpreter
-                continue
-    return _digest(used)
+    for kind in kinds:
+        packages = {OWN_PACKAGE, kind.__module__.partition(".")[0]}
+        for base in kind.__mro__:
+            if base.__module__.partition(".")[0] in packages:
+                try:
+                    _follow(base.__module__, Path(inspect.getfile(base)), packages, used)
+                except (TypeError, OSError):  # typed into an interpreter
+                    continue
+    return used
 
 
 def function_digest(function: object) -> str:

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.projection import Projection
-from swarm_logistics_env.rendering.sprites import words
 from swarm_logistics_env.scenario import Scenario
+
+from . import palette
+from .projection import Projection
+from .sprites import words
 
 
 def background(
@@ -19,12 +20,8 @@ def background(
     """Return the empty warehouse on a picture of that height [px]."""
     picture = np.empty((height, projection.width, 3), np.uint8)
     picture[:] = palette.SURROUNDINGS
-    left, top, right, bottom = (
-        projection.left,
-        projection.top,
-        projection.right,
-        projection.bottom,
-    )
+    left, right = projection.left, projection.right
+    top, bottom = projection.top, projection.bottom
     wall = max(2, projection.margin // 5)
     picture[top - wall : bottom + wall, left - wall : right + wall] = palette.INK
     floor = picture[top:bottom, left:right]

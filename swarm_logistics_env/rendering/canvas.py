@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from swarm_logistics_env.rendering.palette import RGB
+from .palette import RGB
 
 Point = tuple[float, float]  # [px]
 

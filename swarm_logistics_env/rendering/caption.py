@@ -8,10 +8,11 @@ from functools import lru_cache
 
 import pygame
 
-from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.sprites import badge, blank, halo, item, robot, words
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
+
+from . import palette
+from .sprites import badge, blank, halo, item, robot, words
 
 # The widest texts there may be, so that a picture's size does not change with what happens.
 _WIDEST = ("time 0000.0 s", "N = 000", "P = 000 of 000", "requested: item 000")

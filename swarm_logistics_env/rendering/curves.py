@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swarm_logistics_env.rendering.palette import MARKS
+from .palette import MARKS
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,15 @@ import math
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import palette, sprites
-from swarm_logistics_env.rendering.beams import N_BEAMS, ranges
-from swarm_logistics_env.rendering.canvas import Point, draw_line, stamp
-from swarm_logistics_env.rendering.links import followed
-from swarm_logistics_env.rendering.projection import Projection
-from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
+
+from . import palette, sprites
+from .beams import N_BEAMS, ranges
+from .canvas import Point, draw_line, stamp
+from .links import followed
+from .projection import Projection
+from .trails import Trails
 
 _TRAIL_SHADES = 5
 

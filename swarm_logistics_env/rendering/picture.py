@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 import pygame
 
-from swarm_logistics_env.rendering import palette, sprites
-from swarm_logistics_env.rendering.background import background
-from swarm_logistics_env.rendering.canvas import Point, new_canvas, stamp
-from swarm_logistics_env.rendering.caption import Caption
-from swarm_logistics_env.rendering.overlays import draw_beams, draw_links, draw_trails
-from swarm_logistics_env.rendering.projection import Projection
-from swarm_logistics_env.rendering.trails import Trails
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+
+from . import palette, sprites
+from .background import background
+from .canvas import Point, new_canvas, stamp
+from .caption import Caption
+from .overlays import draw_beams, draw_links, draw_trails
+from .projection import Projection
+from .trails import Trails
+
+# What decides the picture's layout.
+_shape = attrgetter(
+    "warehouse_width", "warehouse_height", "delivery_width",
+    "robot_radius", "item_radius", "obstacle_radius",
+)  # fmt: skip
 
 
 class Picture:
@@ -92,12 +101,8 @@ class Picture:
         self._background = new_canvas(projection.width, height)
         self._background.blit(background(projection, scenario, height, text_height), (0, 0))
         self._caption.draw_legend(self._background)
-        self._floor = pygame.Rect(
-            projection.left,
-            projection.top,
-            projection.right - projection.left,
-            projection.bottom - projection.top,
-        )
+        left, top = projection.left, projection.top
+        self._floor = pygame.Rect(left, top, projection.right - left, projection.bottom - top)
         # Things stay visible in a warehouse that is drawn small.
         self._robot_radius = max(3.5, projection.length(scenario.robot_radius))
         self._item_half = max(2.0, 0.8 * projection.length(scenario.item_radius))
@@ -162,17 +167,6 @@ class Picture:
             x, y = robots[robot]
             place = sprite.get_rect(center=(round(x + away), round(y - away)))
             self._canvas.blit(sprite, place.clamp(area))
-
-
-def _shape(scenario: Scenario) -> tuple[float, ...]:
-    return (
-        scenario.warehouse_width,
-        scenario.warehouse_height,
-        scenario.delivery_width,
-        scenario.robot_radius,
-        scenario.item_radius,
-        scenario.obstacle_radius,
-    )
 
 
 def _state_colour(carried: int, requested: int) -> palette.RGB:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering.projection import LARGEST_SIZE, LEAST_SIZE
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
+
+from .projection import LARGEST_SIZE, LEAST_SIZE
 
 if TYPE_CHECKING:
     import pygame
@@ -70,7 +71,7 @@ class Renderer:
                 f"0 to {scenario.n_robots - 1}"
             )
         load_pygame()
-        from swarm_logistics_env.rendering.picture import Picture
+        from .picture import Picture
 
         self.mode = mode
         self._make_copy = functools.partial(
@@ -83,7 +84,7 @@ class Renderer:
 
     def frame(self, state: WarehouseState, scenario: Scenario) -> NDArray[np.uint8]:
         """Return the picture of `state` in either mode: (H, W, 3), uint8, red, green and blue."""
-        from swarm_logistics_env.rendering.canvas import to_array
+        from .canvas import to_array
 
         return to_array(self._picture.draw(state, scenario))
 

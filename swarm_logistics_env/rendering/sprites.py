@@ -16,7 +16,7 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from swarm_logistics_env.rendering import palette
+from . import palette
 
 HEADINGS = 120  # headings that are told apart
 HALOS = 12  # ages of a timer that are told apart

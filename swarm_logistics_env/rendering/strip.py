@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 
 import pygame
 
-from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.canvas import Point, draw_line, new_canvas
-from swarm_logistics_env.rendering.curves import Curve, Event
-from swarm_logistics_env.rendering.sprites import badge, words
+from . import palette
+from .canvas import Point, draw_line, new_canvas
+from .curves import Curve, Event
+from .sprites import badge, words
 
 _GRID_LINES = 4
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import secrets
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering.palette import film_colours
+
+from .palette import film_colours
 
 Frame = NDArray[np.uint8]  # (H, W, 3), both even
 SUFFIXES = (".mp4", ".gif")
@@ -87,47 +88,39 @@ def _becoming(path: Path) -> Iterator[Path]:
 
 
 def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> int:
+    coming = iter(frames)
+    first = next(coming, None)
+    if first is None:
+        raise SetupError("a film needs at least one frame")
+    height, width, _ = first.shape
+    pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+    source = [*pixels, "-r", f"{frame_rate:g}", "-i", "-"]
+    command = [_ffmpeg(), "-y", "-hide_banner", "-loglevel", "error", *source, *output]
     count = 0
-    process: subprocess.Popen[bytes] | None = None
-    with tempfile.TemporaryFile() as said:
+    with (
+        tempfile.TemporaryFile() as said,
+        subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said
+        ) as process,
+    ):
+        assert process.stdin is not None
         try:
-            for frame in frames:
-                if process is None:
-                    height, width, _ = frame.shape
-                    pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
-                    source = [*pixels, "-r", f"{frame_rate:g}", "-i", "-"]
-                    process = _start([*source, *output], said)
-                assert process.stdin is not None
-                process.stdin.write(frame.tobytes())
-                count += 1
-            if process is None:
-                raise SetupError("a film needs at least one frame")
-            process.communicate()
-        except BrokenPipeError:
-            assert process is not None
-            process.wait()
+            with contextlib.suppress(BrokenPipeError):  # ffmpeg has said why it ended
+                for frame in itertools.chain([first], coming):
+                    process.stdin.write(frame.tobytes())
+                    count += 1
+        except BaseException:
+            process.kill()
+            raise
         finally:
-            if process is not None and process.poll() is None:
-                process.kill()
-                process.communicate()
-        _check(process, said)
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.close()
+        if process.wait() != 0:
+            said.seek(0)
+            lines = said.read().decode(errors="replace").strip().splitlines()
+            reason = lines[-1] if lines else f"exit code {process.returncode}"
+            raise SetupError(f"ffmpeg cannot write the film: {reason}")
     return count
-
-
-def _start(arguments: list[str], said: IO[bytes]) -> subprocess.Popen[bytes]:
-    command = [_ffmpeg(), "-y", "-hide_banner", "-loglevel", "error", *arguments]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said)
-
-
-def _check(process: subprocess.Popen[bytes], said: IO[bytes]) -> None:
-    if process.stdin is not None:
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.close()
-    if process.returncode != 0:
-        said.seek(0)
-        lines = said.read().decode(errors="replace").strip().splitlines()
-        reason = lines[-1] if lines else f"exit code {process.returncode}"
-        raise SetupError(f"ffmpeg cannot write the film: {reason}")
 
 
 def _ffmpeg() -> str:

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.verdict_matrix import VerdictMatrix, text_lines, verdict_matrix
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.policy_comparison import (
@@ -18,6 +16,9 @@ from swarm_logistics_env.studies.policy_comparison import (
     cells_against_baseline,
 )
 from swarm_logistics_env.studies.results import StudyResults
+
+from . import wording
+from .verdict_matrix import VerdictMatrix, text_lines, verdict_matrix
 
 if TYPE_CHECKING:
     import pandas as pd

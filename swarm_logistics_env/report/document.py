@@ -5,27 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.answer import Answer, answer
-from swarm_logistics_env.report.figures import Figure, indicator_figures, scaling_figure
-from swarm_logistics_env.report.further_measures import (
-    budget_sections,
-    load_sections,
-    look_sections,
-    size_sections,
-)
-from swarm_logistics_env.report.policies_compared import policy_sections
-from swarm_logistics_env.report.resilience_sections import resilience_sections
-from swarm_logistics_env.report.result_tables import Section, tables, warnings
-from swarm_logistics_env.report.setup_sheet import glossary, methods, setup_sheet
-from swarm_logistics_env.report.wording import sentence
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.few_real_runs import narrowed, replays
 from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import size_series
+
+from . import wording
+from .answer import Answer, answer
+from .figures import Figure, indicator_figures, scaling_figure
+from .further_measures import budget_sections, load_sections, look_sections, size_sections
+from .policies_compared import policy_sections
+from .resilience_sections import resilience_sections
+from .result_tables import Column, Section, table_section, tables, warnings
+from .setup_sheet import glossary, methods, setup_sheet
+from .wording import sentence
 
 
 @dataclass(frozen=True)
@@ -74,16 +68,21 @@ def document(results: StudyResults) -> Document:
     text = [about]
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
-    result_tables, lines = tuple(tables(results)), warnings(results)
+    result_tables, lines = tuple(tables(results)), tuple(warnings(results))
     faults = *budget_sections(results), *resilience_sections(results), *load_sections(results)
     summary = (
         *result_tables,
         *([Section("Warnings", lines=lines)] if lines else []),
         *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
-    chapters = tuple(one for one in _chapters(results, result_tables, faults) if one.sections)
+    warned = (Section("", lines=lines),) if lines else ()
+    chapters = Chapter("Warnings", "", warned), *_chapters(results, result_tables, faults)
     whole = Document(
-        f"Study {plan.specification.name!r}", tuple(text), answer(results), chapters, summary
+        f"Study {plan.specification.name!r}",
+        tuple(text),
+        answer(results),
+        tuple(chapter for chapter in chapters if chapter.sections),
+        summary,
     )
     # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
@@ -106,8 +105,6 @@ def _chapters(
         *indicator_figures(results),
         *(scaling_figure(results, one) for one in series if one.cells["n_seeds"].any()),
     ]
-    lines = warnings(results)
-    yield Chapter("Warnings", "", (Section("", lines=lines),) if lines else ())
     yield Chapter(
         "Figures",
         "The paper's indicators; raw P and the numbers stand in the tables below.",
@@ -160,43 +157,28 @@ def with_simulation(whole: Document, real: StudyResults, simulated: StudyResults
         StudyError: the simulated trials are not of the same set-ups and comparisons.
     """
     seeds, further = replays(real, simulated)
-    rows, problems = [], []
-    for one in narrowed(real, simulated):
-        if one.combined is None:
-            problems.append(f"{one.policy}, {one.name}: {one.problem}.")
-            continue
-        rows.append(
-            (
-                one.policy,
-                one.name,
-                _interval(one.alone),
-                _interval(one.combined),
-                wording.NOTHING if one.width is None else f"{one.width:.2f}",
-                one.combined.verdict if isinstance(one.combined, Estimate) else wording.NOTHING,
-            )
-        )
-    explained = (
+    found = list(narrowed(real, simulated))
+    columns: list[Column] = [
+        ("policy", lambda one: one.policy),
+        ("what", lambda one: one.name),
+        ("real alone [95 %]", lambda one: wording.bracketed(one.alone, 3)),
+        ("with simulation [95 %]", lambda one: wording.bracketed(one.combined, 3)),
+        ("width, with over alone", lambda one: wording.number(one.width, 2)),
+        ("verdict with", lambda one: getattr(one.combined, "verdict", wording.NOTHING)),
+    ]
+    section = table_section(
+        "Real trials with simulation",
+        (one for one in found if one.combined is not None),
+        columns,
         f"{len(seeds)} real trials of each condition, their set-ups simulated, and {len(further)} "
         "further simulated ones. The real trials are corrected for how lucky their set-ups were in "
         "simulation (control variate, Student's t at two degrees of freedom fewer). Nothing is "
         "taken from simulation itself. Decide for one of the two intervals before you look; "
-        "verdicts unadjusted."
+        "verdicts unadjusted.",
+        *(f"{one.policy}, {one.name}: {one.problem}." for one in found if one.combined is None),
     )
-    section = Section(
-        "Real trials with simulation",
-        (
-            "policy", "what", "real alone [95 %]", "with simulation [95 %]",
-            "width, with over alone", "verdict with",
-        ),
-        tuple(rows),
-        (explained, *problems),
-    )  # fmt: skip
     return replace(
         whole,
         chapters=(*whole.chapters, Chapter("With simulation", "", (section,))),
         summary=(*whole.summary, section),
     )
-
-
-def _interval(found: Interval | Estimate) -> str:
-    return wording.bracketed(Interval(found.value, found.low, found.high), 3)

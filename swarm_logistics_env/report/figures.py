@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.report import drawing
-from swarm_logistics_env.report.drawing import Panel
-from swarm_logistics_env.report.wording import DECIDED, listed, percent, seeds_text
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
 from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import SizeSeries
+
+from . import drawing
+from .drawing import Panel
+from .wording import DECIDED, listed, percent, seeds_text
 
 if TYPE_CHECKING:
     import pandas as pd

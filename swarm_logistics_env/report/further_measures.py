@@ -6,20 +6,17 @@ from collections import Counter
 from collections.abc import Iterator
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.drawing import LAWS
-from swarm_logistics_env.report.result_tables import Column, Section, table_section
 from swarm_logistics_env.spi.scaling import ScalingFit
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.fault_measures import (
-    ModeBudget,
-    anchoring_loads,
-    fault_budgets,
-)
+from swarm_logistics_env.studies.fault_measures import ModeBudget, anchoring_loads, fault_budgets
 from swarm_logistics_env.studies.judged_comparisons import CONFIDENCE
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.size_series import SizeSeries, steps
 from swarm_logistics_env.studies.until_clear import SPENDING
+
+from . import wording
+from .drawing import LAWS
+from .result_tables import Column, Section, table_section
 
 _LAWS_TEXT = (
     "USL: P = gN / (1 + a(N-1) + bN(N-1)), N* = sqrt((1-a)/b). The other: "

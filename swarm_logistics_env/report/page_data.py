@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import SwarmLogisticsError
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.verdict_matrix import VerdictMatrix
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.tasks.replay import Recording, can_be_recorded, record_run
-from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.tasks.policy_choice import runs_code
+from swarm_logistics_env.tasks.replay import Recording, record_run
 from swarm_logistics_env.tasks.task_choice import DEFAULT
+
+from . import wording
+from .verdict_matrix import VerdictMatrix
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +54,7 @@ def _conditions(results: StudyResults, arms: Any) -> Iterator[dict[str, Any]]:
     share = min(1.0, _MOST_TIMES / max(1, delivered))
     shown = max(1, int(share * len(results.plan.seeds)))
     for arm in arms:
-        outcomes = [_outcome(results, arm, seed) for seed in results.plan.seeds]
+        outcomes = [results.outcome(arm, seed) for seed in results.plan.seeds]
         yield {
             "name": f"{arm.condition.policy.label}, {arm.setting}",
             "end": float(arm.condition.duration),
@@ -70,11 +71,6 @@ def _conditions(results: StudyResults, arms: Any) -> Iterator[dict[str, Any]]:
 def _steps(times: NDArray[np.float64]) -> list[int]:
     gaps: list[int] = np.diff(np.rint(times).astype(int), prepend=0).tolist()
     return gaps
-
-
-def _outcome(results: StudyResults, arm: Arm, seed: int) -> Outcome | None:
-    found = results.outcomes.get(arm.condition.run(results.plan.code, seed).key)
-    return None if found is None or found.error is not None else found
 
 
 def watch_command(arm: Arm) -> str | None:
@@ -262,18 +258,19 @@ def _typical_seed(results: StudyResults, original: Arm, changed: Arm) -> int:
     seeds = list(results.plan.seeds)
     changes = []
     for seed in seeds:
-        before, after = (_outcome(results, arm, seed) for arm in (original, changed))
+        before, after = (results.outcome(arm, seed) for arm in (original, changed))
         changes.append(after.delivered - before.delivered if before and after else -np.inf)
     return seeds[int(np.argsort(changes, kind="stable")[len(seeds) // 2])]
 
 
 def _recorded(results: StudyResults, arm: Arm, seed: int) -> dict[str, Any] | None:
     """Return a stored run, played again; None: it is not the same any more, or cannot be played."""
-    condition, outcome = arm.condition, _outcome(results, arm, seed)
+    condition, outcome = arm.condition, results.outcome(arm, seed)
     source = condition.policy.source
     if condition.task.name != DEFAULT or outcome is None or outcome.digest is None:
         return None
-    if results.plan.code != condition.task.code() or not can_be_recorded(source):
+    # A store's text must run no code.
+    if results.plan.code != condition.task.code() or runs_code(source):
         return None
     run = condition.run(results.plan.code, seed)
     try:

@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from swarm_logistics_env.report import drawing, wording
-from swarm_logistics_env.report.drawing import Panel
-from swarm_logistics_env.report.figures import Figure, slug
-from swarm_logistics_env.report.result_tables import Column, Section, table_section
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparisons import Setting
 from swarm_logistics_env.studies.performance_table import groups_of
@@ -20,6 +16,11 @@ from swarm_logistics_env.studies.policy_comparison import (
     judged_policies,
 )
 from swarm_logistics_env.studies.results import StudyResults
+
+from . import drawing, wording
+from .drawing import Panel
+from .figures import Figure, slug
+from .result_tables import Column, Section, table_section
 
 _HOW_TO_READ = (
     (

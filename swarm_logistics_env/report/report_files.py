@@ -13,15 +13,17 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.report.answer import digest
-from swarm_logistics_env.report.document import Document, document
-from swarm_logistics_env.report.drawing import INK, PAPER, images
-from swarm_logistics_env.report.page_data import page_data
-from swarm_logistics_env.report.result_tables import Section
-from swarm_logistics_env.report.verdict_matrix import matrix_lines
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
+
+from .answer import digest
+from .attributions import with_attributions
+from .document import Document, document
+from .drawing import INK, PAPER, images
+from .page_data import page_data
+from .result_tables import Section
+from .verdict_matrix import matrix_lines
 
 WIDTH = 100  # of the answer [characters]
 
@@ -35,7 +37,7 @@ def write_report(
     Raises:
         StudyError: a file cannot be written.
     """
-    whole = whole or document(results)
+    whole = with_attributions(whole or document(results), directory)
     paths = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
     pictures, page = directory / "figures", directory / "report.html"
     try:

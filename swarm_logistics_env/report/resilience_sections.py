@@ -7,10 +7,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.drawing import rates, repairs
-from swarm_logistics_env.report.figures import Figure, slug
-from swarm_logistics_env.report.result_tables import Column, Section, table_section
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
@@ -24,6 +20,11 @@ from swarm_logistics_env.studies.fault_measures import (
 )
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
+
+from . import wording
+from .drawing import rates, repairs
+from .figures import Figure, slug
+from .result_tables import Column, Section, table_section
 
 _WHO: list[Column] = [
     ("policy", lambda one: one.compared.policy),

@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.figures import Figure
-from swarm_logistics_env.report.wording import NOTHING, Sentence
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.policy_comparison import Agreement, agreements
 from swarm_logistics_env.studies.results import StudyResults
+
+from . import wording
+from .figures import Figure
+from .wording import NOTHING, Sentence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,23 +83,20 @@ def _tables(
     setting: Column = ("", lambda cell: cell.cell)
     columns: list[Column] = [setting]
     if published:
-        columns.append(("P paper", lambda cell: _plain(cell.published)))
+        columns.append(("P paper", _published))
     columns.append(("P ours [95 %]" if published else "P [95 %]", wording.mean_p))
     columns.append(("one run [95 %]", _one_run))
     for indicator, asked in groups_of(tests, "indicator"):
         answers = _answers(indicator, asked, confidence, published=published)
         yield table_section(title, rows, [*columns, *answers])
         # P is printed once: the tables of further indicators hold what was asked alone.
-        rows = [cell for cell in rows if cell.arm in set(tests["compared"].map(_changed))]
+        changed = {comparison.changed for comparison in tests["compared"]}
+        rows = [cell for cell in rows if cell.arm in changed]
         columns, title = [setting], title.removesuffix(", continued") + ", continued"
 
 
-def _changed(comparison: Comparison) -> Arm:
-    return comparison.changed
-
-
-def _plain(value: float) -> str:
-    return f"{value:g}" if wording.is_known(value) else NOTHING
+def _published(cell: Row) -> str:
+    return f"{cell.published:g}" if wording.is_known(cell.published) else NOTHING
 
 
 def _one_run(cell: Row) -> str:
@@ -207,12 +204,8 @@ def _misses(cells: pd.DataFrame) -> str:
     return ", ".join(told) or "none"
 
 
-def warnings(results: StudyResults) -> tuple[str, ...]:
-    """Return what a reader has to know before any verdict, one sentence each."""
-    return tuple(_warnings(results))
-
-
-def _warnings(results: StudyResults) -> Iterator[str]:
+def warnings(results: StudyResults) -> Iterator[str]:
+    """Yield what a reader has to know before any verdict, one sentence each."""
     if results.performance["saturated"].any():
         yield (
             f"{wording.SATURATED} marks a P that is capped, because every item was delivered in at "

@@ -10,13 +10,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.result_tables import Section
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.fault_measures import fault_budgets
 from swarm_logistics_env.studies.performance_table import Row, rows_of
 from swarm_logistics_env.studies.results import StudyResults
+
+from . import wording
+from .result_tables import Section
 
 STUDY = "scorecard"
 # `docs/play_tables.py` writes it.

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from swarm_logistics_env.report import wording
-from swarm_logistics_env.report.report_files import write_text
-from swarm_logistics_env.report.score_card import Line, ScoreCard, explanation, others, rank
 from swarm_logistics_env.spi.verdict_signs import SIGNS
+
+from . import wording
+from .report_files import write_text
+from .score_card import Line, ScoreCard, explanation, others, rank
 
 _WEAKEST_FIRST = ("refuted", "blocked", "inconclusive", "equivalent", "unaffected", "supported")
 _WIDTH, _HEIGHT, _MARGIN = 340, 34, 8  # of the strip of a line [px]

@@ -6,11 +6,12 @@ import json
 from collections.abc import Iterator
 from importlib.metadata import version
 
-from swarm_logistics_env.report.result_tables import Section
-from swarm_logistics_env.report.wording import NOTHING
 from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
 from swarm_logistics_env.studies.plan import Plan
+
+from .result_tables import Section
+from .wording import NOTHING
 
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:

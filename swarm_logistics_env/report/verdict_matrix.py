@@ -83,13 +83,11 @@ class Block:
     Attributes:
         title: heading of the table in the report that holds the numbers.
         axis: the steps in words, e.g. "N 5→10→20" or "m = 1 2 3".
-        steps: a heading for each step.
         rows: the questions.
     """
 
     title: str
     axis: str
-    steps: tuple[str, ...]
     rows: tuple[MatrixRow, ...]
 
 
@@ -156,7 +154,7 @@ def _block(table: str, kind: str, onset: float, tests: pd.DataFrame) -> Block:
         )
     order = list(DEFINITIONS)
     rows.sort(key=lambda row: order.index(row.indicator))
-    return Block(table, _axis(kind, at), tuple(f"{after:g}" for _, after in at), tuple(rows))
+    return Block(table, _axis(kind, at), tuple(rows))
 
 
 def _step(test: Row) -> tuple[float, float]:

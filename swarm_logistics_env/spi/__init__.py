@@ -6,13 +6,7 @@ from .efficiency import karp_flatt
 from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
-from .indicators import (
-    adaptability,
-    fault_tolerance,
-    relative_change,
-    robustness,
-    scalability,
-)
+from .indicators import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .inputs import IndicatorError
 from .multiplicity import adjust, adjusted_p_values, holm
 from .power import (

@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .inputs import Numbers
 
 MIN_SEEDS = 10  # below, too few distinct resamples to studentise
 RESAMPLES = 9_999  # p is a whole number of ten-thousandths
@@ -13,7 +14,7 @@ RESAMPLES = 9_999  # p is a whole number of ten-thousandths
 _FLAT = 1e-12
 
 
-def resampled_pivots(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+def resampled_pivots(residual: Numbers) -> Numbers:
     """Return sqrt(n) mean / sd of resampled seeds, in ascending order.
 
     Dividing by the deviation of each resample is what keeps the error at alpha at ten seeds;
@@ -39,12 +40,12 @@ def resampled_pivots(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.sort(pivots, axis=0).reshape(RESAMPLES, *residual.shape[:-1])
 
 
-def upper_p(pivots: NDArray[np.float64], statistic: NDArray[np.float64]) -> NDArray[np.float64]:
+def upper_p(pivots: Numbers, statistic: Numbers) -> Numbers:
     """Return the one-sided p of a statistic (...), from pivots of shape (RESAMPLES, ...)."""
     return np.asarray((1 + (pivots >= statistic).sum(axis=0)) / (RESAMPLES + 1))
 
 
-def critical_value(pivots: NDArray[np.float64], alpha: float) -> NDArray[np.float64]:
+def critical_value(pivots: Numbers, alpha: float) -> Numbers:
     """Return the statistic above which `upper_p` is below alpha / 2; inf: no statistic is.
 
     Args:
@@ -59,7 +60,7 @@ def critical_value(pivots: NDArray[np.float64], alpha: float) -> NDArray[np.floa
 
 
 @functools.lru_cache(maxsize=8)
-def _times_drawn(n: int) -> NDArray[np.float64]:
+def _times_drawn(n: int) -> Numbers:
     """Return how often each resample holds each of n seeds, shape (RESAMPLES, n)."""
     generator = np.random.Generator(np.random.Philox(key=n))
     drawn = generator.multinomial(n, np.full(n, 1 / n), size=RESAMPLES)

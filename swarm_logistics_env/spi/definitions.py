@@ -8,18 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from .indicators import (
-    adaptability,
-    fault_tolerance,
-    relative_change,
-    robustness,
-    scalability,
-)
-
-if TYPE_CHECKING:
-    from .estimate import Estimate
+from .estimate import Estimate
+from .indicators import adaptability, fault_tolerance, relative_change, robustness, scalability
 
 Factor = Literal["size", "fault", "parameter", "policy"]
 

@@ -6,18 +6,13 @@ rejects "P falls by the margin or more", and "P rises by it or more".
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from .estimate import Estimate, judge
+from numpy.typing import ArrayLike
+
+from .estimate import Estimate, Verdict, judge
 from .inputs import IndicatorError, between_0_and_1
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from numpy.typing import ArrayLike
-
-    from .estimate import Verdict
 
 MARGIN = 0.1
 ALPHA = 0.05  # of each of the two tests

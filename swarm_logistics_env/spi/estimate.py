@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, TypedDict
+from typing import Literal, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .bootstrap import MIN_SEEDS
-from .inputs import IndicatorError, between_0_and_1, finite, performance, positive_mean, same_seeds
+from .inputs import (
+    IndicatorError,
+    Numbers,
+    between_0_and_1,
+    finite,
+    performance,
+    positive_mean,
+    same_seeds,
+)
 from .ratio import RatioTest, paired_ratio
 from .simulation import Simulation, combined_ratio, simulated_samples
 from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
 from .verdict_signs import SIGNS
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
-
-    from numpy.typing import ArrayLike, NDArray
-
 
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
@@ -201,7 +205,14 @@ def judge(
         return replace(untested, flags=("single_seed",))
     test, flags = _tested(untested, weighted, offset, simulation)
     p_value, probability = float(test.p_value), float(test.probability)
-    flags += _flags(test, n_seeds, _capped_side(weighted, saturated))
+    # The true P of one that is capped is larger, so that it may have brought about this verdict.
+    capped = {"refuted" if weighted[name].in_num > 0.0 else "supported" for name in saturated}
+    if n_seeds < LEAST_SEEDS:
+        flags.append("too_few_seeds")
+    if test.degenerate:
+        flags.append("degenerate")
+    if ("supported" if test.probability > 0.5 else "refuted") in capped:
+        flags.append("capped")
     if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
         p_value, probability = 1.0, 0.5
     elif not paired or n_seeds < MIN_SEEDS or simulation is not None:
@@ -238,7 +249,8 @@ def _tested(
             raise IndicatorError("simulation needs paired = True: set-ups that were replayed")
         return unpaired_ratio(list(weighted.values()), **asking), []
     *_, reference = weighted.values()
-    num, den = _numerator(weighted), reference.sample
+    num = np.asarray(sum(term.in_num * term.sample for term in weighted.values()))
+    den = reference.sample
     if simulation is not None:
         weights = {name: (term.in_num, term.in_den) for name, term in weighted.items()}
         replayed, further = (
@@ -281,29 +293,7 @@ def _checked(
     return weighted
 
 
-def _flags(test: RatioTest, n_seeds: int, capped_side: set[Verdict]) -> Iterator[str]:
-    """Yield why a test gives no verdict."""
-    if n_seeds < LEAST_SEEDS:
-        yield "too_few_seeds"
-    if test.degenerate:
-        yield "degenerate"
-    if ("supported" if test.probability > 0.5 else "refuted") in capped_side:
-        yield "capped"
-
-
-def _capped_side(terms: Mapping[str, Term], saturated: Collection[str]) -> set[Verdict]:
-    """Return the verdicts that a capped P may have brought about: the true P is larger."""
-    return {"refuted" if terms[name].in_num > 0.0 else "supported" for name in saturated}
-
-
-def _numerator(terms: Mapping[str, Term]) -> NDArray[np.float64]:
-    numerator = np.zeros_like(next(iter(terms.values())).sample)
-    for term in terms.values():
-        numerator += term.in_num * term.sample
-    return numerator
-
-
-def _skewed(difference: NDArray[np.float64]) -> bool:
+def _skewed(difference: Numbers) -> bool:
     """Whether n is too small for the skewness of D: Cochran's n > 25 g^2 fails, beyond chance.
 
     Cochran (1977, Sampling Techniques, 2.15) gives the rule for the population's g. That of a few

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, SupportsIndex, Unpack
+from typing import SupportsIndex, Unpack
 
-from .estimate import Options, judge
+from numpy.typing import ArrayLike
+
+from .estimate import Estimate, Options, judge
 from .inputs import IndicatorError, count, finite
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from .estimate import Estimate
 
 
 def scalability(
@@ -120,12 +117,7 @@ def robustness(
 
 
 def adaptability(
-    p_o: ArrayLike,
-    p_new: ArrayLike,
-    *,
-    x_o: float,
-    x_new: float,
-    **options: Unpack[Options],
+    p_o: ArrayLike, p_new: ArrayLike, *, x_o: float, x_new: float, **options: Unpack[Options]
 ) -> Estimate:
     """Adaptability A = ((P_new - P_o) / P_o) / |(x_new - x_o) / x_o| + 1 (paper, eq. A).
 
@@ -155,11 +147,7 @@ def adaptability(
     )
 
 
-def relative_change(
-    p_o: ArrayLike,
-    p_new: ArrayLike,
-    **options: Unpack[Options],
-) -> Estimate:
+def relative_change(p_o: ArrayLike, p_new: ArrayLike, **options: Unpack[Options]) -> Estimate:
     """Relative change (P_new - P_o) / P_o, for ablations and regressions (paper, eq. SdP).
 
     "P falls by at least a third" is the change against `threshold=-1/3`, refuted.

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Sequence
-from typing import SupportsIndex
+from typing import SupportsIndex, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Numbers: TypeAlias = NDArray[np.float64]
 
-def performance(name: str, values: ArrayLike) -> NDArray[np.float64]:
+
+def performance(name: str, values: ArrayLike) -> Numbers:
     """Performances as a float array (n,): not empty, finite, not negative."""
     array = numbers(name, values)
     if array.ndim != 1:
@@ -28,7 +30,7 @@ def performance(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def numbers(name: str, values: ArrayLike) -> Numbers:
     """A float array of any shape."""
     try:
         return np.asarray(values, dtype=np.float64)
@@ -36,7 +38,7 @@ def numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise IndicatorError(f"{name} = {values!r}: should be an array of numbers") from None
 
 
-def same_seeds(**samples: NDArray[np.float64]) -> None:
+def same_seeds(**samples: Numbers) -> None:
     """Raise unless all samples have one performance for each of the same seeds."""
     if len({sample.size for sample in samples.values()}) > 1:
         lengths = ", ".join(f"{name} has {sample.size}" for name, sample in samples.items())
@@ -46,7 +48,7 @@ def same_seeds(**samples: NDArray[np.float64]) -> None:
         )
 
 
-def positive_mean(name: str, sample: NDArray[np.float64]) -> None:
+def positive_mean(name: str, sample: Numbers) -> None:
     """Raise where the mean that the indicator divides by is 0."""
     if not sample.any():
         raise IndicatorError(
@@ -82,7 +84,7 @@ def between_0_and_1(name: str, value: float) -> float:
     return number
 
 
-def delivery_times(name: str, runs: Sequence[ArrayLike]) -> list[NDArray[np.float64]]:
+def delivery_times(name: str, runs: Sequence[ArrayLike]) -> list[Numbers]:
     """Delivery times [s] of each seed, ascending: at least one seed, finite, not negative."""
     if len(runs) == 0:
         raise IndicatorError(f"{name} is empty: should hold the delivery times of each seed")

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .inputs import IndicatorError, numbers
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from .equivalence import Equivalence
-    from .estimate import Estimate, Verdict
+from .equivalence import Equivalence
+from .estimate import Estimate, Verdict
+from .inputs import IndicatorError, Numbers, numbers
 
 
-def holm(p_values: ArrayLike) -> NDArray[np.float64]:
+def holm(p_values: ArrayLike) -> Numbers:
     """Holm's adjusted p-values, in the order given, shape (k,).
 
     Rejecting where the adjusted p < alpha keeps the chance of any false rejection in the family

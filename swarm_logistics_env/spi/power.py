@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+from .equivalence import Equivalence
+from .estimate import Estimate
 from .inputs import IndicatorError, between_0_and_1, count, finite
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from .equivalence import Equivalence
-    from .estimate import Estimate
 
 MAX_SEEDS = 1_000_000
 # A pilot's own spread is as often too small as too large, and power falls faster on the one side

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bootstrap import MIN_SEEDS, critical_value, resampled_pivots, upper_p
+from .inputs import Numbers
 
 # Differences this far below the numbers they are taken from are rounding, not spread between seeds.
 ROUNDING = 1e-12
@@ -22,21 +23,21 @@ ROUNDING = 1e-12
 class RatioTest(NamedTuple):
     """What the data say about one ratio, or about one ratio per study (arrays of one shape)."""
 
-    value: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    probability: NDArray[np.float64]
-    p_value: NDArray[np.float64]
-    difference_sd: NDArray[np.float64]
-    mean_denominator: NDArray[np.float64]
+    value: Numbers
+    low: Numbers
+    high: Numbers
+    probability: Numbers
+    p_value: Numbers
+    difference_sd: Numbers
+    mean_denominator: Numbers
     degrees_of_freedom: float
     degenerate: NDArray[np.bool_]
     unbounded: NDArray[np.bool_]
 
 
 def paired_ratio(
-    num: NDArray[np.float64],
-    den: NDArray[np.float64],
+    num: Numbers,
+    den: Numbers,
     *,
     offset: float = 0.0,
     threshold: float = 0.0,
@@ -95,19 +96,14 @@ def paired_ratio(
     )
 
 
-def probability_of(
-    p_value: NDArray[np.float64], mean_difference: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def probability_of(p_value: Numbers, mean_difference: Numbers) -> Numbers:
     """Confidence that theta lies above the threshold, from the two-sided p and the side."""
     return np.where(mean_difference > 0.0, 1.0 - p_value / 2, p_value / 2)
 
 
 def fieller_limits(
-    num: NDArray[np.float64],
-    den: NDArray[np.float64],
-    t_low: NDArray[np.float64],
-    t_high: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    num: Numbers, den: Numbers, t_low: Numbers, t_high: Numbers
+) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
     """Limits of mean(num)/mean(den) and where they are unbounded, from arrays of shape (..., n).
 
     The lower limit solves mean(D) = t_low se(D) for D = num - theta den, the upper one
@@ -129,13 +125,13 @@ def fieller_limits(
 
 
 def limits_from_moments(
-    value: NDArray[np.float64],
-    mean_den: NDArray[np.float64],
-    s_rr: NDArray[np.float64],
-    s_rd: NDArray[np.float64],
-    s_dd: NDArray[np.float64],
-    critical: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    value: Numbers,
+    mean_den: Numbers,
+    s_rr: Numbers,
+    s_rd: Numbers,
+    s_dd: Numbers,
+    critical: tuple[Numbers, Numbers],
+) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
     """Limits around a ratio of means `value`, and where they are unbounded.
 
     Args:
@@ -145,7 +141,7 @@ def limits_from_moments(
         critical: of the lower and of the upper limit, positive; inf for no limit.
     """
 
-    def limit(t: NDArray[np.float64], side: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def limit(t: Numbers, side: int) -> tuple[Numbers, NDArray[np.bool_]]:
         finite = np.where(np.isfinite(t), t, 0.0)
         a = mean_den**2 - finite**2 * s_dd
         unbounded = (a <= 0.0) | ~np.isfinite(t)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .estimate import Estimate, judge
-from .inputs import delivery_times, finite
+from .inputs import Numbers, delivery_times, finite
 
 
 def resilience_index(
@@ -39,7 +39,7 @@ def resilience_index(
     """
     finite("onset", onset)
 
-    def after_onset(name: str, runs: Sequence[ArrayLike]) -> NDArray[np.float64]:
+    def after_onset(name: str, runs: Sequence[ArrayLike]) -> Numbers:
         times = delivery_times(name, runs)
         return np.array([np.count_nonzero(run > onset) for run in times], dtype=np.float64)
 

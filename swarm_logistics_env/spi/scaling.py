@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .inputs import IndicatorError, between_0_and_1, performance
+from .inputs import IndicatorError, Numbers, between_0_and_1, performance
 from .scaling_laws import (
     CURVES,
     Curve,
@@ -57,7 +57,7 @@ class ScalingFit:
     residual_sum: float
     aicc: float | None
 
-    def predict(self, sizes: ArrayLike) -> NDArray[np.float64]:
+    def predict(self, sizes: ArrayLike) -> Numbers:
         """Performance [items] that the law gives at swarm sizes [robots]."""
         values = np.array(list(self.parameters.values()))
         return CURVES[self.law](values, np.asarray(sizes, dtype=np.float64))
@@ -129,9 +129,9 @@ def compare_scaling(
 class _Points(NamedTuple):
     """Swarm sizes, performances there, and the square roots of their weights, shapes (k,)."""
 
-    n: NDArray[np.float64]
-    p: NDArray[np.float64]
-    root_weights: NDArray[np.float64]
+    n: Numbers
+    p: Numbers
+    root_weights: Numbers
 
 
 def _checked(sizes: ArrayLike, p: ArrayLike, weighting: Weighting) -> _Points:
@@ -152,12 +152,10 @@ def _checked(sizes: ArrayLike, p: ArrayLike, weighting: Weighting) -> _Points:
     return _Points(n, observed, 1.0 / np.sqrt(observed) if weighted else np.ones_like(observed))
 
 
-def _least_squares(
-    curve: Curve, start: NDArray[np.float64], points: _Points
-) -> tuple[NDArray[np.float64], float]:
+def _least_squares(curve: Curve, start: Numbers, points: _Points) -> tuple[Numbers, float]:
     from scipy.optimize import least_squares
 
-    def residuals(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residuals(parameters: Numbers) -> Numbers:
         with np.errstate(all="ignore"):  # the search may step where the law has no value
             predicted = curve(parameters, points.n)
         misses = (points.p - predicted) * points.root_weights
@@ -173,12 +171,7 @@ def _least_squares(
 
 
 def _peak_limits(
-    law: Law,
-    peak: float,
-    bluntest: float,
-    residual_sum: float,
-    points: _Points,
-    confidence: float,
+    law: Law, peak: float, bluntest: float, residual_sum: float, points: _Points, confidence: float
 ) -> tuple[float, float]:
     """Every N* whose best fit is not worse than the best of all by an F-test at `confidence`."""
     from scipy.optimize import brentq

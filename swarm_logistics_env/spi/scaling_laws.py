@@ -7,26 +7,23 @@ from collections.abc import Callable
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .inputs import Numbers
 
 Law = Literal["usl", "power_exponential"]
-Curve: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]"
+Curve: TypeAlias = "Callable[[Numbers, Numbers], Numbers]"
 
 
-def _usl(parameters: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.float64]:
+def _usl(parameters: Numbers, n: Numbers) -> Numbers:
     g, a, b = parameters
     return np.asarray(g * _shape_usl(a, b, n))
 
 
-def _shape_usl(
-    a: NDArray[np.float64], b: NDArray[np.float64], n: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _shape_usl(a: Numbers, b: Numbers, n: Numbers) -> Numbers:
     return n / (1.0 + a * (n - 1.0) + b * n * (n - 1.0))
 
 
-def _power_exponential(
-    parameters: NDArray[np.float64], n: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _power_exponential(parameters: Numbers, n: Numbers) -> Numbers:
     k, p, q = (float(value) for value in parameters)
     return np.exp(-q * n) * n**p * k
 
@@ -34,7 +31,7 @@ def _power_exponential(
 CURVES: dict[Law, Curve] = {"usl": _usl, "power_exponential": _power_exponential}
 
 
-def usl_start(n: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[np.float64]:
+def usl_start(n: Numbers, observed: Numbers) -> Numbers:
     """Values of g, a, b near the best ones, to start the search from."""
     # N/P is linear in 1/g, a/g, b/g; weighted back to the scale of P.
     positive = observed > 0.0
@@ -48,9 +45,7 @@ def usl_start(n: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[
     return np.array([1.0 / scale, inverse[1] / scale, inverse[2] / scale])
 
 
-def power_exponential_start(
-    n: NDArray[np.float64], observed: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def power_exponential_start(n: Numbers, observed: Numbers) -> Numbers:
     """Values of k, p, q near the best ones, to start the search from."""
     positive = observed > 0.0
     n, observed = n[positive], observed[positive]
@@ -62,7 +57,7 @@ def power_exponential_start(
     return np.array([math.exp(log_k), p, q])
 
 
-def peak_of(law: Law, parameters: NDArray[np.float64]) -> float | None:
+def peak_of(law: Law, parameters: Numbers) -> float | None:
     """N* [robots]: sqrt((1-a)/b) or p/q; None where the curve has no maximum beyond one robot."""
     _, second, third = (float(value) for value in parameters)
     if third <= 0.0:
@@ -71,7 +66,7 @@ def peak_of(law: Law, parameters: NDArray[np.float64]) -> float | None:
     return peak if peak > 1.0 else None
 
 
-def sharpness_of(law: Law, parameters: NDArray[np.float64], peak: float) -> float:
+def sharpness_of(law: Law, parameters: Numbers, peak: float) -> float:
     """Sharpness at which `shapes_with_peak_at` gives the fitted curve, whose N* is `peak` > 1.
 
     inf where the fitted law has a pole.
@@ -83,9 +78,7 @@ def sharpness_of(law: Law, parameters: NDArray[np.float64], peak: float) -> floa
     return math.log(share / (1.0 - share)) if share < 1.0 else math.inf
 
 
-def shapes_with_peak_at(
-    law: Law, peak: float, sharpness: NDArray[np.float64], n: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def shapes_with_peak_at(law: Law, peak: float, sharpness: Numbers, n: Numbers) -> Numbers:
     """Return the law at sizes n without its factor (g or k), for a fixed peak N* > 1.
 
     With a fixed peak one parameter is left besides the factor: the sharpness, any real number. The
@@ -97,5 +90,5 @@ def shapes_with_peak_at(
         b = 1.0 / (1.0 + np.exp(-sharpness[:, np.newaxis])) / (peak - 1.0) ** 2
         return _shape_usl(1.0 - b * peak**2, b, n)
     exponent = np.log(n) - n / peak
-    steepness: NDArray[np.float64] = np.exp(sharpness[:, np.newaxis])
+    steepness: Numbers = np.exp(sharpness[:, np.newaxis])
     return np.asarray(np.exp(steepness * (exponent - exponent.max())))

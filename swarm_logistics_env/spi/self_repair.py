@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .inputs import IndicatorError, between_0_and_1, delivery_times
+from .inputs import IndicatorError, Numbers, between_0_and_1, delivery_times
 
 SWAPS = 999  # random swaps in the test that there is any loss
 SIMULATIONS = 400  # for each candidate time; they fix its 95 % limit to +-1 %
@@ -109,12 +109,8 @@ def self_repair(
 
 
 def repair_times(
-    faulty: Sequence[ArrayLike],
-    reference: Sequence[ArrayLike],
-    *,
-    onset: float,
-    end: float,
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    faulty: Sequence[ArrayLike], reference: Sequence[ArrayLike], *, onset: float, end: float
+) -> tuple[Numbers, NDArray[np.bool_]]:
     """Self-repair time of every seed's own run, for `kaplan_meier`; see `self_repair`.
 
     A single run delivers too little to place a change: most of such a time is noise, and it says
@@ -149,7 +145,7 @@ def _followed(onset: float, end: float) -> tuple[float, float]:
     return followed, followed / min(_MOST_BINS, max(1, math.floor(followed)))
 
 
-def _counts(name: str, runs: Sequence[ArrayLike], onset: float, end: float) -> NDArray[np.float64]:
+def _counts(name: str, runs: Sequence[ArrayLike], onset: float, end: float) -> Numbers:
     """Return the deliveries of each seed in bins from onset to end, shape (seeds, bins)."""
     followed, bin_seconds = _followed(onset, end)
     edges = onset + bin_seconds * np.arange(round(followed / bin_seconds) + 1)
@@ -169,7 +165,7 @@ def _paired_counts(
     pair: tuple[Sequence[ArrayLike], Sequence[ArrayLike]],
     onset: float,
     end: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Numbers, Numbers]:
     lead, other = (_counts(name, runs, onset, end) for name, runs in zip(names, pair, strict=True))
     if len(lead) != len(other):
         raise IndicatorError(
@@ -181,7 +177,7 @@ def _paired_counts(
     return lead, other
 
 
-def _log_likelihood(lead: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+def _log_likelihood(lead: Numbers, other: Numbers) -> Numbers:
     """Return how much likelier a loss up to each bin's start is than none.
 
     Args:
@@ -203,10 +199,7 @@ def _log_likelihood(lead: NDArray[np.float64], other: NDArray[np.float64]) -> ND
 
 
 def _swapped_p(
-    lead: NDArray[np.float64],
-    other: NDArray[np.float64],
-    observed: float,
-    generator: np.random.Generator,
+    lead: Numbers, other: Numbers, observed: float, generator: np.random.Generator
 ) -> float:
     """Return the p of no loss: without one, the runs of a seed could as well be swapped."""
     difference, reference = lead - other, other.sum(axis=0)
@@ -217,7 +210,7 @@ def _swapped_p(
     return float(1 + (swapped >= observed - 1e-9).sum()) / (SWAPS + 1)
 
 
-def _dispersion(lead: NDArray[np.float64], other: NDArray[np.float64], bin_seconds: float) -> float:
+def _dispersion(lead: Numbers, other: Numbers, bin_seconds: float) -> float:
     """Return the variance of the pair's difference over a Poisson one's, at least 1."""
     width = max(1, min(lead.shape[1], round(_BLOCK / bin_seconds)))
     starts = np.arange(0, lead.shape[1], width)
@@ -226,9 +219,9 @@ def _dispersion(lead: NDArray[np.float64], other: NDArray[np.float64], bin_secon
 
 
 def _kept(
-    lead: NDArray[np.float64],
-    other: NDArray[np.float64],
-    curve: NDArray[np.float64],
+    lead: Numbers,
+    other: Numbers,
+    curve: Numbers,
     dispersion: float,
     confidence: float,
     generator: np.random.Generator,

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-from .inputs import IndicatorError, between_0_and_1, count
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
+from .inputs import IndicatorError, Numbers, between_0_and_1, count
 
 Spending = Literal["obrien-fleming", "linear"]
 _REACH = 9.0  # standard deviations that the integration grid covers
@@ -63,8 +59,8 @@ def _boundaries(seeds: tuple[int, ...], alpha: float, spending: Spending) -> tup
             boundary: float,
             to_spend: float = to_spend,
             step: float = step,
-            start: NDArray[np.float64] = points,
-            mass: NDArray[np.float64] = weights * density,
+            start: Numbers = points,
+            mass: Numbers = weights * density,
         ) -> float:
             """Chance of a first crossing here, over both sides, less what may be spent."""
             return 2.0 * float((mass * ndtr((start - boundary) / step)).sum()) - to_spend
@@ -90,7 +86,7 @@ def _spent(information: float, alpha: float, spending: Spending) -> float:
     return 4.0 * float(ndtr(ndtri(alpha / 4.0) / math.sqrt(information)))
 
 
-def _simpson(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _simpson(points: Numbers) -> Numbers:
     weights = np.full(points.size, 2.0)
     weights[1::2] = 4.0
     weights[[0, -1]] = 1.0

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from math import factorial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from .inputs import IndicatorError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
 
 Cause = TypeVar("Cause", int, str)
 

@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .inputs import IndicatorError, between_0_and_1, performance, same_seeds
+from .inputs import IndicatorError, Numbers, between_0_and_1, performance, same_seeds
 from .ratio import ROUNDING, RatioTest, limits_from_moments, probability_of
 from .summaries import Interval
 
@@ -34,7 +34,7 @@ class Simulation(NamedTuple):
     further: Mapping[str, ArrayLike]
 
 
-Sample = tuple["NDArray[np.float64]", "NDArray[np.float64]"]  # numerators, denominators
+Sample = tuple[Numbers, Numbers]  # numerators, denominators
 
 
 def simulated_samples(
@@ -165,16 +165,14 @@ def combined_ratio(
 class _Moments(NamedTuple):
     """Adjusted means of numerator and denominator, their squared errors and covariance."""
 
-    num: NDArray[np.float64]
-    den: NDArray[np.float64]
-    s_nn: NDArray[np.float64]
-    s_nd: NDArray[np.float64]
-    s_dd: NDArray[np.float64]
+    num: Numbers
+    den: Numbers
+    s_nn: Numbers
+    s_nd: Numbers
+    s_dd: Numbers
 
 
-def _adjusted(
-    real: Sample, control: NDArray[np.float64], everywhere: NDArray[np.float64]
-) -> _Moments:
+def _adjusted(real: Sample, control: Numbers, everywhere: Numbers) -> _Moments:
     """Regress the real runs on the control, and read them off at its mean over all set-ups."""
     r = control.shape[-1]
     centred = control - control.mean(axis=-1, keepdims=True)
@@ -198,7 +196,7 @@ def _adjusted(
     )
 
 
-def _control(replayed: Sample, further: Sample) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _control(replayed: Sample, further: Sample) -> tuple[Numbers, Numbers]:
     """Return the simulated residuals num - theta_sim den of the replayed set-ups, and of all."""
     num, den = (np.concatenate(parts, axis=-1) for parts in zip(replayed, further, strict=True))
     mean_den = den.mean(axis=-1)

@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .inputs import between_0_and_1, performance, same_seeds
+from .inputs import Numbers, between_0_and_1, performance, same_seeds
 
 
 class Interval(NamedTuple):
@@ -101,9 +101,7 @@ def pairing_correlation(p_a: ArrayLike, p_b: ArrayLike) -> float | None:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def t_interval(
-    sample: NDArray[np.float64], confidence: float = 0.95, *, of_one_run: bool = False
-) -> Interval:
+def t_interval(sample: Numbers, confidence: float = 0.95, *, of_one_run: bool = False) -> Interval:
     """Mean of a sample (n,) of any sign with its t-interval, or with that of one further value.
 
     Raises:

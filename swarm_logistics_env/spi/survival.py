@@ -6,18 +6,18 @@ import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .inputs import IndicatorError, between_0_and_1, numbers
+from .inputs import IndicatorError, Numbers, between_0_and_1, numbers
 
 
 class SurvivalCurve(NamedTuple):
     """Share of runs still without the event after each event time, shapes (k,)."""
 
-    seconds: NDArray[np.float64]
-    share: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    seconds: Numbers
+    share: Numbers
+    low: Numbers
+    high: Numbers
 
     def median(self) -> float | None:
         """First time at which half the runs have had the event [s]; None where never reached."""

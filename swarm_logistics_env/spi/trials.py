@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .inputs import IndicatorError
+from .inputs import IndicatorError, Numbers
 from .trials_table import Table, read_table
 
 NO_FAULT = "none"
@@ -57,6 +56,12 @@ class Trial:
     times: tuple[float, ...] | None = None
     duration: float | None = None
 
+    @property
+    def condition(self) -> tuple[object, ...]:
+        """What is equal in the trials of one condition."""
+        fault = self.fault, self.faulty, self.onset
+        return (self.policy, self.table, self.n_robots, *fault, self.parameters)
+
 
 @dataclass(frozen=True)
 class Trials:
@@ -100,7 +105,7 @@ class Trials:
             raise IndicatorError(f"{self.file} has no trial with {asked}")
         return tuple(sorted(found, key=lambda row: row.seed or 0))
 
-    def performance(self, **conditions: object) -> NDArray[np.float64]:
+    def performance(self, **conditions: object) -> Numbers:
         """Return P of the runs that `select` gives, shape (n,)."""
         return np.array([row.performance for row in self.select(**conditions)])
 
@@ -147,7 +152,7 @@ def _runs(table: Table, duration: float | None) -> list[Trial]:
     for line in range(len(table.rows)):
         trial = _trial(table, line, duration, table.number(line, "performance", least=0.0))
         label = table.text(line, "trial")
-        if label and (first := labels.setdefault((_condition(trial), label), line)) != line:
+        if label and (first := labels.setdefault((trial.condition, label), line)) != line:
             raise table.error(
                 line, "trial", f"is in line {table.lines[first]} too: should name one run a row"
             )
@@ -178,20 +183,13 @@ def _events(table: Table, duration: float | None) -> list[Trial]:
                 "should say when a trial ends [s], as a fault begins during it; "
                 "a column of it, or --duration SECONDS",
             )
-        key = (_condition(trial), trial.seed, table.text(line, "trial"))
+        key = (trial.condition, trial.seed, table.text(line, "trial"))
         runs.setdefault(key, []).append((trial, time))
     found = []
     for deliveries in runs.values():
         times = tuple(sorted(time for _, time in deliveries if time is not None))
         found.append(replace(deliveries[0][0], times=times, performance=float(len(times))))
     return found
-
-
-def _condition(trial: Trial) -> tuple[object, ...]:
-    return (
-        *(trial.policy, trial.table, trial.n_robots, trial.fault, trial.faulty, trial.onset),
-        trial.parameters,
-    )
 
 
 def _trial(table: Table, line: int, duration: float | None, performance: float) -> Trial:
@@ -256,7 +254,7 @@ def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
         )
     conditions: dict[object, dict[int | None, Trial]] = {}
     for row in seeded:
-        of_seed = conditions.setdefault(_condition(row), {})
+        of_seed = conditions.setdefault(row.condition, {})
         if row.seed in of_seed:
             raise IndicatorError(
                 f"{path}, line {row.line}: has seed {row.seed} like line {of_seed[row.seed].line}, "

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .inputs import Numbers
 from .ratio import ROUNDING, RatioTest, probability_of
 
 
 class Term(NamedTuple):
     """One sample of performances and its weights in numerator and denominator of the ratio."""
 
-    sample: NDArray[np.float64]
+    sample: Numbers
     in_num: float
     in_den: float
 
@@ -29,11 +29,7 @@ class _Difference(NamedTuple):
 
 
 def unpaired_ratio(
-    terms: Sequence[Term],
-    *,
-    offset: float = 0.0,
-    threshold: float = 0.0,
-    confidence: float = 0.95,
+    terms: Sequence[Term], *, offset: float = 0.0, threshold: float = 0.0, confidence: float = 0.95
 ) -> RatioTest:
     """Interval and test of theta from independent samples of at least two seeds each.
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from swarm_logistics_env.studies.study import Study
+from .study import Study
 
 __all__ = ["Study"]

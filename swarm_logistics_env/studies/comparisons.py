@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,8 @@ from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
 from swarm_logistics_env.spi.equivalence import Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.simulation import Simulation
-from swarm_logistics_env.studies.runs import Condition
+
+from .runs import Condition
 
 Performance = Callable[["Arm"], NDArray[np.float64]]
 
@@ -52,26 +52,6 @@ class Arm:
 
     setting: Setting
     condition: Condition
-
-
-@dataclass(frozen=True)
-class NullPair:
-    """Two arms without fault that share worlds, not behaviour: what chance alone makes of them.
-
-    Attributes:
-        table: heading of the report's table of the faults whose null this is.
-        original: the arm of P_o.
-        other: the same with other behaviour seeds.
-    """
-
-    table: str
-    original: Arm
-    other: Arm
-
-    @property
-    def policy(self) -> str:
-        """Label of the policy."""
-        return self.original.condition.policy.label
 
 
 class Question(NamedTuple):
@@ -148,45 +128,29 @@ class Comparison:
         return str(after)
 
     def estimate(
-        self,
-        performance: Performance,
-        *,
-        confidence: float = 0.95,
-        paired: bool = True,
-        saturated: Collection[Arm] = (),
-        identical: bool = False,
-        simulation: Simulation | None = None,
+        self, performance: Performance, *, saturated: Collection[Arm] = (), **options: Any
     ) -> Estimate:
         """Return the indicator over seeds.
 
         Args:
             performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
-            confidence: of interval and verdict, in (0, 1).
-            paired: whether the arms share their seeds, row by row.
             saturated: arms whose P is capped, every item delivered in a run.
-            identical: whether the runs of the original and the changed arm are the same runs.
-            simulation: simulated runs that narrow the interval of real ones, by `arguments`.
+            options: the further `spi.Options`; `identical` is about the original and the changed
+                arm, and `simulation` about the arms by `arguments`.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
         """
-        definition = self.definition
-        named = self.arguments
-        change = Change(
-            self.original.setting.value,
-            self.changed.setting.value,
-            self.original.condition.size,
-        )
+        definition, named = self.definition, self.arguments
+        before, after = self.original.setting.value, self.changed.setting.value
+        if self.removed:  # the removed robots make the third condition another one by construction
+            options.pop("identical", None)
         return definition.function(
             **{name: performance(arm) for name, arm in named.items()},
-            **definition.arguments(change),
+            **definition.arguments(Change(before, after, self.original.condition.size)),
             threshold=self.threshold,
-            confidence=confidence,
-            paired=paired,
             saturated=[name for name, arm in named.items() if arm in saturated],
-            simulation=simulation,
-            # The removed robots make the third condition another one by construction.
-            **({} if self.removed else {"identical": identical}),
+            **options,
         )
 
     def equivalence(
@@ -194,16 +158,16 @@ class Comparison:
         performance: Performance,
         *,
         margin: float,
-        alpha: float,
-        paired: bool = True,
         saturated: Collection[Arm] = (),
         identical: bool = False,
+        **options: Any,
     ) -> Equivalence | None:
         """Return whether P is unchanged within a margin; None for S, which has no such question.
 
         Args:
-            margin, alpha: as in `spi.equivalence`.
-            performance, paired, saturated, identical: as in `estimate`.
+            performance, saturated, identical: as in `estimate`.
+            margin: as in `spi.equivalence`.
+            options: its `alpha` and `paired`.
 
         Raises:
             IndicatorError: the change is undefined, e.g. because mean P_o is 0.
@@ -213,13 +177,13 @@ class Comparison:
         named = {"p_o": self.original, "p_new": self.changed}
         if self.removed:
             named["p_s"] = self.removed
+        samples: dict[str, Any] = {name: performance(arm) for name, arm in named.items()}
         return equivalence(
-            **{name: performance(arm) for name, arm in named.items()},
+            **samples,
             margin=margin,
-            alpha=alpha,
-            paired=paired,
             saturated=[name for name, arm in named.items() if arm in saturated],
             identical=identical and not self.removed,
+            **options,
         )
 
 
@@ -257,7 +221,7 @@ def load_reference(name: str | None) -> Reference | None:
     """
     if name is None:
         return None
-    from swarm_logistics_env.studies.presets import PAPER
+    from .presets import PAPER
 
     known = {"paper": PAPER}
     if name not in known:

@@ -19,11 +19,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from unittest.mock import patch
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import Condition, Run
 from swarm_logistics_env.tasks.task import Outcome
+
+from .plan import Plan
+from .runs import Condition, Run
 
 # Simulated seconds that are played to know how long a study takes.
 PILOT = 3.0
@@ -62,7 +64,7 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
         return serial
     if name == "process":
         return ProcessPool(processes or os.cpu_count() or 1)
-    from swarm_logistics_env.studies.ray_cluster import Cluster
+    from .ray_cluster import Cluster
 
     if address is not None and processes is not None:
         raise StudyError("engine ray: a cluster that runs already has its own number of cores")
@@ -87,7 +89,9 @@ def execute(run: Run) -> Outcome:
 
 
 # One thread per worker: n workers with n threads each would wait for each other.
-_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_ONE_THREAD = dict.fromkeys(
+    ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+)
 
 
 class ProcessPool:
@@ -162,7 +166,7 @@ def workers(count: int) -> Iterator[ProcessPoolExecutor]:
     theirs, ours = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
     try:
-        with _one_thread_each(), _interrupts_ignored():
+        with patch.dict(os.environ, _ONE_THREAD), _interrupts_ignored():
             started = [pool.submit(os.getpid) for _ in range(count)]
         try:
             started[0].result()
@@ -205,20 +209,6 @@ def _play(key: str, message: bytes) -> Outcome:
         return execute(pickle.loads(message))
     except Exception:  # noqa: BLE001 - a policy that only the parent can import
         return Outcome(key, error=traceback.format_exc())
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 @contextmanager

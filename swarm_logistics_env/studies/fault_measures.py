@@ -17,9 +17,10 @@ from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.spi.survival import SurvivalCurve
-from swarm_logistics_env.studies.comparisons import Comparison
-from swarm_logistics_env.studies.performance_table import Row, rows_of
-from swarm_logistics_env.studies.results import StudyResults, Times
+
+from .comparisons import Comparison
+from .performance_table import Row, rows_of
+from .results import StudyResults, Times
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,17 +120,15 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
     Raises:
         StudyError: why there can be no self-repair time.
     """
-    for null_pair in results.plan.null_pairs:
-        if (null_pair.policy, null_pair.table) != (comparison.policy, comparison.table):
-            continue
-        original, other = results.times_of(null_pair.original), results.times_of(null_pair.other)
-        if original is None or other is None:
-            break
-        arms = (*comparison.arms, null_pair.other)
-        if any(outcome.all_delivered for arm in arms for outcome in results.outcomes_of(arm) or ()):
-            raise StudyError("the items ran out, and the rate with them: use restock")
-        return original, other
-    raise StudyError("the runs of the no-fault null are missing")
+    null = results.plan.nulls.get((comparison.policy, comparison.table))
+    original = results.times_of(comparison.original)
+    other = results.times_of(null) if null else None
+    if null is None or original is None or other is None:
+        raise StudyError("the runs of the no-fault null are missing")
+    arms = (*comparison.arms, null)
+    if any(outcome.all_delivered for arm in arms for outcome in results.outcomes_of(arm) or ()):
+        raise StudyError("the items ran out, and the rate with them: use restock")
+    return original, other
 
 
 def _self_repair(

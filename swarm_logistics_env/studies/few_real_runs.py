@@ -13,8 +13,9 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.comparisons import Arm, Comparison
-from swarm_logistics_env.studies.results import StudyResults
+
+from .comparisons import Arm, Comparison
+from .results import StudyResults
 
 
 class Narrowed(NamedTuple):
@@ -136,8 +137,8 @@ def _performance(results: StudyResults, arm: Arm, seeds: Sequence[int]) -> NDArr
     """
     values = []
     for seed in seeds:
-        outcome = results.outcomes.get(arm.condition.run(results.plan.code, seed).key)
-        if outcome is None or outcome.error is not None:
+        outcome = results.outcome(arm, seed)
+        if outcome is None:
             raise StudyError(f"{arm.setting}: the run of seed {seed} is missing or failed")
         values.append(outcome.delivered)
     return np.array(values, dtype=np.float64)

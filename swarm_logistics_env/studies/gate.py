@@ -21,17 +21,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numpy as np
-
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
-from swarm_logistics_env.studies.judged_comparisons import estimate_of, same_runs
-from swarm_logistics_env.studies.matching import Match, match, outcomes
-from swarm_logistics_env.studies.performance_table import rows_of
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.runs import seeds_in_words
+
+from .judged_comparisons import estimate_of, same_runs
+from .matching import Match, match
+from .performance_table import played, rows_of
+from .results import StudyResults
+from .runs import seeds_in_words
 
 SUBJECTS = "|".join(DEFINITIONS)
 _GATE = re.compile(
@@ -194,10 +193,13 @@ def _change(
                 f"the new one {seeds_in_words(new.plan.seeds)}; play one of them on the other's "
                 "seeds"
             )
-        pair = outcomes(old, before, seeds), outcomes(new, after, seeds)
-        if same_runs(*([outcome.digest for outcome in side] for side in pair)):
+        one, other = (
+            played([results.outcome(cell.arm, seed) for seed in seeds])
+            for results, cell in ((old, before), (new, after))
+        )
+        if same_runs(one.digests, other.digests):
             return 0.0
-        p_o, p_new = (np.array([o.delivered for o in side], dtype=np.float64) for side in pair)
+        p_o, p_new = one.by_seed, other.by_seed
     try:
         return spi.relative_change(
             p_o,

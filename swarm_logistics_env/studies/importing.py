@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,22 +14,15 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
-from swarm_logistics_env.studies import comparisons, metadata
-from swarm_logistics_env.studies.comparisons import Arm, Comparison, NullPair, Setting
-from swarm_logistics_env.studies.metadata import Declaration
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
-from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.studies.store import new_store, refuse_study_in
-from swarm_logistics_env.tasks.recorded_trials import (
-    RECORDED,
-    Origin,
-    RecordedCell,
-    RecordedFault,
-    RecordedScenario,
-    RecordedTable,
-)
+from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, RecordedScenario
 from swarm_logistics_env.tasks.task import Outcome
+
+from .comparisons import OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .metadata import Declaration, Origin, rows_of
+from .plan import Plan
+from .runs import Condition, StudiedPolicy
+from .specification import Specification
+from .store import new_store, refuse_study_in
 
 
 def import_results(
@@ -60,49 +54,57 @@ def import_results(
         trials = read_trials(file, columns=columns, ignore=ignore, duration=duration)
     except IndicatorError as error:
         raise StudyError(str(error)) from error
-    tables = tuple(_tables(file, trials.rows))
-    cells: dict[tuple[str, RecordedCell], list[Trial]] = {}
-    for table in tables:
-        for cell in table.cells:
-            cells[table.policy, cell] = [
-                row for row in trials.rows if row.policy == table.policy and _is(row, cell)
-            ]
-    _refuse_unused(file, trials.rows, cells.values())
-    specification = Specification(
-        name=file.stem,
-        task=RECORDED.name,
-        policies=tuple(dict.fromkeys(row.policy for row in trials.rows)),
-        seeds=max(map(len, cells.values())),
-    )
+    conditions: dict[object, list[Trial]] = {}
+    for row in trials.rows:
+        conditions.setdefault(row.condition, []).append(row)
     origin = Origin(
         file=trials.file,
         digest=trials.digest,
         paired=trials.paired,
         seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
         setup=tuple((setup or {}).items()),
-        tables=tables,
+        trials=tuple(replace(rows[0], times=None) for rows in conditions.values()),
     )
+    specification = Specification(
+        name=file.stem,
+        task=RECORDED.name,
+        policies=tuple(dict.fromkeys(row.policy for row in trials.rows)),
+        seeds=max(map(len, conditions.values())),
+    )
+    try:
+        _refuse_unused(origin, imported_plan(specification, origin))
+    except StudyError as error:
+        raise StudyError(f"{file}, {error}") from None
     with new_store(out) as store:
-        for (policy, cell), rows in cells.items():
-            condition = _arm(origin, policy, cell).condition
+        for rows in conditions.values():
+            condition = _condition(origin, rows[0])
             for number, row in enumerate(rows):
                 run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
                 store.add(run, _outcome(run.key, row))
-        declared = Declaration.of(specification)
-        notes = metadata.rows_of(specification, RECORDED.code(), {}, declared)
-        store.note({**notes, "imported": origin.to_json()})
+        declared = Declaration.model_validate(specification)
+        notes = rows_of(specification, RECORDED.code(), {}, declared)
+        store.note({**notes, "imported": origin.model_dump_json()})
     return len(trials.rows)
 
 
 def imported_plan(specification: Specification, origin: Origin) -> Plan:
-    """Return the plan of recorded trials: what their tables compare, and nothing to play."""
-    found = [item for table in origin.tables for item in _compared(origin, table)]
+    """Return the plan of recorded trials: what can be compared in them, and nothing to play.
+
+    Raises:
+        StudyError: something has nothing that it can be relative to.
+    """
+    tables = list(_tables(origin))
     return Plan(
         specification,
-        tuple(item for item in found if isinstance(item, Comparison)),
+        tuple(comparison for title, arms in tables for comparison in _compared(title, arms)),
         RECORDED.code(),
         {},
-        null_pairs=tuple(item for item in found if isinstance(item, NullPair)),
+        nulls={
+            (arm.condition.policy.label, title): arm
+            for title, arms in tables
+            for arm in arms[1:]
+            if arm.setting == OTHER_BEHAVIOUR
+        },
         paired=origin.paired,
         imported_from=origin.file,
         imported_seeds=origin.seeds,
@@ -110,20 +112,17 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     )
 
 
-def _compared(origin: Origin, table: RecordedTable) -> Iterator[Comparison | NullPair]:
-    arms = [_arm(origin, table.policy, cell) for cell in table.cells]
+def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
     original, *others = arms
     kind = original.setting.kind
     if kind == "size":
         for small, large in zip(arms, others):
             for definition in comparing(kind):
-                yield Comparison(table.title, definition.symbol, small, large)
+                yield Comparison(title, definition.symbol, small, large)
         return
     by_setting = {arm.setting: arm for arm in arms}
     for arm in others:
         setting = arm.setting
-        if setting == comparisons.OTHER_BEHAVIOUR:
-            yield NullPair(table.title, original, arm)
         if kind == "fault" and setting.name in (REPEATED, RECORDED.removed):
             continue
         removed = by_setting.get(setting._replace(name=str(RECORDED.removed)))
@@ -131,16 +130,22 @@ def _compared(origin: Origin, table: RecordedTable) -> Iterator[Comparison | Nul
             # Whoever recorded no trials with the robots removed asks for R alone.
             if removed is not None or not definition.needs_removed:
                 third = removed if definition.needs_removed else None
-                yield Comparison(table.title, definition.symbol, original, arm, third)
+                yield Comparison(title, definition.symbol, original, arm, third)
 
 
-def _arm(origin: Origin, policy: str, cell: RecordedCell) -> Arm:
-    studied = StudiedPolicy(policy, f"{policy}: {origin.file} ({origin.digest})", policy)
-    scenario: Any = cell.scenario
-    faults: Any = () if cell.fault is None else (cell.fault,)
+def _condition(origin: Origin, row: Trial) -> Condition:
+    identity = f"{row.policy}: {origin.file} ({origin.digest})"
+    studied = StudiedPolicy(row.policy, identity, row.policy)
+    scenario = RecordedScenario(
+        n_robots=row.n_robots or 0,
+        duration=row.duration or 0.0,
+        table=row.table,
+        parameters=row.parameters,
+    )
+    fault = RecordedFault(mode=row.fault, robots=row.faulty, onset=row.onset)
+    faults = (fault,) if row.faulty else ()
     task: Any = RECORDED
-    condition = Condition(studied, scenario, faults, int(cell.repeated), task=task)
-    return Arm(Setting(cell.kind, cell.name, cell.value, cell.onset), condition)
+    return Condition(studied, scenario, faults, int(row.fault == REPEATED), task=task)
 
 
 def _outcome(key: str, row: Trial) -> Outcome:
@@ -149,69 +154,46 @@ def _outcome(key: str, row: Trial) -> Outcome:
     return Outcome(key, delivery_times=np.array(row.times), ended_at=row.duration or 0.0)
 
 
-def _is(row: Trial, cell: RecordedCell) -> bool:
-    """Whether a trial was run in a cell's condition."""
-    fault = cell.fault
-    return _scenario(row) == cell.scenario and (row.fault, row.faulty, row.onset) == (
-        (REPEATED if cell.repeated else NO_FAULT, 0, 0.0)
-        if fault is None
-        else (fault.mode, fault.robots, fault.onset)
-    )
-
-
-def _scenario(row: Trial) -> RecordedScenario:
-    return RecordedScenario(
-        n_robots=row.n_robots or 0,
-        duration=row.duration or 0.0,
-        table=row.table,
-        parameters=row.parameters,
-    )
-
-
-_Cells = tuple[RecordedCell, ...]
+_Arms = list[Arm]
 _Fixed = tuple[tuple[str, float], ...]  # name and value of what is the same in a table
 
 
-def _tables(file: Path, rows: Sequence[Trial]) -> Iterator[RecordedTable]:
-    """Yield what can be compared: all rows that differ in one thing alone, for each thing."""
-    for policy in dict.fromkeys(row.policy for row in rows):
-        own = [row for row in rows if row.policy == policy]
-        for table in dict.fromkeys(row.table for row in own):
-            here = [row for row in own if row.table == table]
-            plain = [row for row in here if row.fault == NO_FAULT]
-            if table in ("", "size"):
-                sized = [row for row in plain if row.n_robots is not None]
-                yield from _split(
-                    policy, "Scalability", sized, lambda row: row.parameters, _size_cells
-                )
-            if table in ("", "fault"):
-                title = "Fault tolerance and robustness"
-                yield from _split(
-                    policy, title, here, _all_but(None), lambda group: _fault_cells(file, group)
-                )
-            for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
-                cells_of = partial(_parameter_cells, file, name, dict(plain[0].parameters)[name])
-                title = f"Adaptability to {name}"
-                yield from _split(policy, title, plain, _all_but(name), cells_of)
+def _tables(origin: Origin) -> Iterator[tuple[str, _Arms]]:
+    """Yield what can be compared: all trials that differ in one thing alone, for each thing.
+
+    Yields:
+        The heading in the report, and the arms, the original one first.
+    """
+    for policy, table in dict.fromkeys((row.policy, row.table) for row in origin.trials):
+        here = [row for row in origin.trials if (row.policy, row.table) == (policy, table)]
+        plain = [row for row in here if row.fault == NO_FAULT]
+        if table in ("", "size"):
+            sized = [row for row in plain if row.n_robots is not None]
+            arms_of = partial(_size_arms, origin)
+            yield from _split("Scalability", sized, lambda row: row.parameters, arms_of)
+        if table in ("", "fault"):
+            title = "Fault tolerance and robustness"
+            yield from _split(title, here, _all_but(None), partial(_fault_arms, origin))
+        for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
+            arms_of = partial(_parameter_arms, origin, name, dict(plain[0].parameters)[name])
+            yield from _split(f"Adaptability to {name}", plain, _all_but(name), arms_of)
 
 
 def _split(
-    policy: str,
     general: str,
     rows: Sequence[Trial],
     fixed: Callable[[Trial], _Fixed],
-    cells_of: Callable[[Sequence[Trial]], _Cells],
-) -> Iterator[RecordedTable]:
-    """Yield a table for each group of rows that have the same fixed values and differ in a cell."""
+    arms_of: Callable[[Sequence[Trial]], _Arms],
+) -> Iterator[tuple[str, _Arms]]:
+    """Yield a table for each group of rows that have the same fixed values and differ in an arm."""
     groups: dict[_Fixed, list[Trial]] = {}
     for row in rows:
         groups.setdefault(fixed(row), []).append(row)
-    tables = {key: cells_of(group) for key, group in groups.items()}
-    tables = {key: cells for key, cells in tables.items() if len(cells) > 1}
-    for key, cells in tables.items():
+    tables = {key: arms_of(group) for key, group in groups.items()}
+    tables = {key: arms for key, arms in tables.items() if len(arms) > 1}
+    for key, arms in tables.items():
         told = ", ".join(f"{name} = {value:g}" for name, value in key)
-        title = f"{general} ({told})" if len(tables) > 1 else general
-        yield RecordedTable(policy=policy, title=title, cells=cells)
+        yield f"{general} ({told})" if len(tables) > 1 else general, arms
 
 
 def _all_but(varied: str | None) -> Callable[[Trial], _Fixed]:
@@ -222,65 +204,51 @@ def _all_but(varied: str | None) -> Callable[[Trial], _Fixed]:
     )
 
 
-def _size_cells(group: Sequence[Trial]) -> _Cells:
-    scenarios = {scenario.n_robots: scenario for scenario in map(_scenario, group)}
-    return tuple(
-        RecordedCell(kind="size", name="n_robots", value=n, scenario=scenarios[n])
-        for n in sorted(scenarios)
-    )
+def _size_arms(origin: Origin, group: Sequence[Trial]) -> _Arms:
+    return [
+        Arm(Setting("size", "n_robots", row.n_robots or 0), _condition(origin, row))
+        for row in sorted(group, key=lambda row: row.n_robots or 0)
+    ]
 
 
-def _fault_cells(file: Path, group: Sequence[Trial]) -> _Cells:
+def _fault_arms(origin: Origin, group: Sequence[Trial]) -> _Arms:
     broken = next((row for row in group if row.faulty), None)
     if broken is None:
-        return ()
+        return []
     if not any(row.fault == NO_FAULT for row in group):
         raise StudyError(
-            f"{file}, line {broken.line}: has the fault {broken.fault!r}, but no row without "
-            "one (fault none) of the same robots and parameters: R and FT are relative to it"
+            f"line {broken.line}: has the fault {broken.fault!r}, but no row without one (fault "
+            "none) of the same robots and parameters: R and FT are relative to it"
         )
-    cells = [_fault_cell(row) for row in group]
     # What faults are measured against stands first, then the pair that shows chance alone.
-    cells.sort(key=lambda cell: (cell.fault is not None, cell.repeated))
-    return tuple(dict.fromkeys(cells))
+    ordered = sorted(group, key=lambda row: (row.faulty > 0, row.fault == REPEATED))
+    return [
+        Arm(Setting("fault", row.fault, row.faulty, row.onset), _condition(origin, row))
+        for row in ordered
+    ]
 
 
-def _fault_cell(row: Trial) -> RecordedCell:
-    fault = None
-    if row.faulty:
-        fault = RecordedFault(mode=row.fault, robots=row.faulty, onset=row.onset)
-    return RecordedCell(
-        kind="fault",
-        name=row.fault,
-        value=row.faulty,
-        onset=row.onset,
-        scenario=_scenario(row),
-        fault=fault,
-        repeated=row.fault == REPEATED,
-    )
-
-
-def _parameter_cells(file: Path, name: str, x_o: float, group: Sequence[Trial]) -> _Cells:
+def _parameter_arms(origin: Origin, name: str, x_o: float, group: Sequence[Trial]) -> _Arms:
     by_value = {dict(row.parameters)[name]: row for row in group}
     values = sorted(by_value, key=lambda x: x != x_o)  # a stable sort: x_o, then as in the file
     if values[0] == 0.0 and len(values) > 1:
         raise StudyError(
-            f"{file}, line {by_value[0.0].line}: {name} = 0 is x_o, as in the first row, "
+            f"line {by_value[0.0].line}: {name} = 0 is x_o, as in the first row, "
             "and A is relative to x_o: let a row with another value stand first"
         )
-    return tuple(
-        RecordedCell(kind="parameter", name=name, value=value, scenario=_scenario(by_value[value]))
+    return [
+        Arm(Setting("parameter", name, value), _condition(origin, by_value[value]))
         for value in values
-    )
+    ]
 
 
-def _refuse_unused(file: Path, rows: Sequence[Trial], used: Iterable[Sequence[Trial]]) -> None:
-    compared = {row.line for found in used for row in found}
-    for row in rows:
-        if row.line not in compared:
+def _refuse_unused(origin: Origin, plan: Plan) -> None:
+    used = {condition.key for condition in plan.conditions}
+    for row in origin.trials:
+        if _condition(origin, row).key not in used:
             varied = ", ".join(repr(name) for name, _ in row.parameters)
             hint = f"; columns taken for parameters: {varied}" if varied else ""
             raise StudyError(
-                f"{file}, line {row.line}: stands alone: should differ from some other row in the "
-                f"fault, the number of robots or one parameter alone{hint}"
+                f"line {row.line}: stands alone: should differ from some other row in the fault, "
+                f"the number of robots or one parameter alone{hint}"
             )

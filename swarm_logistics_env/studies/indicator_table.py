@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.comparisons import Comparison, Reference
-from swarm_logistics_env.studies.judged_comparisons import Judged
-from swarm_logistics_env.studies.performance_table import Columns, table_of
+
+from .comparisons import Comparison, Reference
+from .judged_comparisons import Judged
+from .performance_table import Columns, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,6 +70,10 @@ INDICATORS: Columns = {
     "estimate": (object, "the `Estimate`; None: blocked"),
     "equivalence_test": (object, "the `Equivalence`; None: blocked or not asked"),
 }
+_OF_ESTIMATE = (
+    "value", "low", "high", "confidence", "probability", "p_value", "n_seeds",
+    "pairing_correlation",
+)  # fmt: skip
 
 
 def indicator_table(
@@ -165,14 +170,7 @@ def _estimated(
         least = spi.lower_decile_of_power(estimate, published, needed)
     return {
         "published": published,
-        "value": estimate.value,
-        "low": estimate.low,
-        "high": estimate.high,
-        "confidence": estimate.confidence,
-        "probability": estimate.probability,
-        "p_value": estimate.p_value,
-        "n_seeds": estimate.n_seeds,
-        "pairing_correlation": estimate.pairing_correlation,
+        **{name: getattr(estimate, name) for name in _OF_ESTIMATE},
         "flags": " ".join(estimate.flags),
         "seeds_for_power_80": needed,
         "no_plan": None if published is None else spi.no_plan_because(estimate, published),

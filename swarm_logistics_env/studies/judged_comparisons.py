@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
-from swarm_logistics_env.studies.comparisons import Arm, Comparison
-from swarm_logistics_env.studies.performance_table import Row
-from swarm_logistics_env.studies.plan import Plan
+
+from .comparisons import Arm, Comparison
+from .performance_table import Row
+from .plan import Plan
 
 CONFIDENCE = 0.95
 # A float cannot hold a confidence level much nearer to 1, and an early look may ask for one.

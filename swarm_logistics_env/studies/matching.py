@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from swarm_logistics_env.studies.performance_table import Row, rows_of
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.runs import seeds_in_words
-from swarm_logistics_env.tasks.task import Outcome
+from .performance_table import Row, rows_of
+from .results import StudyResults
+from .runs import seeds_in_words
 
 _Content = tuple[object, ...]  # everything about a condition but its policy
 _Judged = dict[str, dict[_Content, Row]]  # keyed by the policy's label
@@ -95,16 +94,6 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     if seeds:
         notes += _seed_notes(seeds, old, new)
     return Matching(tuple(matches), tuple(unmatched), seeds, tuple(notes))
-
-
-def outcomes(results: StudyResults, cell: Row, seeds: Sequence[int]) -> list[Outcome]:
-    """Return the outcomes of a cell at the given seeds, in their order.
-
-    Raises:
-        KeyError: a run of them is missing; the cell then has a `problem`.
-    """
-    condition, code = cell.arm.condition, results.plan.code
-    return [results.outcomes[condition.run(code, seed).key] for seed in seeds]
 
 
 def _judged(results: StudyResults) -> _Judged:

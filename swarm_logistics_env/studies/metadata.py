@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -12,17 +11,20 @@ from pydantic_core import to_json
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import seeds_in_words
-from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.studies.store import FILE_NAME, Store, new_store, refuse_study_in
-from swarm_logistics_env.tasks.recorded_trials import Origin
+from swarm_logistics_env.spi.trials import Trial
 from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.task_choice import DEFAULT, NAMES, refuse_untrusted
+from swarm_logistics_env.tasks.task_choice import NAMES, refuse_untrusted
+
+from .plan import Plan
+from .runs import seeds_in_words
+from .specification import Specification
+from .store import FILE_NAME, Store, new_store, refuse_study_in
 
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
 _Share = Annotated[float, Field(gt=0, lt=1)]
+# Below ten seeds a verdict rests on normal differences: no look is proposed there.
+FEWEST_TO_PROPOSE = 10
 
 
 class StoredSpecification(BaseModel):
@@ -33,8 +35,8 @@ class StoredSpecification(BaseModel):
     name: str
     seeds: _Count
     policies: tuple[Any, ...]
-    first_seed: _Seed = 0  # older stores say neither of these two
-    task: str = DEFAULT
+    first_seed: _Seed
+    task: str
 
     @property
     def seed_numbers(self) -> range:
@@ -63,6 +65,81 @@ class StoredSpecification(BaseModel):
         return Specification(**{**self.model_dump(), "task": task or self.task})
 
 
+class Declaration(BaseModel):
+    """What a study declared before its first run.
+
+    Attributes:
+        first_seed, seeds: the smallest seed, and how many there are of every condition.
+        looks: numbers of seeds, from the first on, at which it was to be judged; empty: any.
+        margin: of equivalence, as a share of P_o.
+    """
+
+    model_config = ConfigDict(frozen=True, from_attributes=True)
+
+    first_seed: _Seed
+    seeds: _Count
+    looks: tuple[_Count, ...] = ()
+    margin: _Share = MARGIN
+
+    @property
+    def seed_numbers(self) -> range:
+        """The seeds of every condition."""
+        return range(self.first_seed, self.first_seed + self.seeds)
+
+    def covers(self, plan: Plan) -> bool:
+        """Return whether the verdicts of a plan were declared, and so are not exploratory."""
+        if plan.imported_from is not None:
+            return True  # nothing is added to what was imported
+        if not self.looks:
+            return plan.seeds[0] in self.seed_numbers and plan.seeds[-1] in self.seed_numbers
+        return (
+            len(plan.seeds) in self.looks
+            and plan.specification.looks == self.looks
+            and plan.seeds[0] == self.first_seed
+        )
+
+    def warning(self, plan: Plan) -> str:
+        """Return the warning for a plan that this does not cover, and what to declare instead."""
+        declared = _counted(self.seed_numbers)
+        if self.looks:
+            declared = f"looks at {', '.join(map(str, self.looks))} seeds from {self.first_seed} on"
+        least = max(FEWEST_TO_PROPOSE, self.seeds)
+        fresh = max(self.seed_numbers.stop, plan.seeds[-1] + 1)
+        return (
+            f"This study declared {declared} before its first run: over {_counted(plan.seeds)} "
+            "every verdict is exploratory. For verdicts that stand, run a new study in another "
+            f"directory, on fresh seeds and with declared looks: first_seed = {fresh}, "
+            f"seeds = {least}, looks = [{least}, {2 * least}, {4 * least}]."
+        )
+
+
+def _counted(seeds: Sequence[int]) -> str:
+    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
+    return f"{count} ({seeds_in_words(seeds)})"
+
+
+class Origin(BaseModel):
+    """Where recorded trials came from.
+
+    Attributes:
+        file: its name.
+        digest: of its content.
+        paired: whether its rows name their seeds.
+        seeds: those that they name, ascending; empty: none.
+        setup: what the user states about the trials, name and value.
+        trials: the first of every condition, in the file's order.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    file: str
+    digest: str
+    paired: bool
+    seeds: tuple[int, ...] = ()
+    setup: tuple[tuple[str, str], ...] = ()
+    trials: tuple[Trial, ...] = ()
+
+
 class Metadata(BaseModel):
     """What a store notes of its study; each field is a row of text, in JSON but for the code.
 
@@ -70,7 +147,7 @@ class Metadata(BaseModel):
         specification: what the study asks.
         code: version of the code that plays it.
         identities: of the policies, by their names in the specification.
-        declared_seeds, declared_first_seed, declared_looks, declared_margin: at the first run.
+        declared: what was declared before the first run.
         imported: the source of imported results; None: the runs were played.
     """
 
@@ -79,10 +156,7 @@ class Metadata(BaseModel):
     specification: Json[StoredSpecification]
     code: str
     identities: Json[dict[str, str]]
-    declared_seeds: Json[_Count]
-    declared_first_seed: Json[_Seed] = 0
-    declared_looks: Json[tuple[_Count, ...]] = ()
-    declared_margin: Json[_Share] = MARGIN
+    declared: Json[Declaration]
     imported: Json[Origin] | None = None
 
     @classmethod
@@ -102,13 +176,6 @@ class Metadata(BaseModel):
             raise StudyError(
                 f"the store {store.path} is damaged: its note {name!r} does not read"
             ) from None
-
-    @property
-    def declared(self) -> Declaration:
-        """What was declared before the first run."""
-        first = self.declared_first_seed
-        seeds = range(first, first + self.declared_seeds)
-        return Declaration(seeds, self.declared_looks, self.declared_margin)
 
 
 def of_existing(directory: Path) -> Metadata:
@@ -139,69 +206,9 @@ def rows_of(
     notes = {
         "specification": specification,
         "identities": dict(identities),
-        "declared_seeds": len(declared.seeds),
-        "declared_first_seed": declared.seeds.start,
-        "declared_looks": declared.looks,
-        "declared_margin": declared.margin,
+        "declared": declared,
     }
     return {"code": code, **{name: to_json(value).decode() for name, value in notes.items()}}
-
-
-# Below ten seeds a verdict rests on normal differences: no look is proposed there.
-FEWEST_TO_PROPOSE = 10
-
-
-@dataclass(frozen=True)
-class Declaration:
-    """The seeds, looks and margin that a study declared before its first run.
-
-    Attributes:
-        seeds: of every condition.
-        looks: numbers of seeds, from the first on, at which it was to be judged; empty: any.
-        margin: of equivalence, as a share of P_o.
-    """
-
-    seeds: range
-    looks: tuple[int, ...] = ()
-    margin: float = MARGIN
-
-    @classmethod
-    def of(cls, specification: Specification) -> Self:
-        """Return what a study declares that is run for the first time."""
-        return cls(specification.seed_numbers, specification.looks, specification.margin)
-
-    def covers(self, plan: Plan) -> bool:
-        """Return whether the verdicts of a plan were declared, and so are not exploratory."""
-        if plan.imported_from is not None:
-            return True  # nothing is added to what was imported
-        if not self.looks:
-            return plan.seeds[0] in self.seeds and plan.seeds[-1] in self.seeds
-        return (
-            len(plan.seeds) in self.looks
-            and plan.specification.looks == self.looks
-            and plan.seeds[0] == self.seeds.start
-        )
-
-    def warning(self, plan: Plan) -> str:
-        """Return the warning for a plan that this does not cover, and what to declare instead."""
-        declared = _counted(self.seeds)
-        if self.looks:
-            declared = (
-                f"looks at {', '.join(map(str, self.looks))} seeds from {self.seeds.start} on"
-            )
-        least = max(FEWEST_TO_PROPOSE, len(self.seeds))
-        fresh = max(self.seeds.stop, plan.seeds[-1] + 1)
-        return (
-            f"This study declared {declared} before its first run: over {_counted(plan.seeds)} "
-            "every verdict is exploratory. For verdicts that stand, run a new study in another "
-            f"directory, on fresh seeds and with declared looks: first_seed = {fresh}, "
-            f"seeds = {least}, looks = [{least}, {2 * least}, {4 * least}]."
-        )
-
-
-def _counted(seeds: Sequence[int]) -> str:
-    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-    return f"{count} ({seeds_in_words(seeds)})"
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
@@ -257,10 +264,12 @@ def _united(stored: dict[Path, Metadata]) -> dict[str, str]:
                     f"the {part} of {first} is not the one of {directory}: its code differs"
                 )
         identities = {**identities, **other.identities}
-        mine, theirs = declared.seeds, other.declared.seeds
+        mine, theirs = declared.seed_numbers, other.declared.seed_numbers
         both = range(max(mine.start, theirs.start), min(mine.stop, theirs.stop))
         # Without a common seed any part will do: nobody declared the whole.
-        declared = replace(declared, seeds=both or mine)
+        if both:
+            common = {"first_seed": both.start, "seeds": len(both)}
+            declared = declared.model_copy(update=common)
     return rows_of(fields, one.code, identities, declared)
 
 

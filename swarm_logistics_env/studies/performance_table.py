@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.comparisons import Arm, Reference
-from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.tasks.task import Outcome
+
+from .comparisons import Arm, Reference
+from .plan import Plan
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,32 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from itertools import product
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.definitions import DEFINITIONS, comparing
-from swarm_logistics_env.studies.comparisons import (
-    NO_FAULT,
-    OTHER_BEHAVIOUR,
-    Arm,
-    Comparison,
-    NullPair,
-    Setting,
-)
-from swarm_logistics_env.studies.runs import Condition, Run, StudiedPolicy
-from swarm_logistics_env.studies.specification import (
-    Ablation,
-    Factor,
-    Faults,
-    Parameter,
-    Sizes,
-    Specification,
-)
+from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
-from swarm_logistics_env.tasks.task import Task
+
+from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .runs import Condition, Run, StudiedPolicy
+from .specification import Ablation, Factor, Faults, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -41,7 +27,9 @@ class Plan:
         comparisons: all comparisons, in the order of the report.
         code: the version of the code that decides the result of a run.
         identities: the identities of the policies, by their names in the specification.
-        null_pairs: pairs without fault, one for each policy whose faults begin during the run.
+        nulls: by label of the policy and table, an arm without fault that shares the worlds of the
+            original one, not its behaviour: what chance alone makes of the two. For faults that
+            begin during the run.
         paired: whether all conditions share their seeds.
         imported_from: name of the file that the results came in; None: they are run here.
         imported_seeds: those that the file names; empty: it names none, or results are run here.
@@ -52,7 +40,7 @@ class Plan:
     comparisons: tuple[Comparison, ...]
     code: str
     identities: Mapping[str, str]
-    null_pairs: tuple[NullPair, ...] = ()
+    nulls: Mapping[tuple[str, str], Arm] = field(default_factory=dict)
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
@@ -71,9 +59,7 @@ class Plan:
             for comparison in self.comparisons
             for arm in comparison.arms
         ]
-        cells += [
-            (null_pair.policy, null_pair.table, null_pair.other) for null_pair in self.null_pairs
-        ]
+        cells += [(policy, table, arm) for (policy, table), arm in self.nulls.items()]
         return tuple(dict.fromkeys(cells))
 
     @cached_property
@@ -120,7 +106,8 @@ def make_plan(
 
     def policy_of(part: str, source: object) -> StudiedPolicy:
         if identities is None:
-            policy = studied(source, specification.played)
+            identity = policy_identity(source, specification.played.policies)
+            policy = StudiedPolicy(policy_label(source), identity, source)
         elif part in identities:
             policy = StudiedPolicy(policy_label(source), identities[part], source)
         else:
@@ -128,30 +115,28 @@ def make_plan(
         known[part] = policy.identity
         return policy
 
-    found = list(_asked(specification, policy_of))
     comparisons = tuple(
-        item
-        for item in found
-        if isinstance(item, Comparison) and item.indicator in specification.indicators
+        comparison
+        for comparison in _asked(specification, policy_of)
+        if comparison.indicator in specification.indicators
     )
     if not comparisons:
         raise StudyError(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
-    # Only comparisons with the robots removed have a self-repair time, which needs the null pair.
-    null_pairs = [item for item in found if isinstance(item, NullPair)]
-    if not any(DEFINITIONS[symbol].needs_removed for symbol in specification.indicators):
-        null_pairs = []
-    return Plan(
-        specification, comparisons, code or specification.played.code(), known, tuple(null_pairs)
-    )
+    # Only comparisons with the robots removed have a self-repair time, which needs the null.
+    nulls = {
+        (one.policy, one.table): Arm(OTHER_BEHAVIOUR, replace(one.original.condition, behaviour=1))
+        for one in comparisons
+        if one.removed and one.changed.setting.onset
+    }
+    return Plan(specification, comparisons, code or specification.played.code(), known, nulls)
 
 
 def _asked(
     specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
-) -> Iterator[Comparison | NullPair]:
-    base, task = specification.scenario, specification.played
+) -> Iterator[Comparison]:
     lesser = [
         (ablation, policy_of(f"ablation {number}", ablation.policy))
         for number, ablation in enumerate(specification.ablations, start=1)
@@ -159,23 +144,14 @@ def _asked(
     for source in specification.policies:
         policy = policy_of(f"policy {policy_label(source)}", source)
         for sizes in specification.sizes:
-            yield from scalability(base, sizes, policy, task)
+            yield from _scalability(specification, sizes, policy)
         for faults in specification.faults:
-            yield from robustness(base, faults, policy, task, specification.indicators)
+            yield from _robustness(specification, faults, policy)
         for parameter in specification.parameters:
-            yield from adaptability(base, parameter, policy, task)
+            yield from _adaptability(specification, parameter, policy)
         for ablation, part in lesser:
             if part.identity != policy.identity:
-                yield from _ablation(base, ablation, policy, part, task)
-
-
-def studied(source: object, task: Task) -> StudiedPolicy:
-    """Return the policy that `source` makes for a task, with its identity.
-
-    Raises:
-        PolicyError: it cannot be found or built.
-    """
-    return StudiedPolicy(policy_label(source), policy_identity(source, task.policies), source)
+                yield from _ablation(specification, ablation, policy, part)
 
 
 def _title(factor: Factor, general: str) -> str:
@@ -183,16 +159,13 @@ def _title(factor: Factor, general: str) -> str:
     return factor.title or (f"{general} ({changes})" if changes else general)
 
 
-def scalability(base: Any, sizes: Sizes, policy: StudiedPolicy, task: Task) -> Iterator[Comparison]:
+def _scalability(asked: Specification, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
     """Yield the comparisons between neighbouring swarm sizes."""
-    scenario = task.vary(base, sizes.scenario)
-    table = _title(sizes, "Scalability")
-    arms = {
-        size: Arm(
-            Setting("size", "n_robots", size), _condition(task, policy, scenario, n_robots=size)
-        )
-        for size in sizes.values
-    }
+    task, table = asked.played, _title(sizes, "Scalability")
+    arms = {}
+    for size in sizes.values:
+        scenario = task.vary(asked.scenario, {**sizes.scenario, "n_robots": size})
+        arms[size] = Arm(Setting("size", "n_robots", size), Condition(policy, scenario, task=task))
     steps = list(zip(sizes.values, sizes.values[1:]))
     for definition in comparing("size"):
         for small, large in steps:
@@ -210,94 +183,70 @@ def scalability(base: Any, sizes: Sizes, policy: StudiedPolicy, task: Task) -> I
                 )
 
 
-def robustness(
-    base: Any,
-    faults: Faults,
-    policy: StudiedPolicy,
-    task: Task,
-    indicators: Collection[str] = DEFINITIONS,
-) -> Iterator[Comparison | NullPair]:
-    """Yield the indicators of every mode, m and onset; the null pair where faults start late.
+def _robustness(
+    asked: Specification, faults: Faults, policy: StudiedPolicy
+) -> Iterator[Comparison]:
+    """Yield the indicators of every mode, m and onset.
 
     An indicator that needs robots removed is left out where the task cannot remove any.
     """
-    scenario = task.vary(base, faults.scenario)
-    table = _title(faults, "Fault tolerance and robustness")
+    task, table = asked.played, _title(faults, "Fault tolerance and robustness")
+    scenario = task.vary(asked.scenario, faults.scenario)
     for m in faults.robots:
-        if m >= task.size(scenario):
+        if m >= scenario.n_robots:
             raise StudyError(
-                f"faults.robots = {m}: should be less than n_robots = {task.size(scenario)}, "
+                f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, "
                 "or no working robot is left"
             )
     for onset in faults.onsets:
-        if onset >= task.duration(scenario):
+        if onset >= scenario.duration:
             raise StudyError(
                 f"faults.onsets = {onset:g} s: should be less than duration = "
-                f"{task.duration(scenario):g} s, or nothing fails"
+                f"{scenario.duration:g} s, or nothing fails"
             )
-    original = Arm(NO_FAULT, _condition(task, policy, scenario))
-    if any(faults.onsets):
-        other = Arm(OTHER_BEHAVIOUR, Condition(policy, scenario, behaviour=1, task=task))
-        yield NullPair(table, original, other)
+    original = Arm(NO_FAULT, Condition(policy, scenario, task=task))
 
     def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
         fault = task.fault(mode, m, onset, duration)
         condition = Condition(policy, scenario, (fault,), task=task)
         return Arm(Setting("fault", mode, m, onset), condition)
 
-    for onset in faults.onsets:
-        for mode in faults.modes:
-            for m in faults.robots:
-                failed = arm(mode, m, onset, faults.duration)
-                for definition in comparing("fault"):
-                    if definition.symbol not in indicators:
-                        continue
-                    third = None
-                    if definition.needs_removed:
-                        if task.removed is None:
-                            continue
-                        third = arm(task.removed, m, onset, None)
-                    yield Comparison(table, definition.symbol, original, failed, third)
+    wanted = [one for one in comparing("fault") if one.symbol in asked.indicators]
+    if task.removed is None:
+        wanted = [one for one in wanted if not one.needs_removed]
+    for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
+        failed = arm(mode, m, onset, faults.duration)
+        for definition in wanted:
+            third = arm(str(task.removed), m, onset, None) if definition.needs_removed else None
+            yield Comparison(table, definition.symbol, original, failed, third)
 
 
-def adaptability(
-    base: Any, parameter: Parameter, policy: StudiedPolicy, task: Task
+def _adaptability(
+    asked: Specification, parameter: Parameter, policy: StudiedPolicy
 ) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
-    scenario = task.vary(base, parameter.scenario)
-    table = _title(parameter, f"Adaptability to {parameter.name}")
-    original, *changed = (
-        Arm(
-            Setting("parameter", parameter.name, value),
-            _condition(task, policy, scenario, **{parameter.name: value}),
-        )
-        for value in parameter.values
-    )
+    name, task = parameter.name, asked.played
+    table, arms = _title(parameter, f"Adaptability to {name}"), []
+    for value in parameter.values:
+        scenario = task.vary(asked.scenario, {**parameter.scenario, name: value})
+        condition = Condition(policy, scenario, task=task)
+        arms.append(Arm(Setting("parameter", name, value), condition))
+    original, *changed = arms
     for definition in comparing("parameter"):
         for arm in changed:
             yield Comparison(table, definition.symbol, original, arm)
 
 
 def _ablation(
-    base: Any, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy, task: Task
+    asked: Specification, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy
 ) -> Iterator[Comparison]:
-    scenario = task.vary(base, ablation.scenario)
+    task, table = asked.played, _title(ablation, "Ablation")
+    scenario = task.vary(asked.scenario, ablation.scenario)
     whole, part = (
-        Arm(Setting("policy", label.label, task.size(scenario)), _condition(task, label, scenario))
-        for label in (policy, lesser)
+        Arm(Setting("policy", one.label, scenario.n_robots), Condition(one, scenario, task=task))
+        for one in (policy, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".
     threshold = -ablation.fall if ablation.fall else 0.0
     for definition in comparing("policy"):
-        yield Comparison(
-            _title(ablation, "Ablation"),
-            definition.symbol,
-            whole,
-            part,
-            threshold=threshold,
-            claim=False,
-        )
-
-
-def _condition(task: Task, policy: StudiedPolicy, scenario: Any, **fields: float) -> Condition:
-    return Condition(policy, task.vary(scenario, fields), task=task)
+        yield Comparison(table, definition.symbol, whole, part, threshold=threshold, claim=False)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.studies.comparisons import Comparison, Setting
-from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
-from swarm_logistics_env.studies.results import StudyResults
+
+from .comparisons import Comparison, Setting
+from .performance_table import Row, groups_of, rows_of
+from .results import StudyResults
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,8 +10,9 @@ import itertools
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.studies.comparisons import NO_FAULT, Question, Reference, Setting
-from swarm_logistics_env.studies.specification import Specification, read_study_file
+
+from .comparisons import NO_FAULT, Question, Reference, Setting
+from .specification import Specification, read_study_file
 
 
 def size(n: int) -> Setting:

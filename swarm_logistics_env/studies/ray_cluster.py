@@ -9,9 +9,10 @@ from types import ModuleType
 from typing import Any
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.engines import execute
-from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
+
+from .engines import execute
+from .runs import Run
 
 RETRIES = 1  # after a worker's death, as local processes do
 QUEUED_PER_CORE = 2  # so that no core waits for this process

@@ -12,20 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.studies.comparisons import Arm, Reference, load_reference
-from swarm_logistics_env.studies.indicator_table import indicator_table
-from swarm_logistics_env.studies.judged_comparisons import (
-    CONFIDENCE,
-    CellKey,
-    Level,
-    judge_all,
-    level_at,
-)
-from swarm_logistics_env.studies.metadata import Declaration
-from swarm_logistics_env.studies.performance_table import Row, performance_table, rows_of
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.until_clear import standing
 from swarm_logistics_env.tasks.task import Outcome
+
+from .comparisons import Arm, Reference, load_reference
+from .indicator_table import indicator_table
+from .judged_comparisons import CONFIDENCE, CellKey, Level, judge_all, level_at
+from .metadata import Declaration
+from .performance_table import Row, performance_table, rows_of
+from .plan import Plan
+from .until_clear import standing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,18 +64,18 @@ class StudyResults:
         """The rows of `performance` by policy, table and arm."""
         return _by_arm(self.performance)
 
+    def outcome(self, arm: Arm, seed: int) -> Outcome | None:
+        """Return what an arm's run at a seed gave; None: it failed, or is missing."""
+        found = self.outcomes.get(arm.condition.run(self.plan.code, seed).key)
+        return None if found is None or found.error is not None else found
+
     def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...] | None:
         """Return an arm's outcomes by seed, or None if one failed, is missing or has no times."""
-        runs = (arm.condition.run(self.plan.code, seed) for seed in self.plan.seeds)
-        found = [self.outcomes.get(run.key) for run in runs]
-        if not self.plan.paired:  # such results need not be equally many everywhere
-            found = [outcome for outcome in found if outcome is not None]
-        complete = tuple(
-            outcome
-            for outcome in found
-            if outcome is not None and outcome.error is None and outcome.untimed is None
-        )
-        return complete if complete and len(complete) == len(found) else None
+        found = [self.outcome(arm, seed) for seed in self.plan.seeds]
+        complete = tuple(one for one in found if one is not None and one.untimed is None)
+        # Unpaired results need not be equally many everywhere.
+        is_whole = len(complete) == len(found) or not self.plan.paired
+        return complete if complete and is_whole else None
 
     def times_of(self, arm: Arm) -> Times | None:
         """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
@@ -13,6 +12,7 @@ from typing import Any, Self
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import canonical_json
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT
 
@@ -53,22 +53,22 @@ class Condition:
     @property
     def size(self) -> int:
         """Swarm size N."""
-        return self.task.size(self.scenario)
+        return int(self.scenario.n_robots)
 
     @property
     def duration(self) -> float:
         """Time at which a run ends at the latest [s]."""
-        return self.task.duration(self.scenario)
+        return float(self.scenario.duration)
 
     @cached_property
     def scenario_json(self) -> str:
         """The scenario as canonical JSON."""
-        return _canonical(self.scenario.model_dump(mode="json"))
+        return canonical_json(self.scenario.model_dump(mode="json"))
 
     @cached_property
     def faults_json(self) -> str:
         """The faults as canonical JSON, in the order in which they were given."""
-        return _canonical([fault.model_dump(mode="json") for fault in self.faults])
+        return canonical_json([fault.model_dump(mode="json") for fault in self.faults])
 
     @cached_property
     def key(self) -> str:
@@ -144,12 +144,8 @@ class Shard:
         return islice(runs, self.number - 1, None, self.count)
 
 
-def _canonical(value: object) -> str:
-    return json.dumps(value, sort_keys=True, separators=(",", ":"))
-
-
 def _digest(*parts: str) -> str:
-    return hashlib.sha256(_canonical(parts).encode()).hexdigest()
+    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 def seeds_in_words(seeds: Sequence[int]) -> str:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.scaling import ScalingFit, Weighting
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
-from swarm_logistics_env.studies.results import StudyResults
+
+from .performance_table import Row, groups_of, rows_of
+from .results import StudyResults
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     Field,
     NonNegativeFloat,
@@ -20,15 +20,10 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import Record, read_toml
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.tasks.policy_choice import (
-    PolicySource,
-    policy_name,
-    runs_code,
-    told_apart,
-)
+from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
 from swarm_logistics_env.tasks.task import Task
 from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, refuse_untrusted, task_of
 
@@ -57,6 +52,9 @@ def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
     if len(set(values)) < len(values):
         raise ValueError("should hold each value once")
     return values
+
+
+_ONCE = AfterValidator(_each_once)
 
 
 class Factor(_Part):
@@ -100,15 +98,10 @@ class Faults(Factor):
         duration: how long a failure lasts [s]; without it, until the end of the episode.
     """
 
-    modes: Annotated[tuple[str, ...], Field(min_length=1)]
-    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
-    onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1)] = (0.0,)
+    modes: Annotated[tuple[str, ...], Field(min_length=1), _ONCE]
+    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1), _ONCE] = (1, 2, 3)
+    onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), _ONCE] = (0.0,)
     duration: PositiveFloat | None = None
-
-    @field_validator("modes", "robots", "onsets")
-    @classmethod
-    def _distinct(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _each_once(values)
 
 
 class Parameter(Factor):
@@ -120,14 +113,14 @@ class Parameter(Factor):
     """
 
     name: str
-    values: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=2)]
+    values: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=2), _ONCE]
 
     @field_validator("values")
     @classmethod
-    def _distinct(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+    def _relative(cls, values: tuple[float, ...]) -> tuple[float, ...]:
         if values[0] == 0.0:
             raise ValueError("should start with x_o above 0: A is relative to it")
-        return _each_once(values)
+        return values
 
 
 class Ablation(Factor):
@@ -171,7 +164,9 @@ class Specification(_Part):
 
     name: str = "study"
     task: TaskSource = DEFAULT
-    policies: Annotated[tuple[PolicySource, ...], Field(min_length=1)] = ("swarm-dt",)
+    policies: Annotated[
+        tuple[PolicySource, ...], Field(min_length=1), AfterValidator(told_apart)
+    ] = ("swarm-dt",)
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
     scenario: Any = Field(default_factory=dict)
@@ -179,7 +174,7 @@ class Specification(_Part):
     faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
-    indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
+    indicators: Annotated[tuple[str, ...], Field(min_length=1), _ONCE] = tuple(DEFINITIONS)
     looks: tuple[PositiveInt, ...] = ()
     until_clear: bool = False
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
@@ -238,7 +233,7 @@ class Specification(_Part):
         for symbol in symbols:
             if symbol not in DEFINITIONS:
                 raise ValueError(f"no indicator {symbol!r}{suggest(symbol, DEFINITIONS)}")
-        return _each_once(symbols)
+        return symbols
 
     @field_validator("looks")
     @classmethod
@@ -254,11 +249,6 @@ class Specification(_Part):
         if self.until_clear and not self.looks:
             raise ValueError("until_clear: should come with looks, at which comparisons may stop")
         return self
-
-    @field_validator("policies")
-    @classmethod
-    def _once(cls, policies: tuple[object, ...]) -> tuple[object, ...]:
-        return told_apart(policies)
 
 
 def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
@@ -285,15 +275,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
             it is unknown or cannot be.
     """
-    try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise StudyError(f"cannot read the study file {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = str(error).splitlines()[0]
-        raise StudyError(f"the study file {path} is not TOML: {reason}") from error
-    except RecursionError:
-        raise StudyError(f"the study file {path} is nested too deep") from None
+    fields = read_toml(path, "study file", StudyError)
     refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
     try:
         specification = Specification(**{"name": path.stem, **fields})

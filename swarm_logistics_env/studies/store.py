@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.database import Database
-from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks.task import Outcome
+
+from .database import Database
+from .runs import Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +48,7 @@ FROM runs JOIN conditions USING (condition) ORDER BY run
 """
 
 
-class Store:
+class Store(Database):
     """The finished runs of a study. A run is kept from the moment that `add` returns.
 
     Args:
@@ -57,10 +58,6 @@ class Store:
     Raises:
         StudyError: the file is not a store, or its schema is not this version's.
     """
-
-    def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
-        self.path = path
-        self._database = Database(path, read_only=read_only)
 
     @classmethod
     def existing(cls, directory: Path) -> Self:
@@ -80,10 +77,6 @@ class Store:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._database.close()
 
     def add(self, run: Run, outcome: Outcome) -> None:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
@@ -112,19 +105,13 @@ class Store:
         runs = (
             run.key, condition.key, run.code, run.seed, *result, outcome.error, outcome.wall_seconds
         )  # fmt: skip
-        with self._database.transaction() as write:
+        with self.transaction() as write:
             write("INSERT OR IGNORE INTO conditions VALUES (?, ?, ?, ?, ?, ?)", conditions)
             write("DELETE FROM runs WHERE run = ? AND error IS NOT NULL", (run.key,))
             write("INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", runs)
 
     def __len__(self) -> int:
-        return self._database.number("SELECT count(*) FROM runs")
-
-    @property
-    def size(self) -> int:
-        """Size of the database [bytes]."""
-        pages, page = "PRAGMA page_count", "PRAGMA page_size"
-        return self._database.number(pages) * self._database.number(page)
+        return self.number("SELECT count(*) FROM runs")
 
     def absorb(self, path: Path) -> None:
         """Add the runs of another store, to which `add`'s rule applies.
@@ -132,8 +119,8 @@ class Store:
         Raises:
             StudyError: the file is not a store, or has another result of a run that is here.
         """
-        with self._database.attached(path), self._database.transaction() as write:
-            for clash in self._database.read(_CLASH):
+        with self.attached(path), self.transaction() as write:
+            for clash in self.read(_CLASH):
                 raise StudyError(
                     f"{path} has another result than the stores before it for the run "
                     f"{clash['run']} (seed {clash['seed']}), of the same scenario, policy and code"
@@ -143,13 +130,13 @@ class Store:
 
     def succeeded(self) -> set[str]:
         """Return the keys of the runs that need not run again."""
-        rows = self._database.read("SELECT run FROM runs WHERE error IS NULL")
+        rows = self.read("SELECT run FROM runs WHERE error IS NULL")
         return {row["run"] for row in rows}
 
     def outcomes(self, runs: Iterable[Run]) -> dict[str, Outcome]:
         """Return the outcomes of those of `runs` that finished, by key."""
         wanted = {run.key for run in runs}
-        rows = self._database.read(f"SELECT run, {_RESULT}, error, wall_seconds FROM runs")
+        rows = self.read(f"SELECT run, {_RESULT}, error, wall_seconds FROM runs")
         with self._sound():
             return {row["run"]: _outcome(row) for row in rows if row["run"] in wanted}
 
@@ -159,20 +146,20 @@ class Store:
         `delivery_times` is a list [s]; the fields of a result are None where the run failed.
         """
         with self._sound():
-            for row in map(dict, self._database.read(_ROWS)):
+            for row in map(dict, self.read(_ROWS)):
                 if row["delivery_times"] is not None:
                     row["delivery_times"] = _times(row["delivery_times"], row["delivered"]).tolist()
                 yield row
 
     def note(self, notes: Mapping[str, str]) -> None:
         """Note facts about the study, by name; earlier ones of these names are replaced."""
-        with self._database.transaction() as write:
+        with self.transaction() as write:
             for row in notes.items():
                 write("INSERT OR REPLACE INTO notes VALUES (?, ?)", row)
 
     def notes(self) -> dict[str, object]:
         """Return what was noted about the study, by name."""
-        rows = self._database.read("SELECT name, value FROM notes")
+        rows = self.read("SELECT name, value FROM notes")
         return {row["name"]: row["value"] for row in rows}
 
     @contextmanager

@@ -5,24 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.studies.engines import Engine, engine_named
-from swarm_logistics_env.studies.importing import imported_plan
-from swarm_logistics_env.studies.metadata import Declaration, Metadata, of_existing, rows_of
-from swarm_logistics_env.studies.plan import Plan, make_plan
-from swarm_logistics_env.studies.presets import load_preset
-from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.runs import Run, Shard
-from swarm_logistics_env.studies.specification import Specification, read_study_file
-from swarm_logistics_env.studies.store import FILE_NAME, Store
-from swarm_logistics_env.studies.until_clear import standing
 from swarm_logistics_env.tasks.task import Task
+
+from .engines import Engine, engine_named
+from .importing import imported_plan
+from .metadata import Declaration, Metadata, of_existing, rows_of
+from .plan import Plan, make_plan
+from .presets import load_preset
+from .results import StudyResults, judge
+from .runs import Run, Shard
+from .specification import Specification, read_study_file
+from .store import FILE_NAME, Store
+from .until_clear import standing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,20 +44,6 @@ class Tally:
     kept: int
     seconds: float
     error: str | None = None
-
-
-@dataclass
-class _Played:
-    """What one call of `Study.run` has played so far."""
-
-    kept: int
-    keys: set[str] = field(default_factory=set)
-    errors: list[str] = field(default_factory=list)
-    seconds: float = 0.0
-
-    def tally(self) -> Tally:
-        first = self.errors[0] if self.errors else None
-        return Tally(len(self.keys), len(self.errors), self.kept, self.seconds, first)
 
 
 class Study:
@@ -180,62 +167,72 @@ class Study:
             engine = "process" if processes is not None and processes > 1 else "local"
         if isinstance(engine, str):
             engine = engine_named(engine, processes, address)
-        until_clear = self.specification.until_clear
-        if until_clear and shard:
+        if self.specification.until_clear and shard:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        whole = list(shard.of(plan.runs()) if shard else plan.runs())
+        whole, seconds = self._runs(shard), 0.0
         with self._store() as store:
             noted = self._own_metadata(store)
-            declared = noted.declared if noted else Declaration.of(self.specification)
+            declared = noted.declared if noted else Declaration.model_validate(self.specification)
             store.note(rows_of(self.specification, plan.code, plan.identities, declared))
             done = store.succeeded()
-            played = _Played(sum(run.key in done for run in whole))
-            if not until_clear:
-                missing = [run for run in whole if run.key not in done]
-                self._play(missing, engine, store, played)
-            # A run that fails now is not tried again in this call.
-            while until_clear and (missing := self._wanted(store, played.keys)):
-                self._play(missing, engine, store, played)
-            return played.tally()
+            kept = sum(run.key in done for run in whole)
+            played: dict[str, str | None] = {}  # by key, the error of each run that is played now
+            while missing := self._missing(whole, store, played):
+                seconds += self._play(missing, engine, store, played)
+                if not self.specification.until_clear:
+                    break
+        errors = [error for error in played.values() if error is not None]
+        return Tally(len(played), len(errors), kept, seconds, errors[0] if errors else None)
 
-    def _wanted(self, store: Store, played: Collection[str]) -> list[Run]:
-        """Return the runs that the next look needs, those that failed before this call too."""
-        plan = self.plan()
-        outcomes = store.outcomes(plan.runs())
+    def _runs(self, shard: Shard | None) -> list[Run]:
+        return list(shard.of(self.plan().runs()) if shard else self.plan().runs())
+
+    def _missing(self, whole: list[Run], store: Store, played: Collection[str]) -> list[Run]:
+        """Return what is to be played next; a run that failed in this call is not tried again."""
+        if not self.specification.until_clear:
+            done = store.succeeded()
+            return [run for run in whole if run.key not in done]
+        outcomes = store.outcomes(whole)
         kept = {k: o for k, o in outcomes.items() if o.error is None or k in played}
-        return list(standing(plan, kept).wanted)
+        return list(standing(self.plan(), kept).wanted)
 
-    def _play(self, runs: list[Run], engine: Engine, store: Store, played: _Played) -> None:
+    def _play(
+        self, runs: list[Run], engine: Engine, store: Store, played: dict[str, str | None]
+    ) -> float:
+        """Play runs and add them to `played`; return how long it took [s]."""
         policies = Counter(run.condition.policy.label for run in runs)
         progress = ProgressBar(self.specification.name, len(runs), "runs", parts=policies)
-        done, failed = Counter[str](), len(played.errors)
+        done, failed = Counter[str](), 0
         finished = engine(runs)
         # Closed at once where this stops early, so that no worker outlives it.
         with closing(finished), progress:
             for run, outcome in finished:
                 store.add(run, outcome)
-                played.keys.add(run.key)
+                error = outcome.error
+                played[run.key] = error and error.strip().splitlines()[-1]
+                failed += error is not None
                 done[run.condition.policy.label] += 1
-                if outcome.error is not None:
-                    played.errors.append(outcome.error.strip().splitlines()[-1])
-                progress.reach(done.total(), f"{len(played.errors) - failed} failed", done)
-        played.seconds += progress.seconds
+                progress.reach(done.total(), f"{failed} failed", done)
+        return progress.seconds
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.
 
+        A study that runs until it is clear counts those that its next look needs, because what the
+        later ones need is not known yet.
+
         Args:
             shard: of which part; None: of all.
         """
-        plan = self.plan()
-        asked = {run.key for run in (shard.of(plan.runs()) if shard else plan.runs())}
+        whole = self._runs(shard)
         try:
             with self._store(existing=True) as store:
-                return len(asked & store.succeeded()), len(asked)
+                done = len({run.key for run in whole} & store.succeeded())
+                return done, done + len(self._missing(whole, store, ()))
         except StudyError:  # nothing has been run
-            return 0, len(asked)
+            return 0, len(whole)
 
     def exploratory_because(self) -> str | None:
         """Return why verdicts over the asked seeds are exploratory; None: they are not.

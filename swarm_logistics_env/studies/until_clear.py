@@ -17,18 +17,19 @@ from dataclasses import dataclass, replace
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.equivalence import ALPHA
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.comparisons import Arm, Comparison
-from swarm_logistics_env.studies.judged_comparisons import (
+from swarm_logistics_env.tasks.task import Outcome
+
+from .comparisons import Arm, Comparison
+from .judged_comparisons import (
     CONFIDENCE,
     CellKey,
     Judged,
     judge_one,
     level_at,
 )
-from swarm_logistics_env.studies.performance_table import Played, played
-from swarm_logistics_env.studies.plan import Plan
-from swarm_logistics_env.studies.runs import Condition, Run
-from swarm_logistics_env.tasks.task import Outcome
+from .performance_table import Played, played
+from .plan import Plan
+from .runs import Condition, Run
 
 # Below twenty seeds the studentised bootstrap of skewed counts errs at the small levels of a look.
 FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10

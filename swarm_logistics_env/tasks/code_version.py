@@ -4,25 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable
-from functools import cache
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 from typing import Any
 
-from swarm_logistics_env.policies.code_identity import function_digest, without_prose
+from swarm_logistics_env.episode import Play
+from swarm_logistics_env.policies.code_identity import code_digest, function_digest, without_prose
+from swarm_logistics_env.warehouse import Warehouse
 
-# Policies are not here, only what calls them: each policy has an identity of its own.
-SOURCES = (
-    "scenario.py",
-    "streams.py",
-    "kernels.py",
-    "observations.py",
-    "episode.py",
-    "policies/policy.py",
-    "warehouse",
-)
-# These files share out the worlds of a vector environment; a run is one world.
-LEFT_OUT = ("warehouse/thread_pool.py", "warehouse/atomic.py")
 # These files decide what a run in somebody else's environment gives.
 ENVIRONMENT_SOURCES = (
     "streams.py",
@@ -35,23 +24,13 @@ ENVIRONMENT_SOURCES = (
 _environments: dict[str, str] = {}
 
 
-@cache
-def code_version() -> str:
-    """Return the digest of the package's simulation, 16 hexadecimal digits.
+def code_version(world: type = Warehouse) -> str:
+    """Return the digest of the code that decides an episode in a world, 16 hexadecimal digits.
 
-    Docstrings, comments on lines of their own and blank lines do not count.
+    Its modules are those that the world and `run_episode` use; policies have identities of their
+    own. Docstrings, comments on lines of their own and blank lines do not count.
     """
-    package = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for name in SOURCES:
-        source = package / name
-        for file in sorted(source.rglob("*.py")) if source.is_dir() else [source]:
-            path = file.relative_to(package).as_posix()
-            if path in LEFT_OUT:
-                continue
-            digest.update(path.encode() + b"\0")
-            digest.update(without_prose(file.read_text(encoding="utf-8")).encode() + b"\0")
-    return digest.hexdigest()[:16]
+    return code_digest(Play, world)
 
 
 def environment_version(settings: str, functions: Iterable[object], make: Callable[[], Any]) -> str:

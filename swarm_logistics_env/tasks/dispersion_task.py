@@ -13,9 +13,9 @@ import numpy as np
 import vmas
 from numpy.typing import NDArray
 
-from swarm_logistics_env.tasks.parallel_task import ParallelTask
-from swarm_logistics_env.tasks.performance import SumOfRewards
-from swarm_logistics_env.tasks.tuple_env import TupleEnv
+from .parallel_task import ParallelTask
+from .performance import SumOfRewards
+from .tuple_env import TupleEnv
 
 STILL = np.zeros(2, dtype=np.float32)
 GAIN = 3.0  # of the push by the distance, so that robots slow down near the food

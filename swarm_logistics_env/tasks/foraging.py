@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from swarm_logistics_env.errors import ScenarioError
@@ -36,6 +35,7 @@ from swarm_logistics_env.warehouse.structs import (
     STORED,
     Numbers,
     Parameters,
+    Sensed,
     World,
     parameters_of,
 )
@@ -71,7 +71,7 @@ class Foraging(Warehouse):
         """Whether every item was brought home and none comes back."""
         return bool((self.state.item_status == DELIVERED).all())
 
-    def _advance(self, rows: NDArray[np.float32]) -> bool:
+    def _advance(self, rows: Sensed) -> bool:
         return forage(self._address, 0.5 * self.scenario.delivery_width, rows)
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
@@ -91,11 +91,7 @@ class Foraging(Warehouse):
 
 @kernel
 def free_place(
-    key: np.uint64,
-    parameters: Parameters,
-    nest_radius: float,
-    obstacles: Numbers,
-    items: Numbers,
+    key: np.uint64, parameters: Parameters, nest_radius: float, obstacles: Numbers, items: Numbers
 ) -> tuple[float, float]:
     """Return a random place [m], clear of obstacles, of items and of what the nest's robots reach.
 
@@ -117,7 +113,7 @@ def free_place(
 
 
 @kernel
-def forage(address: int, nest_radius: float, rows: NDArray[np.float32]) -> bool:
+def forage(address: int, nest_radius: float, rows: Sensed) -> bool:
     """Take a control step in the world at `address`, as `stepping.step` does in the warehouse."""
     world = unpacked_at(World, address)
     world.outcome.refused[0] = refused_command(world.commands.now, world.robots, world.able)

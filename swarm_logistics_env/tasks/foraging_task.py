@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
-from functools import cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from swarm_logistics_env.policies.code_identity import without_prose
 from swarm_logistics_env.policies.forager import Forager
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.tasks import foraging
-from swarm_logistics_env.tasks.foraging import Foraging, ForagingScenario
-from swarm_logistics_env.tasks.warehouse_task import WarehouseTask
+
+from .foraging import Foraging, ForagingScenario
+from .warehouse_task import WarehouseTask
 
 # What these modes take away means something else here, or nothing.
 _OTHER_MEANING = {
@@ -46,10 +42,6 @@ class ForagingTask(WarehouseTask):
         known = {**super().failure_modes, **_OTHER_MEANING}
         return {mode: known[mode] for mode in known if mode not in _NO_MEANING}
 
-    def code(self) -> str:
-        """Return the version of the simulation and of the rules."""
-        return f"{super().code()} {_rules_version()}"
-
     def vary(self, base: Scenario, fields: Mapping[str, Any]) -> Scenario:
         """Return `base` with `fields` changed; "preset" gives the robots of a warehouse's preset.
 
@@ -62,12 +54,6 @@ class ForagingTask(WarehouseTask):
             robots = {name: getattr(preset, name) for name in preset.model_fields_set}
             base, changes = ForagingScenario(), {**robots, **changes}
         return base.replace(**changes)
-
-
-@cache
-def _rules_version() -> str:
-    source = Path(foraging.__file__).read_text(encoding="utf-8")
-    return hashlib.sha256(without_prose(source).encode()).hexdigest()[:16]
 
 
 FORAGING = ForagingTask()

@@ -15,30 +15,13 @@ from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
 from swarm_logistics_env.errors import FaultError, StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.tasks.code_version import environment_version
-from swarm_logistics_env.tasks.failing_robots import (
-    FAILURE_MODES,
-    REMOVED,
-    FailingRobots,
-    RobotFault,
-    failing_rows,
-)
-from swarm_logistics_env.tasks.parallel_policies import (
-    Env,
-    RandomActions,
-    agent_actions,
-    agents_by_row,
-    observation_rows,
-)
-from swarm_logistics_env.tasks.performance import (
-    Gain,
-    SumOfRewards,
-    in_words,
-    name_of,
-    performance_of,
-)
-from swarm_logistics_env.tasks.policy_choice import policy_of
-from swarm_logistics_env.tasks.task import Outcome, Playable
+
+from .code_version import environment_version
+from .failing_robots import FAILURE_MODES, REMOVED, FailingRobots, RobotFault, failing_rows
+from .parallel_policies import Env, RandomActions, agent_actions, agents_by_row, observation_rows
+from .performance import Gain, SumOfRewards, in_words, name_of, performance_of
+from .policy_choice import policy_of
+from .task import Outcome, Playable
 
 NEEDS = {
     "silent": "the action that counts as none",
@@ -148,14 +131,6 @@ class ParallelTask:
         return environment_version(
             repr(settings), (self._make_env, self._gain), lambda: self._made(self.default, ())
         )
-
-    def size(self, scenario: ParallelScenario) -> int:
-        """Return the number N of robots."""
-        return scenario.n_robots
-
-    def duration(self, scenario: ParallelScenario) -> float:
-        """Return the time at which a run ends at the latest [s]."""
-        return scenario.duration
 
     def vary(self, base: ParallelScenario, fields: Mapping[str, Any]) -> ParallelScenario:
         """Return a scenario with some fields changed.

@@ -17,8 +17,9 @@ from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
-from swarm_logistics_env.records import Record
-from swarm_logistics_env.tasks.parallel_policies import StableBaselinesModel
+from swarm_logistics_env.records import Record, canonical_json
+
+from .parallel_policies import StableBaselinesModel
 
 Known = Mapping[str, Callable[..., Policy]]
 NONE: Known = MappingProxyType({})
@@ -107,7 +108,7 @@ def policy_of(source: object, known: Known = NONE) -> Policy:
             return copy.deepcopy(_model(name))
         if known and name in policies.NAMES:
             raise PolicyError(f"the task has no policy {name!r}{suggest(name, known)}")
-        return copy.deepcopy(_loaded(name, _canonical(parameters)))
+        return copy.deepcopy(_loaded(name, canonical_json(parameters)))
     if not (known or isinstance(source, Policy)):
         raise PolicyError(f"policy {source!r}: should have the methods reset and act")
     policy: Any = copy.deepcopy(source)
@@ -121,7 +122,7 @@ def policy_identity(source: object, known: Known = NONE) -> str:
     if not (isinstance(source, PolicyChoice) and source.parameters):
         return identity
     # A class of one's own need not tell its parameters.
-    return _canonical({"given": source.parameters, "policy": identity})
+    return canonical_json({"given": source.parameters, "policy": identity})
 
 
 def _chosen(value: object) -> object:
@@ -162,7 +163,3 @@ def _model(name: str) -> Policy:
 @lru_cache(maxsize=8)
 def _loaded(name: str, parameters: str) -> Policy:
     return policies.load(name, **json.loads(parameters))
-
-
-def _canonical(value: object) -> str:
-    return json.dumps(value, sort_keys=True, separators=(",", ":"))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.tasks.task import Outcome, Playable
+
+from .task import Outcome, Playable
 
 
 class RecordedScenario(Record):
@@ -43,61 +44,6 @@ class RecordedFault(Record):
     onset: float = 0.0
 
 
-class RecordedCell(Record):
-    """One condition of a table.
-
-    Args:
-        kind, name, value, onset: of the study's setting.
-        scenario, fault: what the file says of it; fault None: there is none.
-        repeated: whether these are the trials without fault of a second set.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    kind: Literal["size", "fault", "parameter"]
-    name: str
-    value: float
-    onset: float = 0.0
-    scenario: RecordedScenario
-    fault: RecordedFault | None = None
-    repeated: bool = False
-
-
-class RecordedTable(Record):
-    """Conditions that are compared with each other, the original one first.
-
-    Args:
-        policy: what controlled the robots; title: heading in the report.
-        cells: the conditions.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    policy: str
-    title: str
-    cells: tuple[RecordedCell, ...]
-
-
-class Origin(Record):
-    """Where recorded trials came from, and what is compared in them.
-
-    Args:
-        file: its name; digest: of its content; paired: whether its rows name their seeds.
-        seeds: those that they name; empty: none.
-        setup: what the user states about the trials, name and value.
-        tables: what is compared.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    file: str
-    digest: str
-    paired: bool
-    seeds: tuple[int, ...] = ()
-    setup: tuple[tuple[str, str], ...] = ()
-    tables: tuple[RecordedTable, ...] = ()
-
-
 class RecordedTrials:
     """Trials of real robots, another simulator or a paper; see `Task` for the attributes."""
 
@@ -112,14 +58,6 @@ class RecordedTrials:
     def code(self) -> str:
         """Return a word in place of a code version: none made these runs."""
         return "imported"
-
-    def size(self, scenario: RecordedScenario) -> int:
-        """Return the number N of robots."""
-        return scenario.n_robots
-
-    def duration(self, scenario: RecordedScenario) -> float:
-        """Return how long a trial lasted [s]."""
-        return scenario.duration
 
     def vary(self, base: RecordedScenario, fields: Mapping[str, Any]) -> RecordedScenario:
         """Return `base` with some fields changed."""

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_of, runs_code
-from swarm_logistics_env.tasks.task import Playable
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
+
+from .policy_choice import policy_of
+from .task import Playable
 
 FRAME_RATE = 2.5  # per second, at most
 NOWHERE = -1.0  # in both coordinates: a robot removed, an item carried or delivered
@@ -38,11 +39,6 @@ class Recording:
     carrying: NDArray[np.bool_]
     failed: NDArray[np.bool_]
     digest: str
-
-
-def can_be_recorded(source: object) -> bool:
-    """Return whether a policy may be played again to be shown: a store's text must run no code."""
-    return not (isinstance(source, str | PolicyChoice) and runs_code(source))
 
 
 def record_run(source: object, condition: Playable, seed: int, policy_seed: int) -> Recording:

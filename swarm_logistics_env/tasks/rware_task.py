@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from rware.warehouse import RewardType, Warehouse
 
 from swarm_logistics_env import streams
-from swarm_logistics_env.tasks.parallel_policies import Env
-from swarm_logistics_env.tasks.parallel_task import ParallelTask
-from swarm_logistics_env.tasks.tuple_env import TupleEnv
+
+from .parallel_policies import Env
+from .parallel_task import ParallelTask
+from .tuple_env import TupleEnv
 
 Cell = tuple[int, int]  # column, row
 

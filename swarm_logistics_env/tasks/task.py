@@ -61,8 +61,10 @@ class Playable(Protocol):
 class Task(Protocol):
     """Something that a policy can be tested in.
 
-    Its scenarios and faults are records (`records.Record`), so that a store can keep them as JSON;
-    a scenario also has `conditions()`: rows of name, value, and unit with meaning, for the report.
+    Its scenarios and faults are records (`records.Record`), so that a store can keep them as JSON.
+    A scenario has the fields `n_robots`, the swarm size N, and `duration`, the time at which a run
+    ends at the latest [s]; and `conditions()`: rows of name, value, and unit with meaning, for the
+    report.
 
     Attributes:
         name: part of a condition's identity, but for the warehouse's.
@@ -94,14 +96,8 @@ class Task(Protocol):
     def code(self) -> str:
         """Return a text that changes whenever the task's runs may have changed."""
 
-    def size(self, scenario: Any) -> int:
-        """Return the number N of robots."""
-
-    def duration(self, scenario: Any) -> float:
-        """Return the time at which a run ends at the latest [s]."""
-
     def vary(self, base: Any, fields: Mapping[str, Any]) -> Any:
-        """Return a scenario with some fields changed; `n_robots` and `duration` are fields too.
+        """Return a scenario with some fields changed.
 
         Raises:
             SwarmLogisticsError: a field is unknown or cannot be.

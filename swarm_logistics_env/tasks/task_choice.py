@@ -8,7 +8,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, PlainSerializer
 
 from swarm_logistics_env.errors import StudyError, suggest
-from swarm_logistics_env.tasks.task import Task
+
+from .task import Task
 
 DEFAULT = "warehouse"
 NAMES = {

@@ -10,11 +10,13 @@ import numpy as np
 
 from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.tasks.code_version import code_version
-from swarm_logistics_env.tasks.policy_choice import policy_of
-from swarm_logistics_env.tasks.task import Outcome, Playable
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
+from swarm_logistics_env.warehouse.faults import Fault
+
+from .code_version import code_version
+from .policy_choice import policy_of
+from .task import Outcome, Playable
 
 __all__ = ["WAREHOUSE", "Fault", "Scenario", "WarehouseTask"]
 
@@ -46,15 +48,7 @@ class WarehouseTask:
 
     def code(self) -> str:
         """Return the version of the simulation."""
-        return code_version()
-
-    def size(self, scenario: Scenario) -> int:
-        """Return the number N of robots."""
-        return scenario.n_robots
-
-    def duration(self, scenario: Scenario) -> float:
-        """Return the time at which an episode ends at the latest [s]."""
-        return scenario.duration
+        return code_version(self.world)
 
     def vary(self, base: Scenario, fields: Mapping[str, Any]) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.

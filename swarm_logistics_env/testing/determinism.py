@@ -5,11 +5,10 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from multiprocessing import get_context
+from unittest.mock import patch
 
 import numpy as np
 
@@ -66,7 +65,8 @@ def _beside(make: Make, policy: Policy | str, seed: int, steps: int) -> list[str
 def _in_fresh_process(
     make: Make, policy: Policy | str, seed: int, steps: int, hash_seed: str
 ) -> list[str]:
-    with _hash_seed(hash_seed), ProcessPoolExecutor(1, get_context("spawn")) as pool:
+    seeded = patch.dict(os.environ, {"PYTHONHASHSEED": hash_seed})
+    with seeded, ProcessPoolExecutor(1, get_context("spawn")) as pool:
         try:
             return pool.submit(trajectory, make, policy, seed, steps).result()
         except (pickle.PicklingError, AttributeError, ImportError, BrokenProcessPool) as error:
@@ -75,18 +75,6 @@ def _in_fresh_process(
                 'process can import, in a script below `if __name__ == "__main__"`; it says: '
                 f"{error}"
             ) from error
-
-
-@contextmanager
-def _hash_seed(value: str) -> Iterator[None]:
-    before = os.environ.get("PYTHONHASHSEED")
-    os.environ["PYTHONHASHSEED"] = value
-    try:
-        yield
-    finally:
-        del os.environ["PYTHONHASHSEED"]
-        if before is not None:
-            os.environ["PYTHONHASHSEED"] = before
 
 
 def _digest(moment: Moment) -> str:

@@ -17,7 +17,7 @@ from swarm_logistics_env.testing.playing import (
     robot_of,
 )
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import failure_mode
+from swarm_logistics_env.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 

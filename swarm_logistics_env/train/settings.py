@@ -21,7 +21,8 @@ from pydantic import (
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.faults import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
+from swarm_logistics_env.warehouse.faults import Fault
 
 Fraction = Annotated[float, Field(gt=0, le=1)]
 

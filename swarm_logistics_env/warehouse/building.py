@@ -8,20 +8,12 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse import engine as whom
-from swarm_logistics_env.warehouse.engine import collide_with
-from swarm_logistics_env.warehouse.native import call_at, made_at
-from swarm_logistics_env.warehouse.packing import unpacked_at
-from swarm_logistics_env.warehouse.structs import (
-    NOBODY,
-    STORED,
-    Engine,
-    Items,
-    Numbers,
-    Parameters,
-    Robots,
-    World,
-)
+
+from . import engine as whom
+from .engine import collide_with
+from .native import call_at, made_at
+from .packing import unpacked_at
+from .structs import NOBODY, STORED, Engine, Items, Numbers, Parameters, Robots, World
 
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
 _BIAS = 1e-4  # share of an overlap that is left after a second; the engine's default: 0.0018

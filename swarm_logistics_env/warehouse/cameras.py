@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.logistics import is_remembered
-from swarm_logistics_env.warehouse.radio import ITEM_SEEN, ROBOT_SEEN, is_missed
-from swarm_logistics_env.warehouse.rangers import Pose, in_frame
-from swarm_logistics_env.warehouse.structs import Nearby, World
+
+from .logistics import is_remembered
+from .radio import ITEM_SEEN, ROBOT_SEEN, is_missed
+from .rangers import Pose, in_frame
+from .structs import Nearby, Sensed, World
 
 _ITEM_WIDTH = len(row.ITEM_FEATURES)
 _NEIGHBOUR_WIDTH = len(row.NEIGHBOUR_FEATURES)
@@ -48,7 +46,7 @@ def view_square(view_range: float) -> float:
 
 
 @inlined_kernel
-def see_items(me: int, pose: Pose, world: World, n_found: int, out: NDArray[np.float32]) -> None:
+def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> None:
     """Fill the block of items in a row from the free items nearby."""
     robots, grid, nearby = world.robots, world.item_grid, world.nearby
     limit, dropout = view_square(world.able.view_range[me]), world.parameters.sensor_dropout
@@ -90,7 +88,7 @@ def choose_neighbours(me: int, world: World, n_found: int) -> int:
 
 
 @inlined_kernel
-def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: NDArray[np.float32]) -> None:
+def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
     robots, parameters = world.robots, world.parameters
     nearby, width = world.nearby, world.robots.message.shape[1]

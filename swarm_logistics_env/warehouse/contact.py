@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.rangers import Pose
-from swarm_logistics_env.warehouse.structs import World
+
+from .rangers import Pose
+from .structs import World
 
 GAP = 0.01  # [m], gap below which two things touch
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.native import call_at, store_at
-from swarm_logistics_env.warehouse.structs import Batch, Engine, Integers, Numbers, Parameters
+
+from .native import call_at, store_at
+from .structs import Batch, Engine, Integers, Numbers, Parameters
 
 _ROBOT, _SOLID, _ITEM = 1, 2, 4  # categories of shapes
 _MASK = 32  # bits of the categories in a filter's second word, below those of its mask

@@ -1,13 +1,10 @@
-"""Failure modes as lost capabilities, with onset and recovery."""
+"""Faults: which robots fail in which mode, from when and for how long."""
 
 from __future__ import annotations
 
 import math
-import re
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import MISSING, dataclass, fields, replace
-from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -26,189 +23,15 @@ from swarm_logistics_env.errors import FaultError, SwarmLogisticsError, suggest
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
-from swarm_logistics_env.warehouse.roles import ROLES, robots_in_role
-from swarm_logistics_env.warehouse.state import WarehouseState
-from swarm_logistics_env.warehouse.structs import LONGEST_RADIO_DELAY
+
+from .failure_modes import FAILURE_MODES, LOST_AS_A_WHOLE, failure_mode
+from .roles import ROLES, robots_in_role
+from .state import WarehouseState
 
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
 
 Seconds = Annotated[float, Field(ge=0.01)]
-
-
-# Capabilities that a mode takes away as a whole: fields of `FailureMode` and of `Capabilities`.
-_FLAGS = (
-    "lifts", "delivers", "sends", "hears", "honest", "obeys", "releases_inside", "rangers_refresh",
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class FailureMode:
-    """What a robot that fails in this mode has lost.
-
-    Attributes:
-        description: in a sentence.
-        mark: what its robots wear in pictures, one or two letters; none: the mode's name.
-        speed: factor in [0, 1] on its top speed and turn rate.
-        view: factor in [0, 1] on its cameras' range.
-        factor: "speed" or "view": which of the two a fault's own factor replaces; or None.
-        wears: whether the speed falls linearly, from all at the fault's onset to that factor at
-            the end of the episode.
-        rangers: False: they report nothing near.
-        ranger_bias: what they read too far [m].
-        radio_delay: how late its broadcasts come [s], at most `LONGEST_RADIO_DELAY`.
-        present: False: it is out of the arena.
-        lifts, delivers, sends, hears, honest, obeys, releases_inside, rangers_refresh: see
-            `structs.Capabilities`.
-
-    Raises:
-        FaultError: broadcasts cannot come that late.
-    """
-
-    description: str
-    mark: str = ""
-    speed: float = 1.0
-    view: float = 1.0
-    factor: str | None = None
-    wears: bool = False
-    rangers: bool = True
-    ranger_bias: float = 0.0
-    radio_delay: float = 0.0
-    present: bool = True
-    lifts: bool = True
-    delivers: bool = True
-    sends: bool = True
-    hears: bool = True
-    honest: bool = True
-    obeys: bool = True
-    releases_inside: bool = True
-    rangers_refresh: bool = True
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.radio_delay <= LONGEST_RADIO_DELAY:
-            raise FaultError(
-                f"FailureMode.radio_delay = {self.radio_delay}: should be 0 to "
-                f"{LONGEST_RADIO_DELAY} s, for which broadcasts are kept"
-            )
-
-
-FAILURE_MODES: dict[str, FailureMode] = {
-    "FM1": FailureMode("always tells timer 0, as if in the delivery area", mark="1", honest=False),
-    "FM2": FailureMode("never picks up", mark="2", lifts=False),
-    "FM3": FailureMode("neither sends nor hears", mark="3", sends=False, hears=False),
-    "FM3_send": FailureMode("does not send", mark="3s", sends=False),
-    "FM3_hear": FailureMode("does not hear", mark="3h", hears=False),
-    "FM4": FailureMode("its entering the delivery area delivers nothing", mark="4", delivers=False),
-    "FM4_jam": FailureMode(
-        "as FM4, and what it holds inside the delivery area it cannot let go",
-        mark="4j",
-        delivers=False,
-        releases_inside=False,
-    ),
-    "motor_slow": FailureMode(
-        "drives and turns at half its speed, or at the fault's factor of it",
-        mark="S",
-        speed=0.5,
-        factor="speed",
-    ),
-    "motor_wear": FailureMode(
-        "drives and turns ever slower, at half its speed or the fault's factor of it in the end",
-        mark="W",
-        speed=0.5,
-        factor="speed",
-        wears=True,
-    ),
-    "motor_dead": FailureMode("stands still", mark="M", speed=0.0),
-    "view_reduced": FailureMode(
-        "sees half as far with its cameras, or the fault's factor of it",
-        mark="V",
-        view=0.5,
-        factor="view",
-    ),
-    "rangers_blind": FailureMode("its rangers report nothing near", mark="R", rangers=False),
-    "rangers_frozen": FailureMode(
-        "its rangers repeat what they read when they failed", mark="F", rangers_refresh=False
-    ),
-    "rangers_biased": FailureMode("its rangers read 0.2 m too far", mark="B", ranger_bias=0.2),
-    "radio_delayed": FailureMode("what it broadcasts comes 2 s late", mark="D", radio_delay=2.0),
-    "dead": FailureMode(
-        "stands still, senses, sends and lifts nothing, keeps what it carries",
-        mark="X",
-        speed=0.0,
-        view=0.0,
-        rangers=False,
-        lifts=False,
-        delivers=False,
-        sends=False,
-        hears=False,
-        obeys=False,
-    ),
-    "removed": FailureMode(
-        "out of the arena, what it carried is put down where it was", present=False
-    ),
-}
-
-# What a mode can take, each with the fields of `FailureMode` that tell of it.
-CAPABILITIES: dict[str, tuple[str, ...]] = {
-    "move": ("speed", "wears", "obeys"),
-    "sense": ("view", "rangers", "ranger_bias", "rangers_refresh"),
-    "pick_up": ("lifts",),
-    "deliver": ("delivers", "releases_inside"),
-    "send": ("sends", "radio_delay"),
-    "hear": ("hears",),
-    "tell_the_truth": ("honest",),
-    "be_there": ("present",),
-}
-_SOUND = {each.name: each.default for each in fields(FailureMode) if each.default is not MISSING}
-_PARTIAL = re.compile(r"(?P<mode>\w+)\[(?P<lost>\w+(,\w+)*)\]")
-
-
-def lost_capabilities(mode: str) -> tuple[str, ...]:
-    """Return the capabilities of `CAPABILITIES` that a mode takes, whole or in part.
-
-    Raises:
-        FaultError: there is no such mode.
-    """
-    found = failure_mode(mode)
-    changed = {name for name, sound in _SOUND.items() if getattr(found, name) != sound}
-    if found.factor is not None:  # the fault's own factor may be less than the mode's
-        changed.add(found.factor)
-    return tuple(name for name, own in CAPABILITIES.items() if changed.intersection(own))
-
-
-@lru_cache
-def _partial(mode: FailureMode, lost: tuple[str, ...]) -> FailureMode:
-    kept: dict[str, Any] = {}
-    for name, own in CAPABILITIES.items():
-        if name not in lost:
-            kept |= {each: _SOUND[each] for each in own}
-            kept |= {"factor": None} if mode.factor in own else {}
-    return replace(mode, description=f"{mode.description}; of this: {', '.join(lost)}", **kept)
-
-
-def failure_mode(name: str) -> FailureMode:
-    """Return the failure mode of that name.
-
-    Args:
-        name: a key of `FAILURE_MODES`; or, as "dead[move,send]", a mode of which a robot loses
-            these capabilities alone, which tells what each of them costs.
-
-    Raises:
-        FaultError: there is no such mode, or it does not take such a capability.
-    """
-    if name in FAILURE_MODES:
-        return FAILURE_MODES[name]
-    match = _PARTIAL.fullmatch(name)
-    if match is None or match["mode"] not in FAILURE_MODES:
-        raise FaultError(f"no failure mode {name!r}{suggest(name, FAILURE_MODES)}")
-    lost, able = tuple(match["lost"].split(",")), lost_capabilities(match["mode"])
-    for capability in lost:
-        if capability not in able:
-            raise FaultError(
-                f"failure mode {name!r}: {match['mode']} takes {', '.join(able)}, not "
-                f"{capability!r}{suggest(capability, able)}"
-            )
-    return _partial(FAILURE_MODES[match["mode"]], lost)
 
 
 class Fault(Record):
@@ -416,7 +239,7 @@ def apply_faults(
     able.ranger_range[:] = scenario.ranger_range * sensing
     able.view_range[:] = scenario.view_range * sensing
     able.ranger_bias[:], able.radio_delay[:] = 0.0, 0
-    for name in _FLAGS:
+    for name in LOST_AS_A_WHOLE:
         getattr(able, name)[:] = True
     gone = np.zeros(state.n_robots, np.bool_)
     modes: list[tuple[str, ...]] = [()] * state.n_robots
@@ -431,7 +254,7 @@ def apply_faults(
         able.ranger_bias[robots] += mode.ranger_bias
         delay = round(mode.radio_delay / scenario.control_period)
         able.radio_delay[robots] = np.maximum(able.radio_delay[robots], delay)
-        for name in _FLAGS:
+        for name in LOST_AS_A_WHOLE:
             getattr(able, name)[robots] &= getattr(mode, name)
         gone[robots] |= not mode.present
         for robot in robots.tolist():

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.structs import Flags, Grid, Nearby, Numbers
+
+from .structs import Flags, Grid, Nearby, Numbers
 
 
 def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:

@@ -9,9 +9,10 @@ have left it.
 from __future__ import annotations
 
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.engine import FREE_ITEM, LIFTED, NO_ONE, collide_with
-from swarm_logistics_env.warehouse.grid import look_around
-from swarm_logistics_env.warehouse.structs import NOBODY, STORED, World
+
+from .engine import FREE_ITEM, LIFTED, NO_ONE, collide_with
+from .grid import look_around
+from .structs import NOBODY, STORED, World
 
 
 @inlined_kernel

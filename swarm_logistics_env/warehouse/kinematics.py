@@ -5,13 +5,8 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse.structs import (
-    NOBODY,
-    Capabilities,
-    Numbers,
-    Parameters,
-    Robots,
-)
+
+from .structs import NOBODY, Capabilities, Numbers, Parameters, Robots
 
 FORWARD, LEFT, TURN, GRIPPER, MESSAGE = range(5)  # columns of a command row; messages are the rest
 

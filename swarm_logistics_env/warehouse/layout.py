@@ -12,7 +12,8 @@ from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, pair_key, uniform
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.warehouse.structs import STORED, Integers, Keys, Numbers, World
+
+from .structs import STORED, Integers, Keys, Numbers, World
 
 _ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
 _ATTEMPTS = 5_000  # to place a disc among those that stand

@@ -11,19 +11,12 @@ import math
 import numpy as np
 
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.engine import CAME_BACK, DELIVERED_IT, LIFTED, PUT_DOWN
-from swarm_logistics_env.warehouse.grid import look_around
-from swarm_logistics_env.warehouse.kinematics import GRIPPER
-from swarm_logistics_env.warehouse.layout import draw_order, place_restocked
-from swarm_logistics_env.warehouse.structs import (
-    CARRIED,
-    DELIVERED,
-    NOBODY,
-    STORED,
-    Integers,
-    Numbers,
-    World,
-)
+
+from .engine import CAME_BACK, DELIVERED_IT, LIFTED, PUT_DOWN
+from .grid import look_around
+from .kinematics import GRIPPER
+from .layout import draw_order, place_restocked
+from .structs import CARRIED, DELIVERED, NOBODY, STORED, Integers, Numbers, World
 
 _HOLD, _OPEN = 0.5, -0.5
 

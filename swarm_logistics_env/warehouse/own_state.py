@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.rangers import Pose
-from swarm_logistics_env.warehouse.structs import NOBODY, World
+
+from .rangers import Pose
+from .structs import NOBODY, Sensed, World
 
 
 @inlined_kernel
-def feel_itself(me: int, pose: Pose, world: World, out: NDArray[np.float32]) -> None:
+def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     """Fill the end of a row: load, delivery area, timer, velocity and contact."""
     robots, parameters = world.robots, world.parameters
     velocity_x, velocity_y = robots.velocity[me, 0], robots.velocity[me, 1]

@@ -19,10 +19,11 @@ from pymunk.batch import BodyFields
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.building import N_WALLS, build, free
-from swarm_logistics_env.warehouse.engine import EMPTY_ROBOT, NO_ONE, collide_with, move
-from swarm_logistics_env.warehouse.packing import hints, packed
-from swarm_logistics_env.warehouse.structs import Batch, Engine, Functions
+
+from .building import N_WALLS, build, free
+from .engine import EMPTY_ROBOT, NO_ONE, collide_with, move
+from .packing import hints, packed
+from .structs import Batch, Engine, Functions
 
 
 class Physics:

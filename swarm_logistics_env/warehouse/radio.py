@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from swarm_logistics_env.kernels import inlined_kernel, pair_key, uniform
-from swarm_logistics_env.warehouse.kinematics import MESSAGE
-from swarm_logistics_env.warehouse.structs import NOBODY, Numbers, World
+
+from .kinematics import MESSAGE
+from .structs import NOBODY, Numbers, World
 
 # Purposes of the streams between a robot and another thing: numbers of one step.
 RADIO, ROBOT_SEEN, ITEM_SEEN, N_PURPOSES = range(4)

@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse.structs import Grid, Nearby, World
+
+from .structs import Grid, Nearby, Sensed, World
 
 _N_BEAMS = row.N_BEAMS
 _BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
@@ -39,9 +39,7 @@ def in_frame(pose: Pose, x: float, y: float) -> tuple[float, float]:
 
 
 @inlined_kernel
-def scan_disc(
-    forward: float, left: float, square: float, radius: float, scan: NDArray[np.float32]
-) -> None:
+def scan_disc(forward: float, left: float, square: float, radius: float, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a disc.
 
     Args:
@@ -89,7 +87,7 @@ def nearest_beam(forward: float, left: float) -> int:
 
 
 @inlined_kernel
-def scan_walls(pose: Pose, width: float, height: float, scan: NDArray[np.float32]) -> None:
+def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall of the arena."""
     reach = scan[0]
     for axis in range(2):
@@ -108,7 +106,7 @@ def scan_walls(pose: Pose, width: float, height: float, scan: NDArray[np.float32
 
 
 @inlined_kernel
-def scan_solids(pose: Pose, reach: float, world: World, scan: NDArray[np.float32]) -> None:
+def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""
     parameters, obstacles = world.parameters, world.obstacles
     scan_walls(pose, parameters.warehouse_width, parameters.warehouse_height, scan)
@@ -123,13 +121,7 @@ def scan_solids(pose: Pose, reach: float, world: World, scan: NDArray[np.float32
 
 @inlined_kernel
 def scan_discs(
-    pose: Pose,
-    reach: float,
-    radius: float,
-    grid: Grid,
-    nearby: Nearby,
-    n_found: int,
-    scan: NDArray[np.float32],
+    pose: Pose, reach: float, radius: float, grid: Grid, nearby: Nearby, n_found: int, scan: Sensed
 ) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet discs nearby, within `reach` [m]."""
     limit, n_scanned = (reach + radius) ** 2, 0

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.warehouse.structs import NOBODY
+from .structs import NOBODY
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.warehouse.state import WarehouseState
+    from .state import WarehouseState
 
 ROLES = {
     "carrier": "carries the requested item",

@@ -7,22 +7,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
-from swarm_logistics_env.warehouse import contact, rangers
-from swarm_logistics_env.warehouse.cameras import (
-    choose_neighbours,
-    see_items,
-    tell_of_neighbours,
-)
-from swarm_logistics_env.warehouse.grid import look_around
-from swarm_logistics_env.warehouse.own_state import feel_itself
-from swarm_logistics_env.warehouse.radio import listen, lowest_timer_heard
-from swarm_logistics_env.warehouse.rangers import Pose
-from swarm_logistics_env.warehouse.structs import NOBODY, World
+
+from . import contact, rangers
+from .cameras import choose_neighbours, see_items, tell_of_neighbours
+from .grid import look_around
+from .own_state import feel_itself
+from .radio import listen, lowest_timer_heard
+from .rangers import Pose
+from .structs import NOBODY, Sensed, World
 
 _N_BEAMS = row.N_BEAMS
 _ROBOTS, _WALLS, _ITEMS, _LOWEST = (
@@ -31,7 +25,7 @@ _ROBOTS, _WALLS, _ITEMS, _LOWEST = (
 
 
 @inlined_kernel
-def sense(world: World, rows: NDArray[np.float32]) -> int:
+def sense(world: World, rows: Sensed) -> int:
     """Fill the observation rows (N, D), who touches what, and what was heard.
 
     Returns how many robots that have not failed touch one that has.
@@ -62,7 +56,7 @@ def sense(world: World, rows: NDArray[np.float32]) -> int:
 
 
 @inlined_kernel
-def sense_robots(me: int, pose: Pose, world: World, out: NDArray[np.float32]) -> bool:
+def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     """Sense robots: by touch, in the beams, heard on the radio, in view.
 
     Returns whether `me` is sound and touches one that failed.
@@ -96,7 +90,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: NDArray[np.float32]) ->
 
 
 @inlined_kernel
-def sense_items(me: int, pose: Pose, world: World, out: NDArray[np.float32]) -> None:
+def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     """Sense free items: in the beams, in view, and by touch when laden."""
     parameters, grid, nearby = world.parameters, world.item_grid, world.nearby
     radius = parameters.item_radius

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import gaussian, inlined_kernel, uniform
-from swarm_logistics_env.warehouse.structs import Parameters, World
+
+from .structs import Parameters, Sensed, World
 
 _N_BEAMS = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
 _ITEM_WIDTH, _NEIGHBOUR_WIDTH = len(row.ITEM_FEATURES), len(row.NEIGHBOUR_FEATURES)
@@ -20,7 +20,7 @@ _DROPPED, _PLACES, _DRAWS = _N_BEAMS, 2 * _N_BEAMS, 2 * _N_BEAMS + 2 * _N_THINGS
 
 
 @inlined_kernel
-def disturb(world: World, rows: NDArray[np.float32]) -> None:
+def disturb(world: World, rows: Sensed) -> None:
     """Add the scenario's noise to rows (N, D) and drop beams, in place.
 
     What is measured stays within the column's range.
@@ -41,7 +41,7 @@ def disturb(world: World, rows: NDArray[np.float32]) -> None:
 
 @inlined_kernel
 def disturb_beams(
-    key: np.uint64, first: int, reach: float, parameters: Parameters, out: NDArray[np.float32]
+    key: np.uint64, first: int, reach: float, parameters: Parameters, out: Sensed
 ) -> None:
     """Add noise to the beams of a row, from number `first` of the stream, and drop some.
 
@@ -57,9 +57,7 @@ def disturb_beams(
 
 
 @inlined_kernel
-def disturb_places(
-    key: np.uint64, first: int, parameters: Parameters, out: NDArray[np.float32]
-) -> None:
+def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sensed) -> None:
     """Add noise to the places of what is there in a row, from number `first` of the stream."""
     far = max(parameters.view_range, parameters.radio_range)
     for thing in range(_N_THINGS):
@@ -75,7 +73,7 @@ def disturb_places(
 
 
 @inlined_kernel
-def fail_rangers(world: World, rows: NDArray[np.float32]) -> None:
+def fail_rangers(world: World, rows: Sensed) -> None:
     """Make of the beams in rows (N, D) what rangers that have failed report, in place."""
     robots, able = world.robots, world.able
     for robot in range(len(rows)):
@@ -95,7 +93,7 @@ def fail_rangers(world: World, rows: NDArray[np.float32]) -> None:
 
 
 @inlined_kernel
-def add_bias(beams: NDArray[np.float32], bias: float, reach: float) -> None:
+def add_bias(beams: Sensed, bias: float, reach: float) -> None:
     """Lengthen the beams that meet something by `bias` [m], at most to `reach` [m]."""
     for beam in range(len(beams)):
         if beams[beam] < np.float32(reach):

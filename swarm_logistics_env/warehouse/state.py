@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.packing import blank
-from swarm_logistics_env.warehouse.structs import (
+
+from .packing import blank
+from .structs import (
     CARRIED,
     DELIVERED,
     NOBODY,

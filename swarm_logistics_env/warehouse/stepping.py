@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse.engine import advance, follow
-from swarm_logistics_env.warehouse.grid import fill
-from swarm_logistics_env.warehouse.item_collisions import mask_below_lifters, unmask_left
-from swarm_logistics_env.warehouse.kinematics import drive, refused_command
-from swarm_logistics_env.warehouse.logistics import (
-    carry_along,
-    close_grippers,
-    deliver,
-    open_grippers,
-)
-from swarm_logistics_env.warehouse.packing import unpacked_at
-from swarm_logistics_env.warehouse.radio import run_timers, send_messages
-from swarm_logistics_env.warehouse.sensing import sense
-from swarm_logistics_env.warehouse.sensor_errors import disturb, fail_rangers
-from swarm_logistics_env.warehouse.structs import (
-    NOBODY,
-    STORED,
-    Commands,
-    Numbers,
-    World,
-)
+
+from .engine import advance, follow
+from .grid import fill
+from .item_collisions import mask_below_lifters, unmask_left
+from .kinematics import drive, refused_command
+from .logistics import carry_along, close_grippers, deliver, open_grippers
+from .packing import unpacked_at
+from .radio import run_timers, send_messages
+from .sensing import sense
+from .sensor_errors import disturb, fail_rangers
+from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
 
 
 @kernel
-def perceive(address: int, rows: NDArray[np.float32]) -> None:
+def perceive(address: int, rows: Sensed) -> None:
     """Run the timers and fill the observation rows (N, D) of the world at `address`."""
     world = unpacked_at(World, address)
     robots, items, progress = world.robots, world.items, world.progress
@@ -44,7 +33,7 @@ def perceive(address: int, rows: NDArray[np.float32]) -> None:
 
 
 @kernel
-def step(address: int, rows: NDArray[np.float32]) -> bool:
+def step(address: int, rows: Sensed) -> bool:
     """Take a control step in the world at `address` and fill the observation rows (N, D).
 
     Returns whether there is something to tell, see `take_step`; a command that is refused is, and
@@ -57,7 +46,7 @@ def step(address: int, rows: NDArray[np.float32]) -> bool:
 
 
 @kernel
-def take_step(address: int, rows: NDArray[np.float32]) -> bool:
+def take_step(address: int, rows: Sensed) -> bool:
     """Take a control step by commands that are finite.
 
     Returns whether there is something to tell: a delivery, faults that begin or end, no room for
@@ -81,9 +70,7 @@ def begin(world: World) -> None:
 
 
 @inlined_kernel
-def finish(
-    address: int, world: World, rows: NDArray[np.float32], n_delivered: int, is_room: bool
-) -> bool:
+def finish(address: int, world: World, rows: Sensed, n_delivered: int, is_room: bool) -> bool:
     """Take the part of a step after items were handled: let the robots sense, note what is to tell.
 
     Returns whether there is something, see `take_step`.

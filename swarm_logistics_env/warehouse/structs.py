@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.observations import N_BEAMS
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.packing import blank
+
+from .packing import blank
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
 LONGEST_RADIO_DELAY = 2.0  # [s] for which broadcasts are kept
@@ -24,6 +25,7 @@ Numbers: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.bool_]
 Keys: TypeAlias = NDArray[np.uint64]
+Sensed: TypeAlias = NDArray[np.float32]  # observations: rows (N, D), one row or its scan
 
 
 class Parameters(NamedTuple):

@@ -22,13 +22,14 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import CommandError, ScenarioError
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.warehouse import stepping
-from swarm_logistics_env.warehouse.atomic import add, exchange, load, replace
-from swarm_logistics_env.warehouse.kinematics import refused_command
-from swarm_logistics_env.warehouse.native import pointer_at
-from swarm_logistics_env.warehouse.packing import unpacked_at
-from swarm_logistics_env.warehouse.structs import NOBODY, Numbers, World
-from swarm_logistics_env.warehouse.warehouse import Warehouse
+
+from . import stepping
+from .atomic import add, exchange, load, replace
+from .kinematics import refused_command
+from .native import pointer_at
+from .packing import unpacked_at
+from .structs import NOBODY, Numbers, Sensed, World
+from .warehouse import Warehouse
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
 
@@ -91,10 +92,7 @@ class WorldThreadPool:
             ).start()
 
     def step(
-        self,
-        commands: NDArray[np.float64],
-        rows: NDArray[np.float32],
-        arrived: Callable[[int, NDArray[np.float32]], None],
+        self, commands: NDArray[np.float64], rows: Sensed, arrived: Callable[[int, Sensed], None]
     ) -> None:
         """Take one control period in every world.
 
@@ -145,9 +143,7 @@ class WorldThreadPool:
                 with contextlib.suppress(ScenarioError):
                     self._take(left, rows, bool(self._jobs[left, IS_EVENTFUL]))
 
-    def _take(
-        self, place: int, rows: NDArray[np.float32], is_eventful: bool
-    ) -> NDArray[np.float32]:
+    def _take(self, place: int, rows: Sensed, is_eventful: bool) -> Sensed:
         world, first = self._worlds[place], self._firsts[place]
         sensed = rows[first : first + world.scenario.n_robots]
         world.take(sensed, is_eventful)
@@ -172,7 +168,7 @@ def job_at(queue: int, place: int) -> int:
 
 
 @kernel
-def submit(queue: int, commands: Numbers, rows: NDArray[np.float32]) -> int:
+def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
     """Give out the jobs of a step, but none if a command is refused.
 
     Args:

@@ -14,21 +14,14 @@ from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
-from swarm_logistics_env.warehouse import layout, stepping
-from swarm_logistics_env.warehouse.faults import GRACE, Fault, Occurrence, apply_faults
-from swarm_logistics_env.warehouse.grid import blank_grid
-from swarm_logistics_env.warehouse.packing import blank, packed
-from swarm_logistics_env.warehouse.physics import Physics
-from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
-from swarm_logistics_env.warehouse.structs import (
-    Claims,
-    Commands,
-    Nearby,
-    Outcome,
-    World,
-    lengths_of,
-    parameters_of,
-)
+
+from . import layout, stepping
+from .faults import GRACE, Fault, Occurrence, apply_faults
+from .grid import blank_grid
+from .packing import blank, packed
+from .physics import Physics
+from .state import NOBODY, STORED, WarehouseState
+from .structs import Claims, Commands, Nearby, Outcome, Sensed, World, lengths_of, parameters_of
 
 COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
@@ -69,11 +62,8 @@ class Warehouse:
         self._words = np.zeros(0, np.int64)
 
     def reset(
-        self,
-        seed: int = 0,
-        faults: Sequence[Fault] = (),
-        scenario: Scenario | None = None,
-    ) -> NDArray[np.float32]:
+        self, seed: int = 0, faults: Sequence[Fault] = (), scenario: Scenario | None = None
+    ) -> Sensed:
         """Begin an episode and return the first observations (N, D).
 
         Args:
@@ -100,7 +90,7 @@ class Warehouse:
         self._save()
         return self.observe()
 
-    def step(self, commands: ArrayLike) -> NDArray[np.float32]:
+    def step(self, commands: ArrayLike) -> Sensed:
         """Move the world by one control period and return what is sensed after it.
 
         Args:
@@ -127,7 +117,7 @@ class Warehouse:
         self.take(rows, self._advance(rows))
         return rows
 
-    def take(self, rows: NDArray[np.float32], is_eventful: bool) -> None:
+    def take(self, rows: Sensed, is_eventful: bool) -> None:
         """Take over a step that compiled code took.
 
         Args:
@@ -173,8 +163,7 @@ class Warehouse:
             ScenarioError: a field is unknown, cannot change during a run, or its value cannot be.
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("change")
+        self._begun("change")
         for name in fields:
             if name not in CHANGES_DURING_RUN and name in Scenario.model_fields:
                 raise ScenarioError(
@@ -192,22 +181,19 @@ class Warehouse:
             FaultError: a fault names robots that are not there.
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("set_faults")
-        seed, n = self._seed, self.state.n_robots
+        seed, n = self._begun("set_faults"), self.state.n_robots
         occurrences = [Occurrence(fault, seed, n) for fault in faults]
         self.faults, self._occurrences = tuple(faults), occurrences
         self._apply_faults()
         self._remember()
 
-    def observe(self) -> NDArray[np.float32]:
+    def observe(self) -> Sensed:
         """Return what every robot senses now: (N, D) float32, absent robots zeros.
 
         Raises:
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("observe")
+        self._begun("observe")
         return self._rows
 
     @property
@@ -222,8 +208,7 @@ class Warehouse:
         Raises:
             SetupError: the world was never reset.
         """
-        if self._seed is None:
-            raise _not_begun("step")
+        self._begun("step")
         return self._address
 
     @property
@@ -236,7 +221,13 @@ class Warehouse:
         """Whether the scenario's duration has passed."""
         return self.state.step >= self.scenario.n_steps
 
-    def _advance(self, rows: NDArray[np.float32]) -> bool:
+    def _begun(self, asked: str) -> int:
+        """Return the seed of the episode; raise SetupError if there is none."""
+        if self._seed is None:
+            raise SetupError(f"{asked} before reset: call reset(seed) first")
+        return self._seed
+
+    def _advance(self, rows: Sensed) -> bool:
         return stepping.step(self._address, rows)
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
@@ -255,8 +246,7 @@ class Warehouse:
         state.requested = int(items.order[0])
 
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
-        if self._seed is None:
-            raise _not_begun("step")
+        self._begun("step")
         try:
             if np.iscomplexobj(commands):
                 raise CommandError("commands should be numbers: real ones, not complex")
@@ -361,7 +351,7 @@ class Warehouse:
             return step - 1
         return step if step * period >= time - GRACE else step + 1
 
-    def _blank_rows(self) -> NDArray[np.float32]:
+    def _blank_rows(self) -> Sensed:
         # New memory every time: what was handed out stays as it was.
         return np.empty(self._row_shape, np.float32)
 
@@ -398,7 +388,3 @@ class Warehouse:
         self._words[:] = words
         self._address: int = self._words.ctypes.data
         self._physics.begin(self._words)
-
-
-def _not_begun(asked: str) -> SetupError:
-    return SetupError(f"{asked} before reset: call reset(seed) first")

@@ -1,5 +1,5 @@
 """Live runs in the browser, with failures and changes by hand, and films of runs."""
 
-from swarm_logistics_env.watch.session import Session
+from .session import Session
 
 __all__ = ["Session"]

@@ -11,7 +11,8 @@ from swarm_logistics_env.episode import Episode, run_episode
 from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.watch.session import Session
+
+from .session import Session
 
 MOST_SEEDS = 20
 LEAST_SEEDS = 3  # of fewer the spread says nothing

@@ -6,16 +6,16 @@ outermost. The seed of an episode decides what a wrapper draws for it. If severa
 thing, the options of the reset win, then the outer wrapper, then the inner one; faults add up.
 """
 
-from swarm_logistics_env.wrappers.condition import Condition
-from swarm_logistics_env.wrappers.discrete_actions import DiscreteActions
-from swarm_logistics_env.wrappers.fault_injection import FaultInjection
-from swarm_logistics_env.wrappers.fixed_agents import FixedAgents
-from swarm_logistics_env.wrappers.indicator_reward import IndicatorReward
-from swarm_logistics_env.wrappers.motion_frame import MotionFrame
-from swarm_logistics_env.wrappers.parameter_change import ParameterChange
-from swarm_logistics_env.wrappers.reference_performances import RunningMeans
-from swarm_logistics_env.wrappers.swarm_size import SwarmSize
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+from .condition import Condition
+from .discrete_actions import DiscreteActions
+from .fault_injection import FaultInjection
+from .fixed_agents import FixedAgents
+from .indicator_reward import IndicatorReward
+from .motion_frame import MotionFrame
+from .parameter_change import ParameterChange
+from .reference_performances import RunningMeans
+from .swarm_size import SwarmSize
+from .wrapper import Wrapper
 
 __all__ = [
     "Condition",

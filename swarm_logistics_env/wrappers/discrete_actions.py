@@ -13,7 +13,8 @@ from swarm_logistics_env.environment.commands import as_array
 from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+from .wrapper import Wrapper
 
 _HALF = math.sqrt(0.5)
 

@@ -15,8 +15,9 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
-from swarm_logistics_env.wrappers.sampling import Distribution
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+from .sampling import Distribution
+from .wrapper import Wrapper
 
 
 class FaultInjection(Wrapper):

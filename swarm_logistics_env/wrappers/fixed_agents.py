@@ -12,7 +12,8 @@ from swarm_logistics_env.environment.commands import as_array
 from swarm_logistics_env.environment.dict_view import ArrayStep, Infos
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+from .wrapper import Wrapper
 
 
 class FixedAgents(Wrapper):

@@ -10,8 +10,9 @@ from typing import Any
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.wrappers.condition import Condition
-from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
+
+from .condition import Condition
+from .reference_performances import GivenPerformances, RunningMeans
 
 # The performances that each indicator is relative to.
 PERFORMANCES = {d.symbol: d.references for d in DEFINITIONS.values() if d.compares != "policy"}

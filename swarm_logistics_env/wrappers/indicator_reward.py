@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,9 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import carrier_of_requested, finite_number
 from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.warehouse.state import NOBODY
-from swarm_logistics_env.wrappers.condition import Condition, changes_of, condition_of
-from swarm_logistics_env.wrappers.indicator_payments import (
+
+from .condition import Condition, changes_of, condition_of
+from .indicator_payments import (
     INDICATORS,
     PERFORMANCES,
     EpisodeIndicator,
@@ -22,8 +23,8 @@ from swarm_logistics_env.wrappers.indicator_payments import (
     derivative_of,
     indicator_of,
 )
-from swarm_logistics_env.wrappers.reference_performances import GivenPerformances, RunningMeans
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+from .reference_performances import GivenPerformances, RunningMeans
+from .wrapper import Wrapper
 
 CREDITS = ("team", "deliverer", "carriers")
 
@@ -142,7 +143,7 @@ class IndicatorReward(Wrapper):
             self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
         self.payments: dict[str, Payment] = {}
         self._indicators: dict[str, EpisodeIndicator] = {}
-        self._is_over = False
+        self._is_over, self._delivered = False, 0
 
     def payments_of(self, condition: Condition) -> dict[str, Payment]:
         """Return what an episode of that condition would pay, by indicator; unweighted.
@@ -191,18 +192,11 @@ class IndicatorReward(Wrapper):
                 info[f"{name}_{role}_episodes"] = self.measured.count(reference) if reference else 0
         return info
 
-    def reset_arrays(
-        self, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> NDArray[np.float32]:
-        """Begin an episode; the one before is counted in `measured` if it came to its end."""
-        if self._is_over:
-            self.measured.add(self.condition, self.unwrapped.warehouse.state.delivered)
-            self._is_over = False
-        return super().reset_arrays(seed, options)
-
     def begun(self, seed: int) -> None:
-        """Store the condition of the episode and what it pays."""
-        self._seed = seed
+        """Count the episode before if it came to its end; store what this one is and pays."""
+        if self._is_over:
+            self.measured.add(self.condition, self._delivered)
+        self._seed, self._is_over = seed, False
         self._paid, self._delivered = Payment(), 0
         self._carriers = set[int]()  # those that carried the requested item since its request
         self._take_condition()

@@ -14,7 +14,8 @@ from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.errors import CommandError
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
 from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+from .wrapper import Wrapper
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -12,8 +12,9 @@ from swarm_logistics_env.errors import ScenarioError, suggest
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse.faults import GRACE
-from swarm_logistics_env.wrappers.sampling import Sampler
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+from .sampling import Sampler
+from .wrapper import Wrapper
 
 
 class ParameterChange(Wrapper):

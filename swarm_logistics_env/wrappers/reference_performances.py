@@ -9,7 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.wrappers.condition import Condition
+
+from .condition import Condition
 
 
 class GivenPerformances:

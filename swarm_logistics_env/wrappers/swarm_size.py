@@ -15,8 +15,9 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.wrappers.sampling import Distribution, Sampler
-from swarm_logistics_env.wrappers.wrapper import Wrapper
+
+from .sampling import Distribution, Sampler
+from .wrapper import Wrapper
 
 
 class SwarmSize(Wrapper):

@@ -195,6 +195,34 @@ def test_approach_can_be_collected_in_circles_and_carried_way_cannot() -> None:
     assert abs(sums["carried_way"]) < 0.1
 
 
+def test_stocking_pays_the_way_of_every_item_so_that_no_circle_earns() -> None:
+    world = Warehouse(
+        Scenario(n_robots=8, n_items=12, warehouse_width=4, warehouse_height=3, restock=True)
+    )
+    world.reset(0)
+    terms, state, edge = started(world, stocking=1.0), world.state, world.scenario.storage_width
+    rng = np.random.default_rng(1)
+    begun, total, n_changes = state.item_position[:, 0].copy(), np.zeros(8), 0
+    for _ in range(600):
+        carriers = state.item_carrier.copy()
+        world.step(rng.uniform(-1.0, 1.0, (8, 4)))
+        total += terms.pay(world)
+        n_changes += int(np.count_nonzero(carriers != state.item_carrier))
+    assert n_changes >= 20
+    assert state.delivered == 0
+    assert np.all(total != 0.0)
+    nearer = np.minimum(state.item_position[:, 0], edge) - np.minimum(begun, edge)
+    assert total.sum() == pytest.approx(nearer.sum())
+
+
+def test_stocking_pays_nothing_for_what_comes_back_after_its_delivery(world: Warehouse) -> None:
+    give(world, 1, 2)
+    terms = started(world, stocking=1.0)
+    deliver(world, 1, next_request=3)
+    world.state.item_position[2] = [0.5, 0.5]
+    assert not np.any(terms.pay(world))
+
+
 def test_contact_pays_its_seconds(world: Warehouse) -> None:
     terms = started(world, contact=-1.0)
     world.state.robot_contact[:] = [True, False, False, True]

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, policies
 from swarm_logistics_env.errors import FaultError, StudyError
+from swarm_logistics_env.fault_analysis import attribution_run
 from swarm_logistics_env.fault_analysis.attribution import attribute, losses
 from swarm_logistics_env.fault_analysis.attribution_run import (
     FINISHED,
     attribute_in,
-    write_tables,
+    write_table,
 )
 from swarm_logistics_env.fault_analysis.fork import Fork
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
@@ -91,7 +92,9 @@ def test_what_cannot_be_attributed_is_refused(fault: Fault, sentence: str) -> No
         attribute(SCENARIO.replace(n_robots=8), policies.load("swarm-dt"), fault, [0])
 
 
-def test_finished_seeds_are_kept_also_beside_a_torn_line(tmp_path: Path) -> None:
+def test_finished_seeds_are_kept_also_beside_a_torn_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fault = Fault("FM4", 1, onset=40.0)
     played = []
     first = attribute_in(
@@ -106,5 +109,8 @@ def test_finished_seeds_are_kept_also_beside_a_torn_line(tmp_path: Path) -> None
     assert again.seeds[:2] == first.seeds
     with pytest.raises(StudyError, match="another fault: should be another directory"):
         attribute_in(tmp_path, SCENARIO, "swarm-dt", Fault("FM1", 1, onset=40.0), [0])
-    for path in write_tables(again, tmp_path):
-        assert path.stat().st_size > 0
+    monkeypatch.setattr(attribution_run, "code_digest", lambda kind: "changed")
+    with pytest.raises(StudyError, match="another code: should be another directory"):
+        attribute_in(tmp_path, SCENARIO, "swarm-dt", fault, [0])
+    path = write_table(again, "swarm-dt", "FM4", tmp_path)
+    assert path.read_text(encoding="utf-8").count("swarm-dt,FM4,3,") > 5

@@ -140,17 +140,17 @@ def test_no_loss_is_not_distinguishable_from_no_fault() -> None:
 
 
 def test_self_repair_without_its_null_says_so(repaired: StudyResults) -> None:
-    (null_pair,) = repaired.plan.null_pairs
-    null = {null_pair.other.condition.run(repaired.plan.code, seed).key for seed in range(SEEDS)}
-    outcomes = {key: o for key, o in repaired.outcomes.items() if key not in null}
+    (null,) = repaired.plan.nulls.values()
+    keys = {null.condition.run(repaired.plan.code, seed).key for seed in range(SEEDS)}
+    outcomes = {key: o for key, o in repaired.outcomes.items() if key not in keys}
     found = judge(repaired.plan, outcomes)
     assert only(found).repair is None
     assert "the runs of the no-fault null are missing" in markdown(document(found))
 
 
 def test_null_that_ran_out_of_items_is_none(repaired: StudyResults) -> None:
-    (null_pair,) = repaired.plan.null_pairs
-    key = null_pair.other.condition.run(repaired.plan.code, 0).key
+    (null,) = repaired.plan.nulls.values()
+    key = null.condition.run(repaired.plan.code, 0).key
     emptied = replace(repaired.outcomes[key], all_delivered=True)
     outcomes = {**repaired.outcomes, key: emptied}
     one = only(judge(repaired.plan, outcomes))

@@ -41,7 +41,7 @@ def test_equal_rows_give_equal_bytes(store: Store, tmp_path: Path, name: str) ->
 
 @pytest.mark.parametrize("name", ["rows.csv", "rows.parquet"])
 def test_failed_runs_are_rows_too(tmp_path: Path, name: str, store: Store) -> None:
-    store._database._connection.execute(
+    store._connection.execute(
         "UPDATE runs SET error = 'Traceback', delivered = NULL, delivery_times = NULL"
     )
     export(store, tmp_path / name)

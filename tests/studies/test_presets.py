@@ -25,11 +25,10 @@ def test_resilience_has_both_references_and_a_null() -> None:
     plan = Study.preset("resilience").plan()
     # No fault, its twin, and m = 1, 2, 3 of the removed and of three modes.
     assert len(plan.conditions) == 2 + 3 * 4
-    (null_pair,) = plan.null_pairs
-    assert null_pair.other.setting == OTHER_BEHAVIOUR
-    assert null_pair.other.condition.scenario == null_pair.original.condition.scenario
+    (null,) = plan.nulls.values()
+    assert null.setting == OTHER_BEHAVIOUR
     for comparison in plan.comparisons:
-        assert comparison.original == null_pair.original
+        assert comparison.original.condition.scenario == null.condition.scenario
         (fault,) = comparison.changed.condition.faults
         assert fault.onset == pytest.approx(comparison.changed.condition.scenario.duration / 3, 0.1)
         assert comparison.changed.condition.scenario.restock

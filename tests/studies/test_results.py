@@ -209,7 +209,7 @@ def test_a_sentence_tells_the_change_and_whether_it_is_within_the_margin() -> No
 
 def test_a_margin_that_was_not_declared_is_exploratory() -> None:
     found = results(as_published)
-    declared = Declaration(range(SEEDS), margin=0.2)
+    declared = Declaration(first_seed=0, seeds=SEEDS, margin=0.2)
     late = judge(found.plan, found.outcomes, declared)
     assert late.late_margin
     assert not late.exploratory
@@ -285,7 +285,7 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
 
 @pytest.mark.parametrize("seeds", [1, 2, 5])
 def test_warnings_are_sentences(seeds: int) -> None:
-    told = warnings(results(as_published, seeds=seeds, same=frozenset({"FM2"})))
+    told = list(warnings(results(as_published, seeds=seeds, same=frozenset({"FM2"}))))
     assert len(told) > 1
     assert all(re.match(r"[A-Z]\w+ \w+ \w+ ", line) for line in told)
     assert all(line.endswith(".") for line in told)

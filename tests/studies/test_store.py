@@ -69,8 +69,8 @@ def test_rows_are_sorted_and_know_no_wall_time() -> None:
 def test_unfinished_transaction_leaves_what_was_there(tmp_path: Path) -> None:
     with Store(tmp_path / FILE_NAME) as store:
         store.add(run(0), outcome(run(0), [1.0]))
-        (pages,) = store._database._connection.execute("PRAGMA page_count").fetchone()
-        store._database._connection.execute(f"PRAGMA max_page_count = {pages}")  # the disk is full
+        (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
+        store._connection.execute(f"PRAGMA max_page_count = {pages}")  # the disk is full
         with pytest.raises(StudyError, match="full"):
             store.add(run(1), outcome(run(1), np.arange(100_000.0).tolist()))
         assert store.succeeded() == {run(0).key}

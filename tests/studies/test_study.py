@@ -240,24 +240,6 @@ def test_seeds_may_start_anywhere_and_others_than_the_declared_ones_are_explorat
     assert not again.findings().exploratory
 
 
-def test_stores_from_before_first_seeds_declared_their_seeds_from_0_on(tmp_path: Path) -> None:
-    fields = {**SMALL, "faults": [], "parameters": [], "ablations": []}
-    Study(out=tmp_path, **{**fields, "seeds": 2}).run()
-    with sqlite3.connect(tmp_path / FILE_NAME) as database:
-        database.execute("DELETE FROM notes WHERE name = 'declared_first_seed'")
-        (text,) = database.execute(
-            "SELECT value FROM notes WHERE name = 'specification'"
-        ).fetchone()
-        older = {name: value for name, value in json.loads(text).items() if name != "first_seed"}
-        database.execute(
-            "UPDATE notes SET value = ? WHERE name = 'specification'", (json.dumps(older),)
-        )
-    database.close()
-    stored = Study.stored(tmp_path)
-    assert stored.plan().seeds == range(2)
-    assert not stored.findings().exploratory
-
-
 def test_another_study_does_not_enter_the_directory_of_this_one(tmp_path: Path) -> None:
     fields = {**SMALL, "faults": [], "parameters": [], "ablations": [], "seeds": 1}
     Study(out=tmp_path, **{**fields, "name": "first"}).run()
@@ -355,8 +337,8 @@ def test_disk_that_fills_up_stops_the_study_in_words_and_keeps_what_is_finished(
 
     def add_until_full(store: Store, run: Run, outcome: Outcome) -> None:
         if len(store) == 5:
-            (pages,) = store._database._connection.execute("PRAGMA page_count").fetchone()
-            store._database._connection.execute(f"PRAGMA max_page_count = {pages}")
+            (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
+            store._connection.execute(f"PRAGMA max_page_count = {pages}")
         add(store, run, outcome)
 
     with monkeypatch.context() as patched:

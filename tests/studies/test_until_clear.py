@@ -118,6 +118,22 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_result(tmp_path: Path) -> N
     assert not stored.findings().exploratory
 
 
+def test_an_interrupted_study_counts_the_runs_of_its_next_look(tmp_path: Path) -> None:
+    def interrupted(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        for count, run in enumerate(runs):
+            if count == 25:
+                raise KeyboardInterrupt
+            yield run, made_up(run)
+
+    study = until_clear(100, tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        study.run(interrupted)
+    assert study.finished() == (25, 20 * 4)
+    assert study.run(Engine()).kept == 25
+    done, total = study.finished()
+    assert done == total < 4 * 100
+
+
 def test_later_outcomes_of_a_shared_condition_change_no_verdict() -> None:
     def capped_later(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
         for run in runs:

@@ -4,8 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from swarm_logistics_env.policies.code_identity import without_prose
-from swarm_logistics_env.tasks.code_version import LEFT_OUT, SOURCES
+from swarm_logistics_env.episode import Play
+from swarm_logistics_env.policies.code_identity import modules_used, without_prose
+from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.tasks.foraging import Foraging
+from swarm_logistics_env.warehouse import Warehouse
 
 
 def test_prose_does_not_count() -> None:
@@ -30,12 +33,18 @@ def test_covers_all_that_an_episode_loads() -> None:
     )
     package = Path(sys.modules["swarm_logistics_env"].__file__ or "").parent
     loaded = {Path(line).relative_to(package).as_posix() for line in done.stdout.split()}
-    covered = {name for name in loaded if name in SOURCES or name.split("/")[0] in SOURCES}
+    used = modules_used(Play, Warehouse).values()
+    covered = {path.relative_to(package).as_posix() for path in used}
     # Policies have identities of their own; these hold messages, validation and names only.
     others = {name for name in loaded - covered if name.split("/")[0] not in ("motion", "policies")}
     assert others <= {
         "errors.py", "records.py", "environment/__init__.py", "environment/registration.py"
     }  # fmt: skip
-    assert "warehouse/physics.py" in covered
-    assert not loaded & set(LEFT_OUT)
-    assert all((package / name).exists() for name in (*SOURCES, *LEFT_OUT))
+    assert {"warehouse/physics.py", "policies/policy.py", "kernels.py"} <= covered <= loaded
+
+
+def test_another_world_has_its_own_version_and_policies_none() -> None:
+    assert code_version(Foraging) != code_version()
+    files = {path.name for path in modules_used(Play, Foraging).values()}
+    assert "foraging.py" in files
+    assert not files & {"swarm_dt.py", "homing.py", "thread_pool.py"}

@@ -301,17 +301,7 @@ def test_a_store_of_wrong_contents_is_read_or_refused(
 
 
 @given(
-    name=st.sampled_from(
-        [
-            "specification",
-            "code",
-            "identities",
-            "declared_seeds",
-            "declared_first_seed",
-            "declared_looks",
-            "imported",
-        ]
-    ),
+    name=st.sampled_from(["specification", "code", "identities", "declared", "imported"]),
     value=st.sampled_from(["", "x", "null", "{}", "[]", "-1", '{"a": 1}', "[[1]]", "1e9", b"\xff"])
     | st.none(),
 )

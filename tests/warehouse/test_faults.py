@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import FaultError
 from swarm_logistics_env.observations import N_BEAMS
-from swarm_logistics_env.warehouse.faults import FailureMode, failed_robots
+from swarm_logistics_env.warehouse.failure_modes import FailureMode
+from swarm_logistics_env.warehouse.faults import failed_robots
 from swarm_logistics_env.warehouse.state import NOBODY
 
 Build = Callable[..., Warehouse]

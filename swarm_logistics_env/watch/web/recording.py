@@ -9,7 +9,8 @@ from importlib import resources
 from typing import Any
 
 from swarm_logistics_env.watch.session import Session
-from swarm_logistics_env.watch.web.messages import changes, encode, fixed_data, frame
+
+from .messages import changes, encode, fixed_data, frame
 
 _SPACING = 0.5  # [s] between frames; the page draws what lies between
 

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError
 from swarm_logistics_env.watch.replicas import Replicas
 from swarm_logistics_env.watch.session import Session
-from swarm_logistics_env.watch.web.messages import changes, encode, fixed_data, frame, obey
-from swarm_logistics_env.watch.web.recording import Recording
+
+from .messages import changes, encode, fixed_data, frame, obey
+from .recording import Recording
 
 if TYPE_CHECKING:
     from aiohttp import web
