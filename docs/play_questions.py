@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 
 import pandas as pd
 import question_tables as tables
@@ -28,9 +27,9 @@ STUDIES = ROOT / "examples" / "questions"
 Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
 
 
-def study(name: str, out: Path = OUT / "questions") -> Study:
-    """Return the study of a question."""
-    return Study.from_file(STUDIES / f"{name}.toml", out=out / name)
+def study(name: str, **fields: int) -> Study:
+    """Return the study of a question, with some fields changed."""
+    return Study.from_file(STUDIES / f"{name}.toml", out=OUT / "questions" / name, **fields)
 
 
 def policies_compared(found: StudyResults) -> Answer:
@@ -125,7 +124,7 @@ def mixed_swarms(found: StudyResults) -> Answer:
 def realistic_robots(found: StudyResults) -> Answer:
     """Answer with all policies, and each beside itself in the ideal world."""
     blocks, draw, height = policies_compared(found)
-    (ideal,) = play([study("central_or_swarm")])
+    (ideal,) = play([study("central_or_swarm", seeds=len(found.plan.seeds))])
     return {**blocks, "lost": tables.beside_another_world(found, ideal)}, draw, height
 
 
@@ -134,6 +133,7 @@ QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
     "larger_swarms": larger_swarms,
     "wear_and_repair": wear_and_repair,
     "mixed_swarms": mixed_swarms,
+    "realistic_robots": realistic_robots,
 }
 
 

@@ -66,7 +66,7 @@ def test_page_quotes_what_was_played(
     page = tmp_path / f"{name}.md"
     shutil.copy(ROOT / "docs" / page.name, page)
     monkeypatch.setattr(script, "DOCS", tmp_path)
-    monkeypatch.setattr(script, "study", lambda asked: in_small(asked, tmp_path / "out"))
+    monkeypatch.setattr(script, "study", lambda asked, **_: in_small(asked, tmp_path / "out"))
     monkeypatch.setattr(importlib.import_module("play_tables"), "PROCESSES", 1)
     script.main([name])
     text = page.read_text(encoding="utf-8")
