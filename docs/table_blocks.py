@@ -174,8 +174,8 @@ def _beside_homing(results: StudyResults) -> list[str]:
         told.append(f"`{name}` {100 * abs(change.value):.1f} %{limits} {word}")
     robots = unbroken["homing"].n_robots
     text = (
-        f"Compared with the script `homing`, at N = {robots} without faults and paired by seed, the "
-        f"networks deliver: {', '.join(told)}."
+        f"Compared with the script `homing`, at N = {robots} without faults and paired by seed, "
+        f"the networks deliver: {', '.join(told)}."
     )
     return ["", text]
 
