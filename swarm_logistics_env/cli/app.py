@@ -123,8 +123,9 @@ def run_command(
     episode = run_episode(scenario, player, seed, scheduled)
     wall = time.perf_counter() - start
     times = episode.delivery_times
+    of = "" if scenario.restock else f" of {scenario.n_items}"
     typer.echo(
-        f"P = {episode.delivered} items delivered of {scenario.n_items} in {episode.ended_at:g} s "
+        f"P = {episode.delivered} items delivered{of} in {episode.ended_at:g} s "
         f"by {scenario.n_robots} robots with {policies.called(policy)}, seed {seed}"
     )
     if len(times):

@@ -272,3 +272,13 @@ def test_policy_of_ones_own_is_found_where_the_command_is_run(
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["--version"]) == 0
     assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__
+
+
+def test_a_run_names_the_number_of_items_only_where_they_do_not_come_back(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    short = ["run", "--set", "duration=5"]
+    assert app.run(short) == 0
+    assert "items delivered of 60 in 5 s" in capsys.readouterr().out
+    assert app.run([*short, "--set", "restock=true"]) == 0
+    assert "items delivered in 5 s" in capsys.readouterr().out
