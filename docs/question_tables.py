@@ -14,6 +14,7 @@ from swarm_logistics_env.report import wording
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.spi.verdict_signs import SIGNS
+from swarm_logistics_env.studies.comparisons import Arm
 from swarm_logistics_env.studies.performance_table import Row, rows_of
 from swarm_logistics_env.studies.policy_comparison import (
     cells_against_baseline,
@@ -208,9 +209,9 @@ def _by_seed(found: StudyResults, test: Row) -> NDArray[np.float64]:
     return counts
 
 
-def deliveries_after(found: StudyResults, arm: object) -> NDArray[np.float64]:
+def deliveries_after(found: StudyResults, arm: Arm) -> NDArray[np.float64]:
     """Return the deliveries of every seed after the repair, shape (n_seeds,)."""
-    times = found.times_of(arm)  # type: ignore[arg-type]
+    times = found.times_of(arm)
     assert times is not None  # the study has been played
     return np.array([np.count_nonzero(run > REPAIRED_AT) for run in times], dtype=np.float64)
 
