@@ -162,6 +162,10 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         for found in result.found
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)
+    capped = (
+        "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
+        "shown. --set restock=true has no cap."
+    )
     show_table(
         f"{policy}: worst faults found",
         ("found by", "fault", "R", "95 % interval", "runs"),
@@ -170,6 +174,7 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
+        *([capped] if result.is_capped else ()),
     )
 
 
