@@ -100,9 +100,7 @@ def blame_command(
     from swarm_logistics_env.scenario import Scenario
     from swarm_logistics_env.studies import Study
 
-    (chosen,) = faults_of([fault])
-    chosen = chosen.replace(role=role)
-    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}{f'-{role}' if role else ''}"
     place = out or (study or Path("results")) / name
     scenario = scenario_of(preset, file, changes)
     asked = Study.stored(study) if study else None
@@ -110,6 +108,11 @@ def blame_command(
         if scenario != Scenario():
             raise SetupError("--study has a scenario: should be without --set and the like")
         scenario = asked.specification.scenario
+        if not isinstance(scenario, Scenario):
+            task = asked.specification.played.name
+            raise SetupError(f"--study {study}: plays {task!r}, should be one of the warehouse")
+    (chosen,) = faults_of([fault], scenario)
+    chosen = chosen.replace(role=role)
     done = 0
     with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
 
@@ -195,7 +198,8 @@ def _show_blame(found: Attribution, policy: str) -> None:
         ]
         show_table(title, ("part", "meaning", "robots", "lost", "95 % interval"), rows, *lines)
 
-    means = [f"Means over {len(found.seeds)} seeds."]
+    n = len(found.seeds)
+    means = [f"Means over {n} seeds." if n > 1 else "Of one seed, which shows no interval."]
     if capped := sum(each.is_capped for each in found.seeds):
         means.append(
             f"Capped: in {capped} of them every item was delivered without the fault, so it costs "

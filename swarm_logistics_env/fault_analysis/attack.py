@@ -121,15 +121,18 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
 
     Raises:
         SetupError: as `Attack.faults`; or the policy delivers nothing without faults.
+        PolicyError: there is no such policy.
         StudyError: the directory cannot be used, or a run failed.
     """
     faults = asked.faults()
+    label, identity = policy_label(asked.policy), policy_identity(asked.policy)
+    policy = StudiedPolicy(label, identity, asked.policy)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(f"cannot write to {out}: {error.strerror}") from error
     with Store(out / STORE) as store:
-        players = _Players(asked, engine, store)
+        players = _Players(policy, asked.scenario, engine, store)
         play = players.search_play(faults)
         worst, trials = search(faults, play, asked.budget, asked.seed)
         at_random, _ = random_search(faults, play, asked.budget, asked.seed)
@@ -170,10 +173,11 @@ def _robustness(asked: Attack, sound: Played, failed: Played) -> Estimate:
 class _Players:
     """Plays faults over seeds; every run is kept in a store and played once."""
 
-    def __init__(self, asked: Attack, engine: Engine, store: Store) -> None:
-        label, identity = policy_label(asked.policy), policy_identity(asked.policy)
-        self._policy = StudiedPolicy(label, identity, asked.policy)
-        self._scenario, self._engine, self._store = asked.scenario, engine, store
+    def __init__(
+        self, policy: StudiedPolicy, scenario: Scenario, engine: Engine, store: Store
+    ) -> None:
+        self._policy, self._scenario = policy, scenario
+        self._engine, self._store = engine, store
 
     def played(self, faults: Sequence[Fault | None], seeds: Sequence[int]) -> list[Played]:
         """Return the runs of each fault (None: without one) over the seeds."""

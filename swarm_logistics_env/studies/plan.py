@@ -11,7 +11,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 
-from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, load_reference
 from .runs import Condition, Run, StudiedPolicy
 from .specification import Ablation, Factor, Faults, Parameter, Sizes, Specification
 
@@ -99,9 +99,11 @@ def make_plan(
         identities: of its policies when it was played; None: they are loaded and asked.
 
     Raises:
-        StudyError: the specification varies nothing, or a step of it cannot be.
+        StudyError: the specification varies nothing, a step of it cannot be, or there is no such
+            reference.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
+    load_reference(specification.reference)  # a name that is wrong is told before anything is run
     known: dict[str, str] = {}
 
     def policy_of(part: str, source: object) -> StudiedPolicy:

@@ -34,9 +34,11 @@ MOST_SEEDS = 100_000
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 
 
-def _each(record: type[Record]) -> Callable[[object], object]:
+def _each(record: type[Record]) -> Callable[[object, ValidationInfo], object]:
     # Through the record's own constructor, whose errors suggest the field that was meant.
-    def build(values: object) -> object:
+    def build(values: object, info: ValidationInfo) -> object:
+        if isinstance(values, dict):
+            raise ValueError(f"should be a list of tables: [[{info.field_name}]] in a study file")
         if not isinstance(values, list | tuple):
             return values
         return tuple(record(**value) if isinstance(value, dict) else value for value in values)
