@@ -100,9 +100,7 @@ def blame_command(
     from swarm_logistics_env.scenario import Scenario
     from swarm_logistics_env.studies import Study
 
-    (chosen,) = faults_of([fault])
-    chosen = chosen.replace(role=role)
-    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}{f'-{role}' if role else ''}"
     place = out or (study or Path("results")) / name
     scenario = scenario_of(preset, file, changes)
     asked = Study.stored(study) if study else None
@@ -110,6 +108,11 @@ def blame_command(
         if scenario != Scenario():
             raise SetupError("--study has a scenario: should be without --set and the like")
         scenario = asked.specification.scenario
+        if not isinstance(scenario, Scenario):
+            task = asked.specification.played.name
+            raise SetupError(f"--study {study}: plays {task!r}, should be one of the warehouse")
+    (chosen,) = faults_of([fault], scenario)
+    chosen = chosen.replace(role=role)
     done = 0
     with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
 
@@ -162,6 +165,10 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         for found in result.found
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)
+    capped = (
+        "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
+        "shown. --set restock=true has no cap."
+    )
     show_table(
         f"{policy}: worst faults found",
         ("found by", "fault", "R", "95 % interval", "runs"),
@@ -170,6 +177,7 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
+        *([capped] if result.is_capped else ()),
     )
 
 
@@ -190,7 +198,8 @@ def _show_blame(found: Attribution, policy: str) -> None:
         ]
         show_table(title, ("part", "meaning", "robots", "lost", "95 % interval"), rows, *lines)
 
-    means = [f"Means over {len(found.seeds)} seeds."]
+    n = len(found.seeds)
+    means = [f"Means over {n} seeds." if n > 1 else "Of one seed, which shows no interval."]
     if capped := sum(each.is_capped for each in found.seeds):
         means.append(
             f"Capped: in {capped} of them every item was delivered without the fault, so it costs "

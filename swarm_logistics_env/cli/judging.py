@@ -269,7 +269,8 @@ def compare_command(
         failed |= fails
         result = "fails" if fails else "passes"
         title = f"Gate {gate.text!r} {result}" if gates else "Change of P"
-        _show_answers(title, said, left_out if gate.subject == "change" else ())
+        notes = left_out if gate.subject == "change" else ()
+        _show_answers(title, said, notes, after.confidence)
     raise typer.Exit(1 if failed else 0)
 
 
@@ -288,12 +289,16 @@ def _pilot(
         if policies:
             raise StudyError("--policy is for a pilot: a study that was run has its own policies")
         return Study.stored(asked, trust_code=trust_code).findings()
-    pilot = study_of(asked, None, seeds, policies, trust_code, looks=())
+    pilot = study_of(asked, None, seeds, policies, trust_code, looks=(), until_clear=False)
     pilot.run(processes=processes or os.cpu_count() or 1)
     return pilot.findings()
 
 
-def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
+def _show_answers(
+    title: str, said: tuple[Answer, ...], left_out: tuple[str, ...], confidence: float
+) -> None:
+    from swarm_logistics_env.report.wording import percent
+
     from .terminal_tables import show_table
 
     rows = []
@@ -307,4 +312,5 @@ def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...
             if estimate.low is not None and estimate.high is not None:
                 value += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
         rows.append((answer.name, value, says))
-    show_table(title, ("", "value [95 %]", "verdict under Holm"), rows, *left_out)
+    columns = ("", f"value [{percent(confidence)}]", "verdict under Holm")
+    show_table(title, columns, rows, *left_out)

@@ -83,11 +83,11 @@ def _fields_of(file: Path) -> dict[str, Any]:
     return fields
 
 
-def faults_of(texts: list[str] | None) -> list[Fault]:
+def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
     """Return the faults that `--fault MODE[:ROBOTS][@ONSET]` describes.
 
     Raises:
-        FaultError: a text does not read so, or there is no such fault.
+        FaultError: a text does not read so, there is no such fault, or the episode ends before.
     """
     from swarm_logistics_env.warehouse.faults import Fault
 
@@ -96,7 +96,10 @@ def faults_of(texts: list[str] | None) -> list[Fault]:
         match = _FAULT.fullmatch(text)
         if match is None:
             raise FaultError(f"--fault {text}: should be MODE[:ROBOTS][@ONSET], e.g. FM1:2@200")
-        faults.append(
-            Fault(match["mode"], int(match["robots"] or 1), onset=float(match["onset"] or 0))
-        )
+        onset = float(match["onset"] or 0)
+        if onset >= scenario.duration:
+            raise FaultError(
+                f"--fault {text}: should begin before the episode ends at {scenario.duration:g} s"
+            )
+        faults.append(Fault(match["mode"], int(match["robots"] or 1), onset=onset))
     return faults

@@ -126,13 +126,14 @@ def _finished(path: Path, about: Mapping[str, Any]) -> dict[int, Losses]:
     if lines and not lines[-1].endswith("\n"):  # it was being written when the program was killed
         path.write_text("".join(lines[:-1]), encoding="utf-8")
         del lines[-1]
-    if not lines:
+    if len(lines) < 2:  # no seed is finished, whatever was asked then
+        path.unlink(missing_ok=True)
         return {}
     there = json.loads(lines[0])
     if different := [name for name in about if there.get(name) != about[name]]:
         raise StudyError(
             f"{path.parent} holds an attribution with another {' and '.join(different)}: should be "
-            "another directory"
+            "another directory, as --out names it"
         )
     found = [Losses(**json.loads(line)) for line in lines[1:]]
     return {

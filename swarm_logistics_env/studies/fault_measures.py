@@ -251,6 +251,8 @@ def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
         if any(outcome.anchoring_seconds is None for outcome in outcomes):
             continue  # the task does not tell
         (fault,) = comparison.changed.condition.faults
+        if getattr(fault, "intermittent", None) is not None:
+            continue  # how long each robot had failed is not recorded
         end = fault.onset + (fault.duration or math.inf)
         seconds = np.array([outcome.anchoring_seconds for outcome in outcomes], dtype=np.float64)
         lasted = np.array([max(0.0, min(o.ended_at, end) - fault.onset) for o in outcomes])

@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 
-from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, load_reference
 from .runs import Condition, Run, StudiedPolicy
 from .specification import Ablation, Factor, Faults, Parameter, Sizes, Specification
 
@@ -99,9 +100,11 @@ def make_plan(
         identities: of its policies when it was played; None: they are loaded and asked.
 
     Raises:
-        StudyError: the specification varies nothing, or a step of it cannot be.
+        StudyError: the specification varies nothing, a step of it cannot be, or there is no such
+            reference.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
+    load_reference(specification.reference)  # a name that is wrong is told before anything is run
     known: dict[str, str] = {}
 
     def policy_of(part: str, source: object) -> StudiedPolicy:
@@ -154,9 +157,9 @@ def _asked(
                 yield from _ablation(specification, ablation, policy, part)
 
 
-def _title(factor: Factor, general: str) -> str:
-    changes = ", ".join(f"{name} = {value}" for name, value in factor.scenario.items())
-    return factor.title or (f"{general} ({changes})" if changes else general)
+def _title(factor: Factor, general: str, manner: str = "") -> str:
+    changes = [*filter(None, [manner]), *(f"{name} = {x}" for name, x in factor.scenario.items())]
+    return factor.title or (f"{general} ({', '.join(changes)})" if changes else general)
 
 
 def _scalability(asked: Specification, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
@@ -190,7 +193,7 @@ def _robustness(
 
     An indicator that needs robots removed is left out where the task cannot remove any.
     """
-    task, table = asked.played, _title(faults, "Fault tolerance and robustness")
+    task, table = asked.played, _title(faults, "Fault tolerance and robustness", str(faults))
     scenario = task.vary(asked.scenario, faults.scenario)
     for m in faults.robots:
         if m >= scenario.n_robots:
@@ -206,8 +209,10 @@ def _robustness(
             )
     original = Arm(NO_FAULT, Condition(policy, scenario, task=task))
 
-    def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
+    def arm(mode: str, m: int, onset: float, duration: float | None, manner: dict[str, Any]) -> Arm:
         fault = task.fault(mode, m, onset, duration)
+        if manner:
+            fault = fault.replace(**manner)
         condition = Condition(policy, scenario, (fault,), task=task)
         return Arm(Setting("fault", mode, m, onset), condition)
 
@@ -215,9 +220,9 @@ def _robustness(
     if task.removed is None:
         wanted = [one for one in wanted if not one.needs_removed]
     for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
-        failed = arm(mode, m, onset, faults.duration)
+        failed = arm(mode, m, onset, faults.duration, faults.manner)
         for definition in wanted:
-            third = arm(str(task.removed), m, onset, None) if definition.needs_removed else None
+            third = arm(str(task.removed), m, onset, None, {}) if definition.needs_removed else None
             yield Comparison(table, definition.symbol, original, failed, third)
 
 

@@ -196,7 +196,8 @@ class Occurrence:
         switches, fault = self._switches[robot], self.fault
         while switches[-1] <= time + GRACE:
             about = (robot, len(switches) // _SWITCHES)
-            rng = generator(self._seed, f"intermittent {fault.mode}", *about)
+            # A part of a mode, as "dead[move]", comes and goes with the whole of it.
+            rng = generator(self._seed, f"intermittent {fault.mode.partition('[')[0]}", *about)
             means = np.resize(fault.intermittent or (), _SWITCHES)
             switches += (switches[-1] + np.cumsum(rng.exponential(means))).tolist()
         return bisect_right(switches, time + GRACE)

@@ -155,7 +155,7 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     printed = capsys.readouterr().out
     # It warns before it plays, so that one can still stop it.
     warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
-    assert warning < printed.index("questions, 4 paired seeds")
+    assert warning < printed.index("question, 4 paired seeds")
     assert "4 seeds (0 to 3) every verdict is exploratory." in printed
     assert "The verdicts are exploratory: seeds were added" in (out / "report.md").read_text()
     assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
@@ -251,6 +251,7 @@ def test_power_of_a_stored_study_and_of_a_pilot(
         "[[sizes]]\nvalues = [2, 3]\n"
     )
     arguments = ["--pilot-seeds", "3", "--processes", "1", "--effect", "1"]
+    path.write_text("until_clear = true\n" + path.read_text())
     assert app.run(["study", "power", str(path), *arguments]) == 0
     assert "Seeds needed, from 3 seeds" in capsys.readouterr().out
     capsys.readouterr()

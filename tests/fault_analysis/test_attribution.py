@@ -67,6 +67,21 @@ def test_a_planted_capability_bears_the_whole_loss() -> None:
         assert seed.capabilities == {"deliver": seed.total, "hear": 0.0}
 
 
+def test_a_role_is_struck_however_short_the_fault_is() -> None:
+    whole = losses(SCENARIO, policies.load("swarm-dt"), Fault("FM4", 2, 20.0, role="carrier"), 0)
+    short = Fault("FM4", 2, onset=20.0, duration=5.0, role="carrier")
+    assert (
+        losses(SCENARIO, policies.load("swarm-dt"), short, 0).robots.keys() == whole.robots.keys()
+    )
+
+
+def test_a_directory_in_which_no_seed_is_finished_takes_another_question(tmp_path: Path) -> None:
+    fault = Fault("FM4", 1, onset=20.0)
+    with pytest.raises(FaultError, match="ended at 10 s"):
+        attribute_in(tmp_path, SCENARIO.replace(duration=10.0), "swarm-dt", fault, [0])
+    assert len(attribute_in(tmp_path, SCENARIO, "swarm-dt", fault, [0]).seeds) == 1
+
+
 def test_the_shares_sum_to_the_loss() -> None:
     fault = Fault("dead[move,deliver]", 2, onset=20.0, role="carrier")
     found = attribute(SCENARIO, policies.load("swarm-dt"), fault, range(2))

@@ -103,6 +103,9 @@ def test_policy_parameters_make_another_condition() -> None:
         ({"parameters": [{"name": "n_items", "values": [60.5, 70]}]}, "60.5"),
         ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
         ({"policies": [3]}, "an object with act"),
+        ({"faults": {"modes": ["FM1"]}}, "list of tables: [[faults]] in a study file"),
+        ({"parameters": {"name": "x"}}, "list of tables: [[parameters]] in a study file"),
+        ({"faults": [{"modes": ["FM1"]}], "reference": "papr"}, "did you mean 'paper'?"),
         ({}, "compares nothing"),
     ],
 )

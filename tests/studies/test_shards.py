@@ -1,4 +1,4 @@
-"""None"""
+"""Shards and the studies merged of them: each run once, and nothing but parts of one study."""
 
 from __future__ import annotations
 
