@@ -18,8 +18,7 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
 
 from .answer import digest
-from .attributions import with_attributions
-from .document import Document, document
+from .document import Document, document, with_attributions
 from .drawing import INK, PAPER, images
 from .page_data import page_data
 from .result_tables import Section
