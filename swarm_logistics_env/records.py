@@ -84,24 +84,28 @@ class Record(BaseModel):
         return f"{field} = {_short(problem['input'])}: {message}"
 
 
-def read_toml(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> dict[str, Any]:
-    """Return the table in a TOML file.
+def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> dict[str, Any]:
+    """Return the table in a TOML file, or in a file whose name ends in .json.
 
     Args:
         what: names it in errors, e.g. "study file".
 
     Raises:
-        The `error_type`: the file cannot be read, or is not TOML.
+        The `error_type`: the file cannot be read, is neither, or holds no table.
     """
+    kind, parse = ("JSON", json.loads) if path.suffix == ".json" else ("TOML", tomllib.loads)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        found = parse(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise error_type(f"cannot read the {what} {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except ValueError as error:  # of Unicode, JSON and TOML
         reason = str(error).splitlines()[0]
-        raise error_type(f"the {what} {path} is not TOML: {reason}") from error
+        raise error_type(f"the {what} {path} is not {kind}: {reason}") from error
     except RecursionError:
         raise error_type(f"the {what} {path} is nested too deep") from None
+    if not isinstance(found, dict):
+        raise error_type(f"the {what} {path} should hold a table of fields")
+    return found
 
 
 def canonical_json(value: object) -> str:

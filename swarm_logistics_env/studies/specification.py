@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.records import Record, read_toml
+from swarm_logistics_env.records import Record, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
@@ -275,7 +275,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
             it is unknown or cannot be.
     """
-    fields = read_toml(path, "study file", StudyError)
+    fields = read_table(path, "study file", StudyError)
     refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
     try:
         specification = Specification(**{"name": path.stem, **fields})

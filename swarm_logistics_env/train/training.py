@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model
 from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
-from swarm_logistics_env.records import read_toml
+from swarm_logistics_env.records import read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
@@ -161,7 +161,7 @@ def load_training(asked: str, **fields: object) -> Training:
     path = Path(asked) if asked.endswith(".toml") else PRESETS / f"{asked}.toml"
     if path.parent == PRESETS and path.stem not in preset_names():
         raise TrainingError(f"no training preset {asked!r}{suggest(asked, preset_names())}")
-    given = read_toml(path, "training", TrainingError)
+    given = read_table(path, "training", TrainingError)
     try:
         return Training(**{"name": path.stem, **given, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
