@@ -19,7 +19,8 @@ from swarm_logistics_env.studies.store import FILE_NAME, Store
 def papers_tables() -> str:
     """The paper's Tables I to III, one run a row; every parameter of III has its own P_o."""
     parameters = {"warehouse_width": 10.0, "delivery_width": 2.0, "n_items": 60.0}
-    rows = [["table", "robots", "fault", "faulty", *parameters, "delivered"]]
+    names = "warehouse_width", "delivery_width", "stock"  # "items" would be those delivered
+    rows = [["table", "robots", "fault", "faulty", *names, "delivered"]]
 
     def add(table: str, robots: int, fault: str, m: int, p: float, **changed: float) -> None:
         values = [table, robots, fault, m, *{**parameters, **changed}.values(), p]
