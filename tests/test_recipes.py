@@ -277,8 +277,8 @@ def test_a_scenario_parameter(copy: Copy) -> None:
         "        if self.world.state.time < self.world.scenario.rest:\n            commands *= 0.0",
     )
     copy.run("-c", RESTS)
-    assert "('rest', '2 (default 0)', 'at first nobody moves [s]; off')" in copy.run(
-        "-c", "from swarm_logistics_env import Scenario; print(Scenario(rest=2.0).conditions())"
+    assert "| rest | 2 (default 0) | at first nobody moves [s]; off |" in copy.run(
+        "-c", "from swarm_logistics_env import Scenario; print(Scenario(rest=2.0).sheet())"
     )
     assert "| `rest` | `0.0` | at first nobody moves [s]; off |" in copy.page()
     assert copy.changed == files_of("A scenario parameter", READER="episode")
