@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -82,6 +83,20 @@ class Record(BaseModel):
         if problem["type"] == "missing":
             return f"{field} is missing"
         return f"{field} = {_short(problem['input'])}: {message}"
+
+
+def one_of(record: type[Record]) -> Callable[[object], object]:
+    """Return what makes a record of a table, and leaves anything else as it is."""
+    # The record's own constructor raises errors that suggest the field that was meant.
+    return lambda value: record(**value) if isinstance(value, dict) else value
+
+
+def each_of(record: type[Record]) -> Callable[[object], object]:
+    """Return what makes a tuple of records of a list of tables."""
+    one = one_of(record)
+    return lambda values: (
+        tuple(one(value) for value in values) if isinstance(values, list | tuple) else values
+    )
 
 
 def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> dict[str, Any]:
