@@ -276,7 +276,10 @@ def test_after_the_last_delivery_every_term_still_pays(world: Warehouse) -> None
     ("weights", "complaint"),
     [
         ({"delivry": 1.0}, "no reward term 'delivry'; did you mean 'delivery'?"),
-        ({"speed_of_light": 1.0}, "no reward term 'speed_of_light'; known: approach, blocked_request"),
+        (
+            {"speed_of_light": 1.0},
+            "no reward term 'speed_of_light'; known: approach, blocked_request",
+        ),
         ({"delivery": float("nan")}, r"rewards\['delivery'\] = nan: should be a finite number"),
         ({"delivery": None}, r"rewards\['delivery'\] = None: should be a finite number"),
         ({"delivery": "1"}, r"rewards\['delivery'\] = '1': should be a finite number"),
