@@ -232,7 +232,7 @@ def test_contact_pays_its_seconds(world: Warehouse) -> None:
 def test_a_robot_that_cannot_deliver_is_charged_while_it_holds_the_requested_item() -> None:
     world = Warehouse(Scenario(n_robots=4, n_items=6))
     world.reset(0, [Fault("FM4", 1)])
-    (faulty,) = np.flatnonzero(~world.state.delivers)
+    (faulty,) = np.flatnonzero(~world.state.delivers).tolist()
     healthy = (faulty + 1) % 4
     world.state.requested = 2
     terms = started(world, blocked_request=-1.0)
