@@ -52,5 +52,7 @@ def test_looks_must_rise(looks: tuple[int, ...]) -> None:
 
 
 def test_alpha_out_of_range() -> None:
+    with pytest.raises(IndicatorError, match="spending = 'pocock': should be one of obrien"):
+        look_alphas([10, 20], spending="pocock")  # type: ignore[arg-type]
     with pytest.raises(IndicatorError, match="alpha = 5"):
         spi.look_alphas((10,), alpha=5)
