@@ -140,22 +140,17 @@ def judge_command(
 
 def _stated(texts: list[str]) -> dict[str, str]:
     """Return the conditions that --setup states."""
-    import tomllib
+    from swarm_logistics_env.records import read_table
 
     stated: dict[str, str] = {}
     for text in texts:
         if "=" in text:
             stated.update([_pair("--setup", text)])
-            continue
-        try:
-            found = tomllib.loads(Path(text).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise StudyError(
-                f"--setup {text}: should be NAME=VALUE, or a file: {error.strerror}"
-            ) from None
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise StudyError(f"--setup {text}: is not TOML: {error}") from None
-        stated.update((name, str(value)) for name, value in found.items())
+        elif Path(text).is_file():
+            found = read_table(Path(text), "file of --setup", StudyError)
+            stated.update((name, str(value)) for name, value in found.items())
+        else:
+            raise StudyError(f"--setup {text}: should be NAME=VALUE, or a TOML file of such")
     return stated
 
 
@@ -297,7 +292,7 @@ def _pilot(
 def _show_answers(
     title: str, said: tuple[Answer, ...], left_out: tuple[str, ...], confidence: float
 ) -> None:
-    from swarm_logistics_env.report.wording import percent
+    from swarm_logistics_env.report.wording import bracketed, percent
 
     from .terminal_tables import show_table
 
@@ -308,9 +303,8 @@ def _show_answers(
         if answer.exact is not None:
             value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
         if estimate is not None:
-            value, says = f"{estimate.value:.3f}", f"above {estimate.threshold:g}: {answer.verdict}"
-            if estimate.low is not None and estimate.high is not None:
-                value += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
+            value = bracketed(estimate, 3)
+            says = f"above {estimate.threshold:g}: {answer.verdict}"
         rows.append((answer.name, value, says))
     columns = ("", f"value [{percent(confidence)}]", "verdict under Holm")
     show_table(title, columns, rows, *left_out)

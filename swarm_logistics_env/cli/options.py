@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swarm_logistics_env.errors import FaultError, ScenarioError
+from swarm_logistics_env.records import read_table
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
     Raises:
         ScenarioError: no such preset, file or field, or a value that cannot be.
     """
-    fields = {} if file is None else _fields_of(file)
+    fields = {} if file is None else read_table(file, "file of --scenario", ScenarioError)
     preset = str(fields.pop("preset", preset))
     for change in changes or []:
         name, equals, value = change.partition("=")
@@ -66,21 +66,6 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
         except (json.JSONDecodeError, RecursionError):
             fields[name] = value
     return Scenario.preset(preset).replace(**fields)
-
-
-def _fields_of(file: Path) -> dict[str, Any]:
-    """Return the fields in a file of `--scenario`; "preset" may be one of them."""
-    try:
-        text = file.read_text(encoding="utf-8")
-        fields = json.loads(text) if file.suffix == ".json" else tomllib.loads(text)
-    except OSError as error:
-        raise ScenarioError(f"--scenario {file}: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # of Unicode, JSON and TOML
-        kind = "JSON" if file.suffix == ".json" else "TOML"
-        raise ScenarioError(f"--scenario {file}: is not {kind}: {error}") from None
-    if not isinstance(fields, dict):
-        raise ScenarioError(f"--scenario {file}: should be a table of fields")
-    return fields
 
 
 def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:

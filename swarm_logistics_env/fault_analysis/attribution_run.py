@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import closing
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from swarm_logistics_env.errors import StudyError
@@ -21,15 +21,12 @@ from swarm_logistics_env.fault_analysis.attribution import (
 from swarm_logistics_env.policies.code_identity import code_digest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.engines import workers
+from swarm_logistics_env.studies.store import write_csv
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_of
 from swarm_logistics_env.warehouse import Fault
 
 FINISHED, TABLE = "losses.jsonl", "attribution.csv"
-HEADINGS = (
-    *("policy", "fault", "seeds", "capped", "group"),
-    *("part", "meaning", "robots", "lost", "low", "high"),
-)
 
 
 def attribute_in(
@@ -84,20 +81,16 @@ def write_table(found: Attribution, policy: str, fault: str, out: Path) -> Path:
     Args:
         policy, fault: in words.
     """
-    capped = sum(each.is_capped for each in found.seeds)
-    groups = {
-        "in all": (found.total, *found.parts),
-        "by role at the onset": found.roles,
-        "by lost capability": found.capabilities,
+    seeds = found.seeds
+    about: dict[str, Any] = {
+        "policy": policy,
+        "fault": fault,
+        "seeds": len(seeds),
+        "capped": sum(each.is_capped for each in seeds),
+        "blocked_seconds": fmean(each.blocked_seconds for each in seeds),
+        "anchoring_seconds": fmean(each.anchoring_seconds for each in seeds),
     }
-    with (out / TABLE).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(HEADINGS)
-        for group, rows in groups.items():
-            for row in rows:
-                part = row.name.replace("_", " ")
-                about = policy, fault, len(found.seeds), capped, group
-                writer.writerow((*about, part, row.meaning, row.robots, *row.lost))
+    write_csv(out / TABLE, found.table().assign(**about))
     return out / TABLE
 
 

@@ -273,6 +273,23 @@ def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None
         axes.set(xlim=(0.0, None), ylim=(0.0, 1.05))
 
 
+def losses(canvas: Canvas, table: pd.DataFrame) -> None:
+    """Draw the deliveries that a fault costs, a panel for each group of parts, on one scale."""
+    groups = list(groups_of(table, "group"))
+    heights = [len(here) for _, here in groups]
+    panels = canvas.subplots(len(groups), 1, sharex=True, squeeze=False, height_ratios=heights)
+    for axes, (group, here) in zip(panels[:, 0], groups):
+        places = range(len(here))
+        axes.barh(places, here["lost"], color=COLOURS[0], height=0.6)
+        axes.hlines(places, here["low"], here["high"], color=INK, linewidth=1.5)
+        axes.set_yticks(places, here["part"])
+        axes.invert_yaxis()
+        axes.axvline(0.0, color=INK, linewidth=0.8)
+        axes.grid(visible=False)
+        axes.set_title(group)
+    panels[-1, 0].set_xlabel("deliveries lost after the onset, per episode")
+
+
 def _over_time(
     canvas: Canvas, panels: Mapping[str, Any], x_label: str, y_label: str
 ) -> Iterator[tuple[Axes, Any]]:

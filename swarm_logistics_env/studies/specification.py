@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -20,7 +19,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.records import Record, read_toml
+from swarm_logistics_env.records import Record, each_of, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
@@ -32,18 +31,6 @@ ScenarioFields = dict[str, Any]
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
-
-
-def _each(record: type[Record]) -> Callable[[object, ValidationInfo], object]:
-    # Through the record's own constructor, whose errors suggest the field that was meant.
-    def build(values: object, info: ValidationInfo) -> object:
-        if isinstance(values, dict):
-            raise ValueError(f"should be a list of tables: [[{info.field_name}]] in a study file")
-        if not isinstance(values, list | tuple):
-            return values
-        return tuple(record(**value) if isinstance(value, dict) else value for value in values)
-
-    return build
 
 
 class _Part(Record):
@@ -194,10 +181,10 @@ class Specification(_Part):
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
     scenario: Any = Field(default_factory=dict)
-    sizes: Annotated[tuple[Sizes, ...], BeforeValidator(_each(Sizes))] = ()
-    faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
-    parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
-    ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
+    sizes: Annotated[tuple[Sizes, ...], BeforeValidator(each_of(Sizes))] = ()
+    faults: Annotated[tuple[Faults, ...], BeforeValidator(each_of(Faults))] = ()
+    parameters: Annotated[tuple[Parameter, ...], BeforeValidator(each_of(Parameter))] = ()
+    ablations: Annotated[tuple[Ablation, ...], BeforeValidator(each_of(Ablation))] = ()
     indicators: Annotated[tuple[str, ...], Field(min_length=1), _ONCE] = tuple(DEFINITIONS)
     looks: tuple[PositiveInt, ...] = ()
     until_clear: bool = False
@@ -300,7 +287,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
             it is unknown or cannot be.
     """
-    fields = read_toml(path, "study file", StudyError)
+    fields = read_table(path, "study file", StudyError)
     refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
     try:
         specification = Specification(**{"name": path.stem, **fields})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -19,7 +18,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import Record, each_of
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import Fault
@@ -35,20 +34,6 @@ def _known(modes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 Modes = Annotated[tuple[str, ...], AfterValidator(_known)]
-
-
-def one_of(record: type[Record]) -> Callable[[object], object]:
-    """Return what makes a record of a table, and leaves anything else as it is."""
-    # The record's own constructor raises errors that suggest the field that was meant.
-    return lambda value: record(**value) if isinstance(value, dict) else value
-
-
-def each_of(record: type[Record]) -> Callable[[object], object]:
-    """Return what makes a tuple of records of a list of tables."""
-    one = one_of(record)
-    return lambda values: (
-        tuple(one(value) for value in values) if isinstance(values, list | tuple) else values
-    )
 
 
 class Part(Record):

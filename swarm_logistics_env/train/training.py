@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model
 from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
-from swarm_logistics_env.records import read_toml
+from swarm_logistics_env.records import each_of, one_of, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
@@ -20,19 +20,12 @@ from swarm_logistics_env.train.settings import (
     PPOSettings,
     Scores,
     WorldKind,
-    each_of,
-    one_of,
 )
 
 PRESETS = Path(__file__).parent / "presets"
 
 # stable-baselines3 shuffles with numpy's global generator, which takes seeds of 32 bits.
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
-
-
-def as_scenario(value: object) -> object:
-    """Return the scenario of a table of fields; anything else as it is."""
-    return Scenario(**value) if isinstance(value, dict) else value
 
 
 class Training(Part):
@@ -61,7 +54,7 @@ class Training(Part):
 
     name: str = "policy"
     about: str = ""
-    scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
+    scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
     start: str | None = None
     worlds: Annotated[
         tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
@@ -161,7 +154,7 @@ def load_training(asked: str, **fields: object) -> Training:
     path = Path(asked) if asked.endswith(".toml") else PRESETS / f"{asked}.toml"
     if path.parent == PRESETS and path.stem not in preset_names():
         raise TrainingError(f"no training preset {asked!r}{suggest(asked, preset_names())}")
-    given = read_toml(path, "training", TrainingError)
+    given = read_table(path, "training", TrainingError)
     try:
         return Training(**{"name": path.stem, **given, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses

@@ -191,14 +191,14 @@ def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
     assert stored(out) == 34
 
 
-TABLE = "kind,name,value,n_robots,seed,delivered\n"
+TABLE = "fault,faulty,robots,seed,delivered\n"
 
 
 def imported(path: Path, faulty: tuple[int, ...], first: int = 0) -> str:
     """A study of four seeds of P_o, P_S and the P_F that are given."""
     seeds = range(first, first + 4)
-    rows = [f"fault,none,0,25,{s},{40 + s}\nfault,removed,1,25,{s},{38 + s}\n" for s in seeds]
-    rows += [f"fault,FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
+    rows = [f"none,0,25,{s},{40 + s}\nremoved,1,25,{s},{38 + s}\n" for s in seeds]
+    rows += [f"FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
     path.with_suffix(".csv").write_text(TABLE + "".join(rows))
     assert app.run(["study", "import", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
     return str(path)

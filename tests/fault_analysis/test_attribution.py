@@ -52,7 +52,7 @@ def test_copies_without_a_fault_are_equal_and_lose_nothing() -> None:
 
 def test_a_planted_robot_bears_the_whole_loss() -> None:
     found = attribute(SCENARIO, OneWorker(), Fault("dead", (0, 3), onset=20.0), range(4))
-    assert found.total.lost.value > 0.0
+    assert found.table()["lost"][0] > 0.0
     for seed in found.seeds:
         assert seed.robots[3][1] == 0.0
         assert seed.robots[0][1] == seed.total
@@ -62,7 +62,7 @@ def test_a_planted_capability_bears_the_whole_loss() -> None:
     # A policy that does not listen loses nothing by deafness.
     fault = Fault("dead[deliver,hear]", (0, 3), onset=20.0)
     found = attribute(SCENARIO, OneWorker(), fault, range(4))
-    assert found.total.lost.value > 0.0
+    assert found.table()["lost"][0] > 0.0
     for seed in found.seeds:
         assert seed.capabilities == {"deliver": seed.total, "hear": 0.0}
 
@@ -88,10 +88,12 @@ def test_the_shares_sum_to_the_loss() -> None:
     for seed in found.seeds:
         assert sum(lost for _, lost in seed.robots.values()) == pytest.approx(seed.total)
         assert sum(seed.capabilities.values()) == pytest.approx(seed.total)
-    total = found.total.lost.value
-    for rows in (found.parts, found.roles, found.capabilities):
-        assert sum(row.lost.value for row in rows) == pytest.approx(total)
-    assert sum(row.robots or 0 for row in found.roles) == 4
+    table = found.table()
+    total, *others = table["lost"]
+    for _, rows in table[1:].groupby("group"):
+        assert rows["lost"].sum() == pytest.approx(total)
+    assert len(others) > 4
+    assert table["robots"].sum() == 4
 
 
 @pytest.mark.parametrize(

@@ -143,7 +143,7 @@ def test_it_can_be_watched() -> None:
     session = Session(SMALL, "swarm-dt=8,homing=2", seed=2, faults=[Fault("FM4", 3)])
     session.play(1e6)
     played = run_episode(SMALL, policies.load("swarm-dt=8,homing=2"), 2, [Fault("FM4", 3)])
-    assert list(session.curves[0].times) == played.delivery_times.tolist()
+    assert session.run.world.state.delivery_times == played.delivery_times.tolist()
 
 
 def test_the_docstrings_example_holds() -> None:

@@ -123,8 +123,6 @@ GOOD = "1,8,none,,10\n"
         ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
         ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n", "line 4: its condition has no run of seed 1"),
         ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: has duration 90, line 2 60"),
-        ("kind,name,p\nsize,n,1\n", "has no column 'value', as it has 'kind'"),
-        ("kind,name,value,p\nsise,n,4,1\n", "line 2, column 'kind': 'sise': should be one of size"),
         ("robots,time\n4,1\n", "has no column trial or seed"),
         ("trial,robots,time,p\n1,4,1,1\n", "has a column of times and one of performance"),
         (
