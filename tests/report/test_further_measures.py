@@ -158,6 +158,17 @@ def test_null_that_ran_out_of_items_is_none(repaired: StudyResults) -> None:
     assert "the items ran out" in str(one.problem)
 
 
+def test_runs_that_deliver_everything_are_no_evidence_of_resilience() -> None:
+    found = after_a_fault(1.0, back=END)
+    (comparison,) = (c for c in found.plan.comparisons if c.indicator == "FT")
+    key = comparison.original.condition.run(found.plan.code, 0).key
+    capped = {**found.outcomes, key: replace(found.outcomes[key], all_delivered=True)}
+    one = only(judge(found.plan, capped))
+    assert one.against_whole is not None
+    assert one.against_whole.verdict == "inconclusive"
+    assert "| inconclusive† |" in markdown(document(judge(found.plan, capped)))
+
+
 def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) -> None:
     (comparison,) = (c for c in repaired.plan.comparisons if c.indicator == "FT")
     rates = rate_curves(repaired, comparison)
