@@ -375,3 +375,19 @@ def test_no_law_is_fitted_to_a_flat_series() -> None:
     found = judged(study, lambda *_: Outcome("", np.arange(60.0)))
     assert table(found, "Scaling laws") == []
     assert "no law is fitted: P is 60.0 at every size" in markdown(document(found))
+
+
+def test_a_law_that_is_fitted_to_a_capped_series_is_marked() -> None:
+    def play(_: str, level: Setting, seed: int) -> Outcome:
+        return Outcome("", np.arange(min(30.0, 2.0 * level.value**0.8 + seed % 2)))
+
+    study = Study(seeds=2, sizes=[{"values": [5, 10, 20, 40, 60]}])
+    found = judged(study, play)
+    assert "Scalability†" not in markdown(document(found))
+    full = {
+        key: replace(outcome, all_delivered=outcome.delivered == 30)
+        for key, outcome in found.outcomes.items()
+    }
+    told = markdown(document(judge(found.plan, full)))
+    assert "| swarm-dt: Scalability† | 1/P |" in told
+    assert "so P is capped there, and the law bends too early" in told
