@@ -50,7 +50,9 @@ _FAULT = re.compile(r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+))?(@(?P<onset>\
 
 
 def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
-    """Return the scenario that `--preset`, `--scenario` and `--set` describe, the last one wins.
+    """Return the scenario that `--preset`, `--scenario` and `--set` describe.
+
+    A file changes fields of the preset, and `--set` those of both.
 
     Raises:
         ScenarioError: no such preset, file or field, or a value that cannot be.

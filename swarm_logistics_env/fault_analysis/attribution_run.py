@@ -122,13 +122,19 @@ def _finished(path: Path, about: Mapping[str, Any]) -> dict[int, Losses]:
     if len(lines) < 2:  # no seed is finished, whatever was asked then
         path.unlink(missing_ok=True)
         return {}
-    there = json.loads(lines[0])
-    if different := [name for name in about if there.get(name) != about[name]]:
+    try:
+        there, *rows = map(json.loads, lines)
+        different = [name for name in about if dict(there).get(name) != about[name]]
+        found = [] if different else [Losses(**row) for row in rows]
+    except (TypeError, ValueError) as error:
+        raise StudyError(
+            f"{path} is damaged ({error}): should be deleted, and its seeds played again"
+        ) from None
+    if different:
         raise StudyError(
             f"{path.parent} holds an attribution with another {' and '.join(different)}: should be "
             "another directory, as --out names it"
         )
-    found = [Losses(**json.loads(line)) for line in lines[1:]]
     return {
         each.seed: each._replace(
             robots={int(robot): (role, lost) for robot, (role, lost) in each.robots.items()}

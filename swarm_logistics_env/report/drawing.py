@@ -1,7 +1,7 @@
 """Drawing with matplotlib, which is loaded only when a figure is drawn.
 
-Colours are Okabe and Ito's, every series has its own marker as well, and all ink is `INK` and all
-paper `PAPER`, so that a page can put its own colours in their place.
+The colours are those of Okabe and Ito, and every series has a marker of its own as well. Lines and
+letters are drawn in `INK` on `PAPER`, and a page puts its own colours in the place of these two.
 """
 
 from __future__ import annotations

@@ -101,7 +101,11 @@ def resilience_sections(results: StudyResults) -> Iterator[Section]:
 
 
 def _verdict(estimate: Estimate | None) -> str:
-    return "undefined" if estimate is None else estimate.verdict
+    if estimate is None:
+        return "undefined"
+    if estimate.identical:
+        return wording.UNAFFECTED
+    return estimate.verdict + (wording.SATURATED if "capped" in estimate.flags else "")
 
 
 def _seconds(repair: SelfRepair) -> str:

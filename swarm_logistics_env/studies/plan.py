@@ -100,8 +100,8 @@ def make_plan(
         identities: of its policies when it was played; None: they are loaded and asked.
 
     Raises:
-        StudyError: the specification varies nothing, a step of it cannot be, or there is no such
-            reference.
+        StudyError: the specification varies nothing, a step of it cannot be, two factors with one
+            heading vary the same under different conditions, or there is no such reference.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
     load_reference(specification.reference)  # a name that is wrong is told before anything is run
@@ -118,11 +118,13 @@ def make_plan(
         known[part] = policy.identity
         return policy
 
+    asked = _asked(specification, policy_of)
+    # What two factors ask alike is asked once, or Holm's family would count it twice.
     comparisons = tuple(
-        comparison
-        for comparison in _asked(specification, policy_of)
-        if comparison.indicator in specification.indicators
+        dict.fromkeys(one for one in asked if one.indicator in specification.indicators)
     )
+    if code is None:  # what was played so stays readable
+        _refuse_one_name_for_two(comparisons)
     if not comparisons:
         raise StudyError(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
@@ -135,6 +137,18 @@ def make_plan(
         if one.removed and one.changed.setting.onset
     }
     return Plan(specification, comparisons, code or specification.played.code(), known, nulls)
+
+
+def _refuse_one_name_for_two(comparisons: Sequence[Comparison]) -> None:
+    found: dict[object, str] = {}
+    for comparison in comparisons:
+        for arm in comparison.arms:
+            place = comparison.policy, comparison.table, arm.setting
+            if found.setdefault(place, arm.condition.key) != arm.condition.key:
+                raise StudyError(
+                    f"title = {comparison.table!r} heads {str(arm.setting)!r} under two different "
+                    "conditions: each factor should have a title of its own"
+                )
 
 
 def _asked(

@@ -106,10 +106,10 @@ class _Runs:
 
 
 class _Family:
-    """The comparisons of one indicator and policy, taken from look to look.
+    """The comparisons of one indicator for one policy, judged look after look.
 
     Attributes:
-        wanted: by key, the runs that its next look needs.
+        wanted: the runs that its next look needs and that are not played yet, by their keys.
     """
 
     def __init__(self, members: Sequence[Comparison], runs: _Runs) -> None:

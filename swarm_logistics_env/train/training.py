@@ -36,17 +36,20 @@ class Training(Part):
         about: a sentence about the policy, for its card.
         scenario: the conditions; a table of fields makes one.
         start: name or path of a trained policy that this one goes on from; none: from nothing.
-        worlds: those that run side by side, kind by kind: easy ones beside hard ones are what lets
-            a training from nothing begin.
-        threads: in which worlds step, and processes that measure scores; no result depends on it.
-        seed: decides everything random.
+        worlds: kinds of worlds that run side by side. A training from nothing begins to learn in
+            easy ones, which therefore stand beside the hard ones.
+        threads: how many threads step the worlds, and how many processes measure the scores; no
+            result depends on it.
+        seed: the number that decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
             added to them. Potentials are discounted by `ppo.gamma`.
-        indicators: pays them instead of the task.
-        conditions: kinds of episodes that are mixed; none: nobody fails.
+        indicators: the indicators that are paid instead of the task reward; none: the task reward.
+        conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
-        ppo, evaluation, scores: see there.
+        ppo: settings of the learner.
+        evaluation: what is measured during the training.
+        scores: what is measured at its end.
 
     Raises:
         TrainingError: a field is unknown, or its value is not allowed.
@@ -132,7 +135,7 @@ class Training(Part):
 
     @property
     def rows(self) -> int:
-        """Robots in all worlds together."""
+        """The number of robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
 
 

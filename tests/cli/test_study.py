@@ -157,7 +157,9 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
     assert warning < printed.index("question, 4 paired seeds")
     assert "4 seeds (0 to 3) every verdict is exploratory." in printed
-    assert "The verdicts are exploratory: seeds were added" in (out / "report.md").read_text()
+    assert (
+        "The verdicts are exploratory: they are over other seeds" in (out / "report.md").read_text()
+    )
     assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
     assert "holds the study 'mine'" in capsys.readouterr().err
 

@@ -75,6 +75,13 @@ def test_a_role_is_struck_however_short_the_fault_is() -> None:
     )
 
 
+@pytest.mark.parametrize("damage", ["no JSON\nat all\n", "[1]\n[2]\n"])
+def test_a_damaged_file_is_told(damage: str, tmp_path: Path) -> None:
+    (tmp_path / FINISHED).write_text(damage)
+    with pytest.raises(StudyError, match=r"is damaged .*: should be deleted"):
+        attribute_in(tmp_path, SCENARIO, "swarm-dt", Fault("FM4", 1, onset=20.0), [0])
+
+
 def test_a_directory_in_which_no_seed_is_finished_takes_another_question(tmp_path: Path) -> None:
     fault = Fault("FM4", 1, onset=20.0)
     with pytest.raises(FaultError, match="ended at 10 s"):
