@@ -149,7 +149,7 @@ def _short(told: str) -> str:
 
 
 def _over(row: Row) -> str:
-    """Return what stands on the axis of the categories."""
+    """Return the label of the axis of a figure on which the conditions stand."""
     factors = {
         "size": "swarm size N",
         "fault": "failure mode and number m of faulty robots",
