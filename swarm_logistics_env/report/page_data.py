@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import shlex
 import zlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import SwarmLogisticsError
+from swarm_logistics_env.records import canonical_json
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
@@ -78,15 +80,20 @@ def watch_command(arm: Arm) -> str | None:
     condition = arm.condition
     if condition.task.name != DEFAULT or not isinstance(condition.policy.source, str):
         return None
-    words = ["swarm-logistics watch", f"--policy {condition.policy.source}"]
+    if condition.behaviour:
+        return None
+    words = ["swarm-logistics", "watch", "--policy", condition.policy.source]
     default = condition.task.default.model_dump(mode="json")
     for name, value in condition.scenario.model_dump(mode="json").items():
         if value != default[name]:
-            words.append(f"--set {name}={str(value).lower() if value in (True, False) else value}")
+            text = value if isinstance(value, str) else canonical_json(value)
+            words += ["--set", f"{name}={text}"]
     for fault in condition.faults:
+        if fault != type(fault)(fault.mode, fault.robots, fault.onset):
+            return None  # no option says how long it lasts, and the like
         start = f"@{fault.onset:g}" if fault.onset else ""
-        words.append(f"--fault {fault.mode}:{fault.robots}{start}")
-    return " ".join(words)
+        words += ["--fault", f"{fault.mode}:{fault.robots}{start}"]
+    return shlex.join(words)
 
 
 def _question(results: StudyResults, test: Row, places: dict[str, int]) -> dict[str, Any]:
