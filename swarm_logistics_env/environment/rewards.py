@@ -190,22 +190,16 @@ def contact(world: Warehouse, before: Before) -> Earned:
 
 
 def blocked_request(world: Warehouse, before: Before) -> Earned:
-    """Seconds that a robot kept others from the requested item; weigh it negatively.
+    """Seconds that a robot that cannot deliver held the requested item; weigh it negatively.
 
-    It held the item and cannot deliver, or is in the way of who would lift it and cannot lift.
-    Privileged: no robot senses that it is faulty.
+    Privileged: such a robot only finds out inside the delivery area, as nothing happens there.
     """
-    state, carrier = world.state, carrier_of_requested(world)
-    paid = np.zeros(state.n_robots)
-    if carrier != NOBODY:
-        paid[carrier] = not state.delivers[carrier]
-    elif state.requested != NOBODY:
-        away = state.robot_position - state.item_position[state.requested]
-        # From here on a body may touch that of a robot that could lift the item.
-        reach = world.scenario.pickup_range + 2.0 * world.scenario.robot_radius
-        is_near = np.hypot(away[:, 0], away[:, 1]) < reach
-        paid[is_near & ~state.lifts] = 1.0
-    return paid * world.scenario.control_period
+    carrier = carrier_of_requested(world)
+    if carrier == NOBODY or world.state.delivers[carrier]:
+        return None
+    paid = np.zeros(world.state.n_robots)
+    paid[carrier] = world.scenario.control_period
+    return paid
 
 
 REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {

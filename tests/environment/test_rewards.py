@@ -246,24 +246,6 @@ def test_a_robot_that_cannot_deliver_is_charged_while_it_holds_the_requested_ite
     assert terms.pay(world) == pytest.approx(np.where(np.arange(4) == faulty, -0.1, 0.0))
 
 
-def test_a_robot_that_cannot_lift_is_charged_while_it_stands_at_the_requested_item() -> None:
-    world = Warehouse(Scenario(n_robots=4, n_items=6))
-    world.reset(0, [Fault("FM2", 1)])
-    (faulty,) = np.flatnonzero(~world.state.lifts).tolist()
-    healthy = (faulty + 1) % 4
-    world.state.requested = 2
-    at, far = [3.0, 3.0], [6.0, 6.0]
-    world.state.item_position[2] = at
-    world.state.robot_position[:] = far
-    terms = started(world, blocked_request=-1.0)
-    world.state.robot_position[healthy] = at
-    assert not terms.pay(world).any()
-    world.state.robot_position[faulty] = [3.45, 3.0]
-    assert terms.pay(world) == pytest.approx(np.where(np.arange(4) == faulty, -0.1, 0.0))
-    give(world, healthy, 2)
-    assert not terms.pay(world).any(), "another robot carries it"
-
-
 def test_terms_are_weighed_and_added(world: Warehouse) -> None:
     give(world, 1, 2)
     terms = started(world, delivery=0.5, own_delivery=2.0, contact=-10.0)
