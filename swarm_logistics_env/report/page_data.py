@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import shlex
 import zlib
 from collections.abc import Iterator
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import SwarmLogisticsError
-from swarm_logistics_env.records import canonical_json
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
@@ -86,7 +86,7 @@ def watch_command(arm: Arm) -> str | None:
     default = condition.task.default.model_dump(mode="json")
     for name, value in condition.scenario.model_dump(mode="json").items():
         if value != default[name]:
-            text = value if isinstance(value, str) else canonical_json(value)
+            text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
             words += ["--set", f"{name}={text}"]
     for fault in condition.faults:
         if fault != type(fault)(fault.mode, fault.robots, fault.onset):
