@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
@@ -201,12 +202,28 @@ _LOSSES: list[Column] = [
 ]
 
 
+_COLUMNS = (
+    *("policy", "fault", "seeds", "capped", "blocked_seconds", "anchoring_seconds"),
+    *("group", "part", "meaning", "robots", "lost", "low", "high"),
+)
+
+
 def attribution_section(path: Path) -> Section:
-    """Return the table of losses that `blame` wrote (`attribution.csv`), with its figure."""
+    """Return the table of losses that `blame` wrote (`attribution.csv`), with its figure.
+
+    Raises:
+        StudyError: it wrote none such.
+    """
     import pandas as pd
 
-    table = pd.read_csv(path)
-    one = next(rows_of(table))
+    try:
+        table = pd.read_csv(path)
+        one = next(rows_of(table[list(_COLUMNS)]))
+    except (OSError, KeyError, ValueError, StopIteration):
+        raise StudyError(
+            f"{path} is no table of this version of `blame`: should be written anew by the same "
+            "command, or be deleted"
+        ) from None
     title = f"{one.policy}: deliveries that {one.fault} costs, per episode"
     means = (
         f"Means over {one.seeds} seeds. The rows of roles sum to all, and so do those of lost "

@@ -32,6 +32,7 @@ NAMES: dict[str, tuple[str, ...]] = {
 }
 _MEANING = {word: column for column, words in NAMES.items() for word in (column, *words)}
 _COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
@@ -126,18 +127,26 @@ class Table:
     def _decimal_comma(self) -> bool:
         """Whether decimals have a comma; a file with both signs could mean anything."""
         first: dict[str, tuple[int, int]] = {}
+        only_thousands = True  # as far as can be seen
         places = [*(p for name, p in self.places.items() if name not in _TEXTS), *self.others]
         for row, cells in enumerate(self.rows):
             for place in places:
                 for sign, form in ((",", _COMMA), (".", _POINT)):
                     if form.fullmatch(cells[place]):
                         first.setdefault(sign, (row, place))
+                        only_thousands &= _THOUSANDS.fullmatch(cells[place]) is not None
         if len(first) == 2:
             raise self._error(
                 *first["."],
                 f"should have a decimal comma, as line {self.lines[first[','][0]]} has "
                 f"({self.rows[first[','][0]][first[','][1]]!r}), or all a point; no sign between "
                 "thousands",
+            )
+        if first and only_thousands:
+            raise self._error(
+                *first[","],
+                "could be thousands or decimals: should have a point before decimals, and no sign "
+                "between thousands",
             )
         return "," in first
 

@@ -108,7 +108,8 @@ class Answer:
     Attributes:
         name: policy, subject and comparison.
         fails: whether it makes the gate fail; what cannot be judged does.
-        estimate: against the gate's number; None: it is exact, or cannot be judged.
+        estimate: the indicator tested against the gate's number; None: it is exact, or cannot be
+            judged.
         verdict: on "above the number", Holm-adjusted over the gate's estimates.
         exact: the value where the runs compared are the same runs, so that nothing is estimated.
         problem: why it cannot be judged.

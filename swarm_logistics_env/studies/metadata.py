@@ -112,7 +112,7 @@ def _counted(seeds: Sequence[int]) -> str:
 
 
 class Origin(BaseModel):
-    """Where recorded trials came from.
+    """The source of recorded trials.
 
     Attributes:
         file: its name.

@@ -41,8 +41,8 @@ class Fault(Record):
         mode: a key of `FAILURE_MODES`, or a part of one, see `failure_mode`.
         robots: how many robots fail (1..N), chosen by the seed alone, so that every mode hits the
             same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
-        onset: when [s], from the start of the episode.
-        duration: for how long [s]; None: for good. A removed robot does not come back.
+        onset: when it begins [s], from the start of the episode.
+        duration: for how long it holds [s]; None: for good. A removed robot does not come back.
         factor: for `motor_slow`, `motor_wear` and `view_reduced`: what is left, in [0, 1).
         intermittent: for how long [s] it holds, and for how long not, both on average, in turn
             from its onset on; each robot's times are drawn from its own stream (exponential).
