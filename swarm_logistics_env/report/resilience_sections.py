@@ -225,8 +225,9 @@ def attribution_section(path: Path) -> Section:
             "command, or be deleted"
         ) from None
     title = f"{one.policy}: deliveries that {one.fault} costs, per episode"
+    over = f"Means over {one.seeds} seeds" if one.seeds > 1 else "Of one seed, without an interval"
     means = (
-        f"Means over {one.seeds} seeds. The rows of roles sum to all, and so do those of lost "
+        f"{over}. The rows of roles sum to all, and so do those of lost "
         "capabilities (Shapley values); robots: how many failed in that role, over all seeds."
     )
     contacts = (
