@@ -7,9 +7,12 @@ is played is kept, as by `play_tables.py`.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 import question_tables as tables
 from play_tables import OUT, ROOT, play, rewritten
@@ -21,6 +24,9 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.fault_measures import rate_curves
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
 
 DOCS = ROOT / "docs"
 STUDIES = ROOT / "examples" / "questions"
@@ -47,13 +53,13 @@ def larger_swarms(found: StudyResults) -> Answer:
         f"last column is paired by seed and unadjusted. {tables.LEGEND}.",
     }
     rows = [test for test in rows_of(found.indicators) if test.indicator == "R"]
-    modes = list(dict.fromkeys(test.factor for test in rows))
+    policies = list(dict.fromkeys(test.policy for test in rows))
     points = pd.DataFrame(
         [
             {
-                "policy": test.policy,
-                "series": test.factor,
-                "style": modes.index(test.factor),
+                "mode": test.factor,
+                "series": test.policy,
+                "style": policies.index(test.policy),
                 "category": f"{test.n_robots}, m = {test.after:g}",
                 "value": test.value,
                 "low": test.low,
@@ -66,30 +72,44 @@ def larger_swarms(found: StudyResults) -> Answer:
         ]
     )
     panels = [
-        Panel(policy, "robustness R", own, (0.0,), "swarm size N, faulty robots m")
-        for policy, own in points.groupby("policy", sort=False)
+        Panel(mode, "robustness R", own, (0.0,), "")
+        for mode, own in points.groupby("mode", sort=False)
     ]
-    return blocks, partial(drawing.intervals, panels=panels), 0.5 + 2.5 * len(panels)
+    panels[-1] = replace(panels[-1], x_label="swarm size N, faulty robots m")
+    return blocks, partial(on_one_scale, panels=panels), 0.7 + 1.8 * len(panels)
+
+
+def on_one_scale(canvas: Canvas, panels: Sequence[Panel]) -> None:
+    """Draw values with their intervals, one panel below the other, all on one scale."""
+    drawing.intervals(canvas, panels)
+    limits = np.array([axes.get_ylim() for axes in canvas.axes])
+    for axes in canvas.axes:
+        axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
 
 
 def wear_and_repair(found: StudyResults) -> Answer:
     """Answer with what wear costs and what a repair brings, drawn over time for FM4."""
     blocks = {
         "wear": tables.wear(found),
-        "repair": f"{tables.repairs(found)}\n\n{tables.over(found)}. [95 %], the two "
-        f"columns after 200 s in percent of the deliveries without a fault. {tables.LEGEND}.",
+        "repair": tables.repairs(found),
+        "after": f"{tables.after_repairs(found)}\n\n{tables.over(found)}. [95 %]. {tables.LEGEND}.",
     }
     panels = {}
-    for policy in dict.fromkeys(found.indicators["policy"]):
-        curves = {}
-        for test in rows_of(found.indicators):
-            if (test.policy, test.factor) == (policy, "FM4"):
-                frame = rate_curves(found, test.compared)
-                told = {"fault": test.table.lower(), "no fault": "no fault"}
-                curves |= {told[runs]: own for runs, own in frame.groupby("runs", sort=False)}
-        panels[policy] = pd.concat([own.assign(runs=runs) for runs, own in curves.items()])
-    draw = partial(drawing.rates, panels=panels, onset=100.0, y_label="deliveries in 100 s")
-    return blocks, draw, 0.5 + 2.4 * len(panels)
+    for test in rows_of(found.indicators):
+        if test.factor == "FM4":
+            frame = rate_curves(found, test.compared)
+            whole = frame.loc[frame["runs"] == "no fault", "deliveries"].mean()
+            columns = ["deliveries", "low", "high"]
+            frame[columns] *= 100.0 / whole
+            told = {"fault": test.table.lower(), "no fault": "no fault"}
+            curves = panels.setdefault(f"{test.policy}, 100 % are {whole:.1f} items", {})
+            curves |= {told[runs]: own for runs, own in frame.groupby("runs", sort=False)}
+    drawn = {
+        title: pd.concat([own.assign(runs=runs) for runs, own in curves.items()])
+        for title, curves in panels.items()
+    }
+    draw = partial(drawing.rates, panels=drawn, onset=100.0, y_label="deliveries [%]")
+    return blocks, draw, 0.5 + 1.9 * len(panels)
 
 
 def mixed_swarms(found: StudyResults) -> Answer:
@@ -98,27 +118,31 @@ def mixed_swarms(found: StudyResults) -> Answer:
         "shares": f"{tables.shares(found)}\n\n{tables.over(found)}. [95 %]. "
         f"{tables.LEGEND}; the steps are one family, straight lines are unadjusted."
     }
-    policies = list(dict.fromkeys(found.indicators["policy"]))
     rows = [cell for cell in rows_of(found.performance) if cell.n_seeds]
     faults = list(dict.fromkeys(str(cell.arm.setting) for cell in rows))
-    points = pd.DataFrame(
-        [
-            {
-                "series": str(cell.arm.setting),
-                "style": faults.index(str(cell.arm.setting)),
-                "category": f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
-                "value": cell.mean,
-                "low": cell.low,
-                "high": cell.high,
-                "decided": True,
-                "saturated": cell.saturated,
-                "published": float("nan"),
-            }
-            for cell in rows
-        ]
-    )
-    panel = Panel("", "P [items in 500 s]", points, (0.0,), f"share of {policies[-1]}")
-    return blocks, partial(drawing.intervals, panels=[panel]), 3.2
+    panels = []
+    for policies in tables.replacements(found):
+        points = pd.DataFrame(
+            [
+                {
+                    "series": str(cell.arm.setting),
+                    "style": faults.index(str(cell.arm.setting)),
+                    "category": f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
+                    "value": cell.mean,
+                    "low": cell.low,
+                    "high": cell.high,
+                    "decided": True,
+                    "saturated": cell.saturated,
+                    "published": float("nan"),
+                }
+                for cell in rows
+                if cell.policy in policies
+            ]
+        )
+        title = f"from {policies[0]} to {policies[-1]}"
+        share = f"share of {policies[-1]}"
+        panels.append(Panel(title, "P [items in 500 s]", points, (0.0,), share))
+    return blocks, partial(drawing.intervals, panels=panels), 0.5 + 2.5 * len(panels)
 
 
 def realistic_robots(found: StudyResults) -> Answer:

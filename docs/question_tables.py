@@ -166,46 +166,44 @@ def performances_by_size(found: StudyResults) -> str:
 REPAIRED_AT = 200.0  # [s]: failed at 100 s, for 100 s
 
 
-def repairs(found: StudyResults) -> str:
-    """Return what a repair brings, and whether anything of the fault is left after it."""
+def repaired_tests(found: StudyResults) -> Iterator[tuple[Row, Row]]:
+    """Yield each fault that stays until the end with the same one that is repaired."""
     tests = {
         (test.policy, test.factor, test.table): test
         for test in rows_of(found.indicators)
         if test.onset
     }
-    body = []
     for (policy, mode, where), repaired in tests.items():
-        if not where.startswith("Repaired"):
-            continue
-        broken = tests[policy, mode, "Not repaired"]
-        p = [_by_seed(found, test) for test in (broken, repaired)]
-        gain = spi.relative_change(*p)
-        after = [deliveries_after(found, test.compared.changed) for test in (broken, repaired)]
-        whole = deliveries_after(found, repaired.compared.original)
-        left = [spi.relative_change(whole, counts) for counts in after]
-        back = spi.equivalence(whole, after[1], margin=found.plan.specification.margin)
-        body.append(
-            (
-                f"`{policy}`",
-                mode,
-                with_sign(broken),
-                with_sign(repaired),
-                _share(gain),
-                *map(_share, left),
-                back.verdict,
-            )
-        )
-    head = (
-        "policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P",
-        "after 200 s, not repaired", "after 200 s, repaired", "all back",
-    )  # fmt: skip
+        if where.startswith("Repaired"):
+            yield tests[policy, mode, "Not repaired"], repaired
+
+
+def repairs(found: StudyResults) -> str:
+    """Return what a repair brings."""
+    body = []
+    for tests in repaired_tests(found):
+        gain = spi.relative_change(*(_by_seed(found, one, one.compared.changed) for one in tests))
+        named = f"`{tests[0].policy}`", tests[0].factor
+        body.append((*named, *map(with_sign, tests), _share(gain)))
+    head = ("policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P [%]")
     return table(head, body)
 
 
-def _by_seed(found: StudyResults, test: Row) -> NDArray[np.float64]:
-    counts: NDArray[np.float64] = found.by_arm[
-        test.policy, test.table, test.compared.changed
-    ].by_seed
+def after_repairs(found: StudyResults) -> str:
+    """Return whether anything of a fault is left after its repair."""
+    body = []
+    for tests in repaired_tests(found):
+        whole = deliveries_after(found, tests[0].compared.original)
+        after = [deliveries_after(found, test.compared.changed) for test in tests]
+        left = [spi.relative_change(whole, counts) for counts in after]
+        back = spi.equivalence(whole, after[1], margin=found.plan.specification.margin)
+        named = f"`{tests[0].policy}`", tests[0].factor
+        body.append((*named, *map(_share, left), back.verdict))
+    return table(("policy", "mode", "not repaired [%]", "repaired [%]", "all back"), body)
+
+
+def _by_seed(found: StudyResults, test: Row, arm: Arm) -> NDArray[np.float64]:
+    counts: NDArray[np.float64] = found.by_arm[test.policy, test.table, arm].by_seed
     return counts
 
 
@@ -224,56 +222,64 @@ def _share(change: Estimate) -> str:
 
 
 def wear(found: StudyResults) -> str:
-    """Return R of wearing motors beside motors that are slow from the start."""
-    rows: dict[str, dict[str, str]] = {}
-    columns: list[str] = []
+    """Return R and the change of P, of wearing motors and of motors slow from the start."""
+    body = []
     for test in rows_of(found.indicators):
         if test.table == "Wear":
-            column = f"`{test.policy}`"
-            columns += [] if column in columns else [column, f"P, {column}"]
-            row = rows.setdefault(test.comparison, {})
-            row[column] = with_sign(test)
-            row[f"P, {column}"] = f"{100 * test.change:.1f} %"
-    heads = [c if not c.startswith("P") else f"change of {c}" for c in columns]
-    body = [(label, *(row[column] for column in columns)) for label, row in rows.items()]
-    return table(("R", *heads), body)
+            whole, worn = (
+                _by_seed(found, test, arm)
+                for arm in (test.compared.original, test.compared.changed)
+            )
+            change = _share(spi.relative_change(whole, worn))
+            body.append((f"`{test.policy}`", test.comparison, with_sign(test), change))
+    return table(("policy", "worn robots", "R", "change of P [%]"), body)
 
 
 # -- mixed swarms -------------------------------------------------------------------------------
 
 
+def replacements(found: StudyResults) -> list[tuple[str, ...]]:
+    """Return the policies from each pure swarm to the next one, the mixes between them."""
+    policies = judged_policies(found)
+    names = [str(getattr(one, "name", one)) for one in found.plan.specification.policies]
+    pure = [place for place, name in enumerate(names) if "=" not in name]
+    ends = sorted({0, *pure, len(policies) - 1})
+    return [policies[first : last + 1] for first, last in itertools.pairwise(ends)]
+
+
 def shares(found: StudyResults) -> str:
     """Return P and R by share, the step from share to share, and what the mix adds to its parts."""
-    policies = judged_policies(found)
     p = {
         cell.policy: cell for cell in rows_of(found.performance) if cell.arm.setting.name == "none"
     }
     tests = {(test.policy, test.comparison): test for test in rows_of(found.indicators)}
     asked = list(dict.fromkeys(comparison for _, comparison in tests))
-    first, last = (p[policies[place]].by_seed for place in (0, -1))
+    policies = judged_policies(found)
     steps = [
         spi.relative_change(p[before].by_seed, p[after].by_seed)
         for before, after in itertools.pairwise(policies)
     ]
-    verdicts = spi.adjust(steps)
-    body = []
-    for place, policy in enumerate(policies):
-        part = place / (len(policies) - 1)
-        step, more = "", ""
-        if place:
-            step = f"{_share(steps[place - 1])} {SIGNS[verdicts[place - 1]].mark}"
-        if 0 < part < 1:
-            straight = (1 - part) * first + part * last
-            more = wording.bracketed(t_interval(p[policy].by_seed - straight), 1)
-        body.append(
-            (
-                f"`{policy}`",
-                wording.mean_p(p[policy]),
-                step,
-                more,
-                *(with_sign(tests[policy, comparison]) for comparison in asked),
-            )
+    told = {
+        policy: f"{_share(step)} {SIGNS[verdict].mark}"
+        for policy, step, verdict in zip(policies[1:], steps, spi.adjust(steps))
+    }
+    more = {}
+    for own in replacements(found):
+        first, last = (p[own[place]].by_seed for place in (0, -1))
+        for place, policy in enumerate(own[1:-1], 1):
+            part = place / (len(own) - 1)
+            beyond = p[policy].by_seed - (1 - part) * first - part * last
+            more[policy] = wording.bracketed(t_interval(beyond), 1)
+    body = [
+        (
+            f"`{policy}`",
+            wording.mean_p(p[policy]),
+            told.get(policy, ""),
+            more.get(policy, ""),
+            *(with_sign(tests[policy, comparison]) for comparison in asked),
         )
+        for policy in policies
+    ]
     head = ("", "P", "step [%]", "P less the straight line", *(f"R, {one}" for one in asked))
     return table(head, body)
 
