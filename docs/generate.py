@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from record_tables import summary, table
 
-from swarm_logistics_env import FAILURE_MODES, Scenario, wrappers
+from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.environment.central_state import ITEM_FEATURES, ROBOT_FEATURES
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
@@ -132,7 +132,7 @@ have it, a dict of its arguments: `{{"mode": "FM1", "robots": 2}}`. Any argument
 
 ## Failure modes
 
-A fault is `Fault(mode, robots, onset, duration, factor)`. Robots do not sense it; `infos[agent]["failed"]` is 1 while any mode holds.
+A fault is `Fault({fault})`. Robots do not sense it; `infos[agent]["failed"]` is 1 while any mode holds.
 
 {failures}
 
@@ -173,6 +173,7 @@ def page() -> str:
             ],
         ),
         last=scenario.n_robots - 1,
+        fault=", ".join(Fault.model_fields),
         observations=observation_table(scenario),
         commands=table(
             ("column", "name", "-1", "0", "1"),

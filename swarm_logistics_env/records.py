@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo
 
 from swarm_logistics_env.errors import SwarmLogisticsError, suggest
 
@@ -84,24 +85,46 @@ class Record(BaseModel):
         return f"{field} = {_short(problem['input'])}: {message}"
 
 
-def read_toml(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> dict[str, Any]:
-    """Return the table in a TOML file.
+def one_of(record: type[Record]) -> Callable[[object], object]:
+    """Return what makes a record of a table, and leaves anything else as it is."""
+    # The record's own constructor raises errors that suggest the field that was meant.
+    return lambda value: record(**value) if isinstance(value, dict) else value
+
+
+def each_of(record: type[Record]) -> Callable[[object, ValidationInfo], object]:
+    """Return what makes a tuple of records of a list of tables."""
+    one = one_of(record)
+
+    def build(values: object, info: ValidationInfo) -> object:
+        if isinstance(values, dict):
+            raise ValueError(f"should be a list of tables: [[{info.field_name}]] in a TOML file")
+        return tuple(map(one, values)) if isinstance(values, list | tuple) else values
+
+    return build
+
+
+def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> dict[str, Any]:
+    """Return the table in a TOML file, or in a file whose name ends in .json.
 
     Args:
         what: names it in errors, e.g. "study file".
 
     Raises:
-        The `error_type`: the file cannot be read, or is not TOML.
+        The `error_type`: the file cannot be read, is neither, or holds no table.
     """
+    kind, parse = ("JSON", json.loads) if path.suffix == ".json" else ("TOML", tomllib.loads)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        found = parse(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise error_type(f"cannot read the {what} {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except ValueError as error:  # of Unicode, JSON and TOML
         reason = str(error).splitlines()[0]
-        raise error_type(f"the {what} {path} is not TOML: {reason}") from error
+        raise error_type(f"the {what} {path} is not {kind}: {reason}") from error
     except RecursionError:
         raise error_type(f"the {what} {path} is nested too deep") from None
+    if not isinstance(found, dict):
+        raise error_type(f"the {what} {path} should hold a table of fields")
+    return found
 
 
 def canonical_json(value: object) -> str:

@@ -118,11 +118,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
     @property
     def rows_of_worlds(self) -> list[slice]:
-        """Of each of `worlds`, the slice of its rows."""
+        """The slice of the rows that each of `worlds` has."""
         return self._worlds.rows
 
     def seed(self, seed: int | None = None) -> list[int]:
-        """Fix all episodes from the next `reset` on; returns each row's world's seed.
+        """Fix all episodes from the next `reset` on; return the seed of the world of each row.
 
         Raises:
             SetupError: the seed is no integer.

@@ -1,4 +1,4 @@
-"""Several environments side by side in one process, their robots as rows of common arrays."""
+"""Several environments in one process, whose robots are the rows of common arrays."""
 
 from __future__ import annotations
 

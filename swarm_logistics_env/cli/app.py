@@ -115,7 +115,8 @@ def run_command(
     from swarm_logistics_env import policies
     from swarm_logistics_env.episode import run_episode
 
-    scenario, scheduled = scenario_of(preset, scenario_file, changes), faults_of(faults)
+    scenario = scenario_of(preset, scenario_file, changes)
+    scheduled = faults_of(faults, scenario)
     player = policies.load(policy, trust_code=trust_code)
     # This compiles the kernels, so that the time below is that of the episode alone.
     run_episode(scenario.replace(duration=scenario.control_period), player, seed)

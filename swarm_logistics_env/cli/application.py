@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import shlex
 import sys
 import traceback
 from pathlib import Path
@@ -31,7 +32,10 @@ class Application(typer.Typer):
         try:
             command = typer.main.get_command(self)
             _show_brackets(command)
-            code = command(arguments, standalone_mode=False)
+            # What made a file is recorded in it: the command line is the context's object.
+            typed = sys.argv[1:] if arguments is None else arguments
+            words = shlex.join(["swarm-logistics", *typed])
+            code = command(arguments, standalone_mode=False, obj=words)
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
         except Exception as error:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from statistics import fmean
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,8 +13,6 @@ from .study_commands import ProcessesOption
 
 if TYPE_CHECKING:
     from swarm_logistics_env.fault_analysis.attack import AttackResult
-    from swarm_logistics_env.fault_analysis.attribution import Attribution, Share
-    from swarm_logistics_env.spi import Estimate, Interval
     from swarm_logistics_env.warehouse import Fault
 
 PolicyArgument = Annotated[
@@ -94,15 +92,15 @@ def blame_command(
     from swarm_logistics_env.errors import SetupError
     from swarm_logistics_env.fault_analysis.attribution_run import attribute_in, write_table
     from swarm_logistics_env.progress_bar import ProgressBar
-    from swarm_logistics_env.report.attributions import section_of
     from swarm_logistics_env.report.drawing import images
     from swarm_logistics_env.report.report_files import missing_packages
+    from swarm_logistics_env.report.resilience_sections import attribution_section
     from swarm_logistics_env.scenario import Scenario
     from swarm_logistics_env.studies import Study
 
-    (chosen,) = faults_of([fault])
-    chosen = chosen.replace(role=role)
-    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
+    from .terminal_tables import show
+
+    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}{f'-{role}' if role else ''}"
     place = out or (study or Path("results")) / name
     scenario = scenario_of(preset, file, changes)
     asked = Study.stored(study) if study else None
@@ -110,6 +108,11 @@ def blame_command(
         if scenario != Scenario():
             raise SetupError("--study has a scenario: should be without --set and the like")
         scenario = asked.specification.scenario
+        if not isinstance(scenario, Scenario):
+            task = asked.specification.played.name
+            raise SetupError(f"--study {study}: plays {task!r}, should be one of the warehouse")
+    (chosen,) = faults_of([fault], scenario)
+    chosen = chosen.replace(role=role)
     done = 0
     with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
 
@@ -130,10 +133,11 @@ def blame_command(
             )
         except KeyboardInterrupt:
             _stopped(place)
-    _show_blame(found, policy)
     written = [write_table(found, policy, _in_words(chosen), place)]
+    section = attribution_section(written[0])
+    show(replace(section, figures=()))
     if not missing_packages():
-        (figure,) = section_of(written[0]).figures
+        (figure,) = section.figures
         written.append(place / "attribution.png")
         written[1].write_bytes(images(figure.draw, figure.height)[1])
     typer.echo(f"Written: {', '.join(map(str, written))}")
@@ -149,75 +153,34 @@ def _stopped(place: Path) -> None:
 
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
+    from swarm_logistics_env.report.wording import bracketed
+
     from .terminal_tables import show_table
 
     rows = [
         (
             found.by,
             _in_words(found.fault),
-            f"{found.robustness.value:+.3f}",
-            _limits(found.robustness, 3),
+            bracketed(found.robustness, 3),
             str(found.runs),
         )
         for found in result.found
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)
+    capped = (
+        "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
+        "shown. --set restock=true has no cap."
+    )
     show_table(
         f"{policy}: worst faults found",
-        ("found by", "fault", "R", "95 % interval", "runs"),
+        ("found by", "fault", "R [95 %]", "runs"),
         rows,
         f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
         f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
+        *([capped] if result.is_capped else ()),
     )
-
-
-def _show_blame(found: Attribution, policy: str) -> None:
-    from .terminal_tables import show_table
-
-    def show_shares(title: str, shares: tuple[Share, ...], *lines: str) -> None:
-        rows = [
-            (
-                share.name.replace("_", " "),
-                share.meaning,
-                "" if share.robots is None else str(share.robots),
-                f"{share.lost.value:.2f}",
-                _limits(share.lost, 2),
-            )
-            for share in shares
-            if share.robots != 0
-        ]
-        show_table(title, ("part", "meaning", "robots", "lost", "95 % interval"), rows, *lines)
-
-    means = [f"Means over {len(found.seeds)} seeds."]
-    if capped := sum(each.is_capped for each in found.seeds):
-        means.append(
-            f"Capped: in {capped} of them every item was delivered without the fault, so it costs "
-            "more than is shown. --set restock=true has no cap."
-        )
-    heading = f"{policy}: deliveries that {_in_words(found.fault)} costs, per episode"
-    show_shares(heading, (found.total, *found.parts), *means)
-    show_shares(
-        "By role at the onset",
-        found.roles,
-        "robots: how many failed in that role, over all seeds. The rows sum to all.",
-    )
-    show_shares(
-        "By lost capability",
-        found.capabilities,
-        "Shapley values over copies of the world at the onset; the rows sum to all.",
-        "The requested item was held by a failed robot for "
-        f"{fmean(each.blocked_seconds for each in found.seeds):.0f} s, and working "
-        "robots touched failed ones for "
-        f"{fmean(each.anchoring_seconds for each in found.seeds):.0f} robot-seconds.",
-    )
-
-
-def _limits(found: Interval | Estimate, digits: int) -> str:
-    if found.low is None or found.high is None:
-        return ""
-    return f"[{found.low:.{digits}f}, {found.high:.{digits}f}]"
 
 
 def _in_words(fault: Fault) -> str:

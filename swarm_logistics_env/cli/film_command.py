@@ -70,7 +70,8 @@ def film_command(
     from swarm_logistics_env.rendering.renderer import load_pygame
     from swarm_logistics_env.rendering.video import check_film, write_film
 
-    scenario, scheduled = scenario_of(preset, scenario_file, changes), faults_of(faults)
+    scenario = scenario_of(preset, scenario_file, changes)
+    scheduled = faults_of(faults, scenario)
     if twin and not scheduled:
         raise SetupError("--twin: shows the run without its faults, so --fault should be given")
     check_film(out)

@@ -140,22 +140,17 @@ def judge_command(
 
 def _stated(texts: list[str]) -> dict[str, str]:
     """Return the conditions that --setup states."""
-    import tomllib
+    from swarm_logistics_env.records import read_table
 
     stated: dict[str, str] = {}
     for text in texts:
         if "=" in text:
             stated.update([_pair("--setup", text)])
-            continue
-        try:
-            found = tomllib.loads(Path(text).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise StudyError(
-                f"--setup {text}: should be NAME=VALUE, or a file: {error.strerror}"
-            ) from None
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise StudyError(f"--setup {text}: is not TOML: {error}") from None
-        stated.update((name, str(value)) for name, value in found.items())
+        elif Path(text).is_file():
+            found = read_table(Path(text), "file of --setup", StudyError)
+            stated.update((name, str(value)) for name, value in found.items())
+        else:
+            raise StudyError(f"--setup {text}: should be NAME=VALUE, or a TOML file of such")
     return stated
 
 
@@ -269,7 +264,8 @@ def compare_command(
         failed |= fails
         result = "fails" if fails else "passes"
         title = f"Gate {gate.text!r} {result}" if gates else "Change of P"
-        _show_answers(title, said, left_out if gate.subject == "change" else ())
+        notes = left_out if gate.subject == "change" else ()
+        _show_answers(title, said, notes, after.confidence)
     raise typer.Exit(1 if failed else 0)
 
 
@@ -288,12 +284,16 @@ def _pilot(
         if policies:
             raise StudyError("--policy is for a pilot: a study that was run has its own policies")
         return Study.stored(asked, trust_code=trust_code).findings()
-    pilot = study_of(asked, None, seeds, policies, trust_code, looks=())
+    pilot = study_of(asked, None, seeds, policies, trust_code, looks=(), until_clear=False)
     pilot.run(processes=processes or os.cpu_count() or 1)
     return pilot.findings()
 
 
-def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
+def _show_answers(
+    title: str, said: tuple[Answer, ...], left_out: tuple[str, ...], confidence: float
+) -> None:
+    from swarm_logistics_env.report.wording import bracketed, percent
+
     from .terminal_tables import show_table
 
     rows = []
@@ -303,8 +303,8 @@ def _show_answers(title: str, said: tuple[Answer, ...], left_out: tuple[str, ...
         if answer.exact is not None:
             value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
         if estimate is not None:
-            value, says = f"{estimate.value:.3f}", f"above {estimate.threshold:g}: {answer.verdict}"
-            if estimate.low is not None and estimate.high is not None:
-                value += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
+            value = bracketed(estimate, 3)
+            says = f"above {estimate.threshold:g}: {answer.verdict}"
         rows.append((answer.name, value, says))
-    show_table(title, ("", "value [95 %]", "verdict under Holm"), rows, *left_out)
+    columns = ("", f"value [{percent(confidence)}]", "verdict under Holm")
+    show_table(title, columns, rows, *left_out)

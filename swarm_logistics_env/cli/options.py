@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swarm_logistics_env.errors import FaultError, ScenarioError
+from swarm_logistics_env.records import read_table
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 
 if TYPE_CHECKING:
@@ -50,12 +50,14 @@ _FAULT = re.compile(r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+))?(@(?P<onset>\
 
 
 def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
-    """Return the scenario that `--preset`, `--scenario` and `--set` describe, the last one wins.
+    """Return the scenario that `--preset`, `--scenario` and `--set` describe.
+
+    A file changes fields of the preset, and `--set` those of both.
 
     Raises:
         ScenarioError: no such preset, file or field, or a value that cannot be.
     """
-    fields = {} if file is None else _fields_of(file)
+    fields = {} if file is None else read_table(file, "file of --scenario", ScenarioError)
     preset = str(fields.pop("preset", preset))
     for change in changes or []:
         name, equals, value = change.partition("=")
@@ -68,26 +70,11 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
     return Scenario.preset(preset).replace(**fields)
 
 
-def _fields_of(file: Path) -> dict[str, Any]:
-    """Return the fields in a file of `--scenario`; "preset" may be one of them."""
-    try:
-        text = file.read_text(encoding="utf-8")
-        fields = json.loads(text) if file.suffix == ".json" else tomllib.loads(text)
-    except OSError as error:
-        raise ScenarioError(f"--scenario {file}: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # of Unicode, JSON and TOML
-        kind = "JSON" if file.suffix == ".json" else "TOML"
-        raise ScenarioError(f"--scenario {file}: is not {kind}: {error}") from None
-    if not isinstance(fields, dict):
-        raise ScenarioError(f"--scenario {file}: should be a table of fields")
-    return fields
-
-
-def faults_of(texts: list[str] | None) -> list[Fault]:
+def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
     """Return the faults that `--fault MODE[:ROBOTS][@ONSET]` describes.
 
     Raises:
-        FaultError: a text does not read so, or there is no such fault.
+        FaultError: a text does not read so, there is no such fault, or the episode ends before.
     """
     from swarm_logistics_env.warehouse.faults import Fault
 
@@ -96,7 +83,10 @@ def faults_of(texts: list[str] | None) -> list[Fault]:
         match = _FAULT.fullmatch(text)
         if match is None:
             raise FaultError(f"--fault {text}: should be MODE[:ROBOTS][@ONSET], e.g. FM1:2@200")
-        faults.append(
-            Fault(match["mode"], int(match["robots"] or 1), onset=float(match["onset"] or 0))
-        )
+        onset = float(match["onset"] or 0)
+        if onset >= scenario.duration:
+            raise FaultError(
+                f"--fault {text}: should begin before the episode ends at {scenario.duration:g} s"
+            )
+        faults.append(Fault(match["mode"], int(match["robots"] or 1), onset=onset))
     return faults

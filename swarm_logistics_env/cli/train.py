@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -15,11 +14,11 @@ from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train.training import preset_names
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.train.training import Training
     from swarm_logistics_env.train.tuning import Trial, Tuning
 
 
 def train_command(
+    context: typer.Context,
     preset: Annotated[
         str | None,
         typer.Argument(
@@ -66,26 +65,75 @@ def train_command(
     for option, (value, other) in wrong.items():
         if value is not None and other is not None:
             raise TrainingError(f"{option} does not go with {other}")
+    command, of_training = str(context.obj), _given(seed=seed, agent_steps=steps)
     try:
-        if tune is None:
-            assert preset is not None
-            if trials is None:
-                path = train_as_asked(preset, out, seed, steps, device)
-                _show_training(path)
-            else:
-                tried, path = search_as_asked(preset, trials, out, seed, steps)
-                _show_trials(f"{preset}, factors of its weights", ("P", "worst R"), tried)
+        if tune is not None:
+            fields = _given(objectives=objectives, trials=trials, seeds=seeds, seed=seed)
+            path = _tune(tune, out, command, fields)
+        elif trials is not None:
+            path = _search(str(preset), trials, out, command, of_training)
         else:
-            fields = {
-                "objectives": tuple(objectives) if objectives else None,
-                "trials": trials, "seeds": seeds, "seed": seed,
-            }  # fmt: skip
-            asked, tried, path = tune_as_asked(tune, out, **fields)
-            _show_search(asked, tried, path)
+            path = _train(str(preset), out, command, device, of_training)
     except KeyboardInterrupt:
         typer.echo("\nStopped. The same command goes on.", err=True)
         raise typer.Exit(130) from None
     typer.echo(f"Written: {path}")
+
+
+def _given(**fields: Any) -> dict[str, Any]:
+    return {name: value for name, value in fields.items() if value is not None}
+
+
+def _train(
+    asked: str, out: Path | None, command: str, device: str | None, fields: dict[str, Any]
+) -> Path:
+    """Train a preset, or what a TOML file describes, and show it; return the policy file's path."""
+    from swarm_logistics_env.train.training import load_training
+
+    training = load_training(asked, **fields)
+    with _explained():
+        import_module("tensorboard")  # missed before anything is written
+        from swarm_logistics_env.train.trainer import train
+    path = train(
+        training, out or Path("results/train", training.name), command=command, device=device
+    )
+    _show_training(path)
+    return path
+
+
+def _search(
+    asked: str, trials: int, out: Path | None, command: str, fields: dict[str, Any]
+) -> Path:
+    """Search the weights of a training's rewards, and show it; return the path of its table."""
+    from swarm_logistics_env.train.reward_search import (
+        FRONT,
+        OBJECTIVES,
+        RewardSearch,
+        search_rewards,
+    )
+    from swarm_logistics_env.train.training import load_training
+
+    search = RewardSearch(training=load_training(asked, **fields), trials=trials)
+    with _explained():
+        for package in ("optuna", "tensorboard", "stable_baselines3"):
+            import_module(package)  # as above
+    out = out or Path("results/tune", search.training.name)
+    tried = search_rewards(search, out, command=command)
+    _show_trials(f"{asked}, factors of its weights", OBJECTIVES, tried)
+    return out / FRONT
+
+
+def _tune(policy: str, out: Path | None, command: str, fields: dict[str, Any]) -> Path:
+    """Search the parameters of a scripted policy, and show it; return the path of the result."""
+    from swarm_logistics_env.train.tuning import RESULT, Tuning, tune
+
+    asked = Tuning(policy=policy, **fields)
+    with _explained():
+        import_module("optuna")  # as above
+    out = out or Path("results/tune", policy)
+    tried = tune(asked, out, command=command)
+    _show_search(asked, tried, out / RESULT)
+    return out / RESULT
 
 
 def _show_search(asked: Tuning, trials: list[Trial], path: Path) -> None:
@@ -143,96 +191,6 @@ def _show_training(path: Path) -> None:
         )
     typer.echo(f"Curve: {path.parent / PICTURE}")
     typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
-
-
-def train_as_asked(
-    asked: str,
-    out: Path | None = None,
-    seed: int | None = None,
-    agent_steps: int | None = None,
-    device: str | None = None,
-) -> Path:
-    """Train a preset, or what a TOML file describes; returns the path of the policy file.
-
-    Args:
-        asked: name of the preset, or path of the file.
-        out: directory; None: results/train/NAME.
-        seed, agent_steps: instead of the training's own.
-        device: "cpu" or "cuda"; None: the GPU where there is one.
-
-    Raises:
-        TrainingError: there is no such training, it cannot be, or its libraries are missing.
-    """
-    training = _asked_training(asked, seed, agent_steps)
-    out = Path("results/train") / training.name if out is None else out
-    words = _words(asked, out, {"--seed": seed, "--steps": agent_steps, "--device": device})
-    with _explained():
-        import_module("tensorboard")  # missed before anything is written
-
-        from swarm_logistics_env.train.trainer import train
-    return train(training, out, command=words, device=device)
-
-
-def search_as_asked(
-    asked: str, trials: int, out: Path | None, seed: int | None, agent_steps: int | None
-) -> tuple[list[Trial], Path]:
-    """Search the weights of a training's rewards; returns the trials and the table of them.
-
-    Raises:
-        TrainingError: as `train_as_asked`, or the training measures no R.
-    """
-    from swarm_logistics_env.train.reward_search import FRONT, RewardSearch, search_rewards
-
-    training = _asked_training(asked, seed, agent_steps)
-    search = RewardSearch(training=training, trials=trials)
-    out = Path("results/tune") / training.name if out is None else out
-    words = _words(asked, out, {"--seed": seed, "--steps": agent_steps, "--trials": trials})
-    with _explained():
-        for package in ("optuna", "tensorboard", "stable_baselines3"):
-            import_module(package)  # as above
-    return search_rewards(search, out, command=words), out / FRONT
-
-
-def _asked_training(asked: str, seed: int | None, agent_steps: int | None) -> Training:
-    from swarm_logistics_env.train.training import load_training
-
-    given = {"seed": seed, "agent_steps": agent_steps}
-    return load_training(asked, **{n: value for n, value in given.items() if value is not None})
-
-
-def _words(asked: str, out: Path, options: dict[str, object]) -> str:
-    words = ["swarm-logistics", "train", asked, "--out", str(out)]
-    for option, value in options.items():
-        if value is not None:
-            words += [option, str(value)]
-    return shlex.join(words)
-
-
-def tune_as_asked(
-    policy: str, out: Path | None = None, **fields: object
-) -> tuple[Tuning, list[Trial], Path]:
-    """Search the parameters of a scripted policy; returns what was asked, the trials, the result.
-
-    Args:
-        policy: its name.
-        out: directory; None: results/tune/NAME.
-        fields: of `Tuning`, where they are not None.
-
-    Raises:
-        TrainingError: there is no such policy, a field cannot be, or Optuna is missing.
-    """
-    given: dict[str, Any] = {n: value for n, value in fields.items() if value is not None}
-    from swarm_logistics_env.train.tuning import RESULT, Tuning, tune
-
-    asked = Tuning(policy=policy, **given)
-    out = Path("results/tune") / policy if out is None else out
-    words = ["swarm-logistics", "train", "--tune", policy, "--out", str(out)]
-    for name, value in given.items():
-        for each in value if isinstance(value, tuple) else (value,):
-            words += [f"--{name.removesuffix('s') if name == 'objectives' else name}", str(each)]
-    with _explained():
-        import_module("optuna")  # as above
-    return asked, tune(asked, out, command=shlex.join(words)), out / RESULT
 
 
 @contextmanager

@@ -45,6 +45,8 @@ def watch_command(
     trust_code: TrustPolicyOption = False,
 ) -> None:
     """Watch two runs side by side in the browser; inspect, break and repair robots."""
+    import os
+
     from swarm_logistics_env import policies
     from swarm_logistics_env.errors import SetupError
     from swarm_logistics_env.watch import Session
@@ -52,13 +54,16 @@ def watch_command(
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
+    if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
+        raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
+    scenario = scenario_of(preset, scenario_file, changes)
     given = {policies.called(name): name for name in filter(None, (policy, against))}
     session = Session(
-        scenario_of(preset, scenario_file, changes),
+        scenario,
         policies.called(policy),
         None if against is None else policies.called(against),
         seed,
-        faults_of(faults),
+        faults_of(faults, scenario),
         speed,
         lambda name: policies.load(given.get(name, name), trust_code=trust_code),
     )

@@ -204,7 +204,7 @@ class SwarmLogisticsEnv(DictView):
 
     @property
     def is_watched(self) -> bool:
-        """Whether a step may pay or end something though its warehouse has nothing to tell."""
+        """Whether a step in which no event happens may pay a reward or end the episode."""
         return self._rewards.pays_steadily or self.max_cycles is not None
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:

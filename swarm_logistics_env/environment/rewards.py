@@ -189,6 +189,19 @@ def contact(world: Warehouse, before: Before) -> Earned:
     return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
 
 
+def blocked_request(world: Warehouse, before: Before) -> Earned:
+    """Seconds that a robot that cannot deliver held the requested item; weigh it negatively.
+
+    Privileged: such a robot only finds out inside the delivery area, as nothing happens there.
+    """
+    carrier = carrier_of_requested(world)
+    if carrier == NOBODY or world.state.delivers[carrier]:
+        return None
+    paid = np.zeros(world.state.n_robots)
+    paid[carrier] = world.scenario.control_period
+    return paid
+
+
 REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "delivery": delivery,
     "own_delivery": own_delivery,
@@ -198,6 +211,7 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "carrying": carrying,
     "carried_way": carried_way,
     "contact": contact,
+    "blocked_request": blocked_request,
 }
 POTENTIALS = frozenset({"carrying", "carried_way"})
 _AT_DELIVERIES = {"delivery", "own_delivery"}

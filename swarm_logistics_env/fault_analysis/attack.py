@@ -15,9 +15,12 @@ from swarm_logistics_env.fault_analysis.fault_search import Play, random_search,
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi import Estimate, robustness
 from swarm_logistics_env.studies.engines import Engine
+from swarm_logistics_env.studies.judged_comparisons import same_runs
+from swarm_logistics_env.studies.performance_table import Played, played
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.studies.store import Store
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
+from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.roles import ROLES
@@ -100,11 +103,14 @@ class AttackResult:
     Attributes:
         tried: how many different faults the search has tried.
         searched: how many there were to search.
+        is_capped: whether every item was delivered in a run without a fault on a fresh seed, so
+            that the faults may cost more than R tells.
     """
 
     found: tuple[Found, ...]
     tried: int
     searched: int
+    is_capped: bool
 
 
 def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
@@ -115,53 +121,69 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
 
     Raises:
         SetupError: as `Attack.faults`; or the policy delivers nothing without faults.
+        PolicyError: there is no such policy.
         StudyError: the directory cannot be used, or a run failed.
     """
     faults = asked.faults()
+    label, identity = policy_label(asked.policy), policy_identity(asked.policy)
+    policy = StudiedPolicy(label, identity, asked.policy)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(f"cannot write to {out}: {error.strerror}") from error
     with Store(out / STORE) as store:
-        players = _Players(asked, engine, store)
+        players = _Players(policy, asked.scenario, engine, store)
         play = players.search_play(faults)
         worst, trials = search(faults, play, asked.budget, asked.seed)
         at_random, _ = random_search(faults, play, asked.budget, asked.seed)
         named = [Fault(mode, asked.robots) for mode in asked.modes]
-        worst_named = int(np.argmin([p.mean() for p in players.played(named, range(_NAMED_SEEDS))]))
-        # Seeds that neither search can have met.
-        fresh = range(asked.budget, asked.budget + asked.fresh)
+        tries = players.played(named, range(_NAMED_SEEDS))
+        worst_named = int(np.argmin([runs.by_seed.mean() for runs in tries]))
+        # Seeds that neither search can have met, nor the choice among the named modes.
+        first = max(asked.budget, _NAMED_SEEDS)
+        fresh = range(first, first + asked.fresh)
         chosen = [
             ("search", faults[worst], asked.budget),
             ("random search", faults[at_random], asked.budget),
             ("named modes", named[worst_named], _NAMED_SEEDS * len(named)),
         ]
-        p_o, *p_f = players.played([None, *(fault for _, fault, _ in chosen)], fresh)
-    n = asked.scenario.n_robots
+        sound, *failed = players.played([None, *(fault for _, fault, _ in chosen)], fresh)
     return AttackResult(
         found=tuple(
-            Found(by, fault, robustness(p_o, p, n=n, m=asked.robots), runs)
-            for (by, fault, runs), p in zip(chosen, p_f, strict=True)
+            Found(by, fault, _robustness(asked, sound, with_fault), runs)
+            for (by, fault, runs), with_fault in zip(chosen, failed, strict=True)
         ),
         tried=len(set(trials.tried)),
         searched=len(faults),
+        is_capped=sound.saturated,
+    )
+
+
+def _robustness(asked: Attack, sound: Played, failed: Played) -> Estimate:
+    return robustness(
+        sound.by_seed,
+        failed.by_seed,
+        n=asked.scenario.n_robots,
+        m=asked.robots,
+        saturated=[name for name, runs in (("p_o", sound), ("p_f", failed)) if runs.saturated],
+        identical=same_runs(sound.digests, failed.digests),
     )
 
 
 class _Players:
     """Plays faults over seeds; every run is kept in a store and played once."""
 
-    def __init__(self, asked: Attack, engine: Engine, store: Store) -> None:
-        label, identity = policy_label(asked.policy), policy_identity(asked.policy)
-        self._policy = StudiedPolicy(label, identity, asked.policy)
-        self._scenario, self._engine, self._store = asked.scenario, engine, store
+    def __init__(
+        self, policy: StudiedPolicy, scenario: Scenario, engine: Engine, store: Store
+    ) -> None:
+        self._policy, self._scenario = policy, scenario
+        self._engine, self._store = engine, store
 
-    def played(
-        self, faults: Sequence[Fault | None], seeds: Sequence[int]
-    ) -> list[NDArray[np.float64]]:
-        """Return P of each fault (None: without one) over the seeds, shape (seeds,) each."""
-        pairs = [(fault, seed) for fault in faults for seed in seeds]
-        return list(np.reshape(self._delivered(pairs), (len(faults), len(seeds))))
+    def played(self, faults: Sequence[Fault | None], seeds: Sequence[int]) -> list[Played]:
+        """Return the runs of each fault (None: without one) over the seeds."""
+        outcomes = self._outcomes([(fault, seed) for fault in faults for seed in seeds])
+        n = len(seeds)
+        return [played(outcomes[place * n : (place + 1) * n]) for place in range(len(faults))]
 
     def search_play(self, faults: Sequence[Fault]) -> Play:
         """Return what plays a fault's k-th run with seed k, beside the run without a fault."""
@@ -180,6 +202,9 @@ class _Players:
         return play
 
     def _delivered(self, pairs: Sequence[tuple[Fault | None, int]]) -> NDArray[np.float64]:
+        return played(self._outcomes(pairs)).by_seed
+
+    def _outcomes(self, pairs: Sequence[tuple[Fault | None, int]]) -> list[Outcome]:
         code = WAREHOUSE.code()
         runs = [
             Condition(
@@ -194,4 +219,4 @@ class _Players:
             if outcome.error is not None:
                 raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
         outcomes = self._store.outcomes(runs)
-        return np.array([outcomes[run.key].delivered for run in runs], dtype=np.float64)
+        return [outcomes[run.key] for run in runs]

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from swarm_logistics_env.errors import FaultError
 from swarm_logistics_env.fault_analysis.fork import AfterOnset, Fork
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.spi.shapley import coalitions, shapley_values
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.failure_modes import failure_mode, lost_capabilities
 from swarm_logistics_env.warehouse.roles import ROLES
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_CAUSES = 6  # 2^6 copies of a world
 
@@ -58,65 +61,48 @@ class Losses(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Share:
-    """A row of an attribution: a mean over seeds of deliveries lost, with its interval.
-
-    Attributes:
-        name: of the role, capability or part; meaning: in words.
-        lost: deliveries lost per episode, with a t-interval over seeds.
-        robots: how many failed robots had that role, over all seeds; None for other rows.
-    """
-
-    name: str
-    meaning: str
-    lost: Interval
-    robots: int | None = None
-
-
-@dataclass(frozen=True)
 class Attribution:
-    """The losses of several seeds, summed up; see `attribute`."""
+    """The losses of several seeds; see `attribute`."""
 
     fault: Fault
     seeds: tuple[Losses, ...]
 
-    @property
-    def total(self) -> Share:
-        """All that the fault costs."""
-        return self._share("all", "deliveries lost after the onset", lambda each: each.total)
+    def table(self) -> pd.DataFrame:
+        """Return the deliveries lost per episode: in all, by role and by lost capability.
 
-    @property
-    def parts(self) -> tuple[Share, Share]:
-        """The loss of the robots' work, and what their staying in the arena costs beyond it."""
-        return (
-            self._share("missing work", "as if they had left", lambda each: each.missing_work),
-            self._share(
-                "staying", "beyond that, as they stay", lambda each: each.total - each.missing_work
-            ),
-        )
+        Returns:
+            A table with the columns `group`, `part`, `meaning`, `robots` (how many failed in that
+            role, over all seeds; missing where no role is asked), `lost` (mean over seeds), and
+            the limits `low` and `high` of its 95 % t-interval; these are missing at one seed. The
+            rows of each group but the first sum to the first row.
+        """
+        import pandas as pd
 
-    @property
-    def roles(self) -> tuple[Share, ...]:
-        """What failed robots cost by their role at the onset; the rows sum to the total."""
-        rows = []
+        total = np.array([each.total for each in self.seeds])
+        missing_work = np.array([each.missing_work for each in self.seeds])
+        rows: list[tuple[str, str, str, int | None, ArrayLike]] = [
+            ("in all", "all", "deliveries lost after the onset", None, total),
+            ("in all", "missing work", "as if they had left", None, missing_work),
+            ("in all", "staying", "beyond that, as they stay", None, total - missing_work),
+        ]
         for role, meaning in ROLES.items():
             in_role = [
                 [lost for its, lost in each.robots.values() if its == role] for each in self.seeds
             ]
-            interval = _interval([sum(lost) for lost in in_role])
-            rows.append(Share(role, meaning, interval, sum(map(len, in_role))))
-        return tuple(rows)
-
-    @property
-    def capabilities(self) -> tuple[Share, ...]:
-        """What each lost capability costs; the rows sum to the total."""
-        return tuple(
-            Share(name, MECHANISMS[name], _interval([e.capabilities[name] for e in self.seeds]))
-            for name in self.seeds[0].capabilities
-        )
-
-    def _share(self, name: str, meaning: str, lost: Callable[[Losses], float]) -> Share:
-        return Share(name, meaning, _interval([lost(each) for each in self.seeds]))
+            if failed := sum(map(len, in_role)):
+                lost = [sum(robots) for robots in in_role]
+                rows.append(("by role at the onset", role, meaning, failed, lost))
+        for name in self.seeds[0].capabilities:
+            lost = [each.capabilities[name] for each in self.seeds]
+            rows.append(("by lost capability", name, MECHANISMS[name], None, lost))
+        means = [t_interval(np.asarray(lost, dtype=np.float64)) for *_, lost in rows]
+        return pd.DataFrame(
+            [
+                (group, part.replace("_", " "), meaning, robots, *mean)
+                for (group, part, meaning, robots, _), mean in zip(rows, means)
+            ],
+            columns=["group", "part", "meaning", "robots", "lost", "low", "high"],
+        ).astype({"robots": "Int64"})
 
 
 def attribute(
@@ -206,7 +192,3 @@ def _part(fault: Fault, robots: Iterable[int], taken: Iterable[str] = ()) -> Fau
         mode = f"{mode.partition('[')[0]}[{','.join(lost)}]"
     factor = fault.factor if failure_mode(mode).factor else None
     return fault.replace(mode=mode, robots=tuple(sorted(robots)), factor=factor, role=None)
-
-
-def _interval(lost: Sequence[float]) -> Interval:
-    return t_interval(np.array(lost, dtype=np.float64))

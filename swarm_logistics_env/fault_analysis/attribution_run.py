@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import closing
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from swarm_logistics_env.errors import StudyError
@@ -21,15 +21,12 @@ from swarm_logistics_env.fault_analysis.attribution import (
 from swarm_logistics_env.policies.code_identity import code_digest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies.engines import workers
+from swarm_logistics_env.studies.store import write_csv
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_of
 from swarm_logistics_env.warehouse import Fault
 
 FINISHED, TABLE = "losses.jsonl", "attribution.csv"
-HEADINGS = (
-    *("policy", "fault", "seeds", "capped", "group"),
-    *("part", "meaning", "robots", "lost", "low", "high"),
-)
 
 
 def attribute_in(
@@ -84,20 +81,16 @@ def write_table(found: Attribution, policy: str, fault: str, out: Path) -> Path:
     Args:
         policy, fault: in words.
     """
-    capped = sum(each.is_capped for each in found.seeds)
-    groups = {
-        "in all": (found.total, *found.parts),
-        "by role at the onset": found.roles,
-        "by lost capability": found.capabilities,
+    seeds = found.seeds
+    about: dict[str, Any] = {
+        "policy": policy,
+        "fault": fault,
+        "seeds": len(seeds),
+        "capped": sum(each.is_capped for each in seeds),
+        "blocked_seconds": fmean(each.blocked_seconds for each in seeds),
+        "anchoring_seconds": fmean(each.anchoring_seconds for each in seeds),
     }
-    with (out / TABLE).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(HEADINGS)
-        for group, rows in groups.items():
-            for row in rows:
-                part = row.name.replace("_", " ")
-                about = policy, fault, len(found.seeds), capped, group
-                writer.writerow((*about, part, row.meaning, row.robots, *row.lost))
+    write_csv(out / TABLE, found.table().assign(**about))
     return out / TABLE
 
 
@@ -126,15 +119,22 @@ def _finished(path: Path, about: Mapping[str, Any]) -> dict[int, Losses]:
     if lines and not lines[-1].endswith("\n"):  # it was being written when the program was killed
         path.write_text("".join(lines[:-1]), encoding="utf-8")
         del lines[-1]
-    if not lines:
+    if len(lines) < 2:  # no seed is finished, whatever was asked then
+        path.unlink(missing_ok=True)
         return {}
-    there = json.loads(lines[0])
-    if different := [name for name in about if there.get(name) != about[name]]:
+    try:
+        there, *rows = map(json.loads, lines)
+        different = [name for name in about if dict(there).get(name) != about[name]]
+        found = [] if different else [Losses(**row) for row in rows]
+    except (TypeError, ValueError) as error:
+        raise StudyError(
+            f"{path} is damaged ({error}): should be deleted, and its seeds played again"
+        ) from None
+    if different:
         raise StudyError(
             f"{path.parent} holds an attribution with another {' and '.join(different)}: should be "
-            "another directory"
+            "another directory, as --out names it"
         )
-    found = [Losses(**json.loads(line)) for line in lines[1:]]
     return {
         each.seed: each._replace(
             robots={int(robot): (role, lost) for robot, (role, lost) in each.robots.items()}

@@ -67,7 +67,9 @@ class Fork:
             FaultError: as `failed_robots`.
         """
         state = self._play.world.state
-        occurrence = Occurrence(fault.replace(onset=0.0), self._play.seed, state.n_robots)
+        # It holds now, however short it is and whatever the sum of the control periods.
+        holding = fault.replace(onset=0.0, duration=None)
+        occurrence = Occurrence(holding, self._play.seed, state.n_robots)
         occurrence.choose_by_role(state)
         return tuple(occurrence.robots.tolist())
 

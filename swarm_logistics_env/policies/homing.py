@@ -7,9 +7,8 @@ free. A robot that stands still drives in a random direction for a moment. One t
 failure of its own leaves requested items to others, and lets go inside the area.
 
 What it leans on: the remembered direction is kept in the robot's own frame, which drifts, so the
-memory fades within ten seconds. It holds for robots that move sideways: this policy never commands
-a turn. Swarm D-T remembers no direction and does not need it.
-As it never turns, this policy is for the holonomic drive.
+memory fades within ten seconds. Swarm D-T remembers no direction and does not need it. This policy
+never commands a turn, so it is for robots that can move sideways (the holonomic drive).
 """
 
 from __future__ import annotations

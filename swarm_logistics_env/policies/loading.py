@@ -89,10 +89,8 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     )
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
-        raise PolicyError(
-            f"no policy {name!r}{_classes_of(name) or suggest(name, known)}, or "
-            "'package.module:Class', or a path"
-        )
+        near = f" (a name, 'package.module:Class' or a file){suggest(name, known)}"
+        raise PolicyError(f"no policy {name!r}{_classes_of(name) or near}")
     try:
         policy = make(**parameters)
     except SwarmLogisticsError:

@@ -16,8 +16,36 @@ from swarm_logistics_env.scenario import Scenario
 SUFFIX = ".zip"
 
 
-class StableBaselinesPolicy:
-    """A PPO model that stable-baselines3 saved; it gives its most likely command each time.
+class StableBaselinesModel:
+    """A PPO model that stable-baselines3 saved; it gives its most likely action each time.
+
+    It decides for one robot at a time, from the robot's observation row.
+
+    Args:
+        path: of the .zip file. Reading it executes the code in it.
+
+    Raises:
+        PolicyError: it cannot be read, or stable-baselines3 is missing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+        except OSError as error:
+            raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
+        self._model = read_model(path)
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode; nothing here is random."""
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[Any]:
+        """Return an action for each row of observations (N, D)."""
+        actions, _ = self._model.predict(observations, deterministic=True)
+        return np.asarray(actions)
+
+
+class StableBaselinesPolicy(StableBaselinesModel):
+    """A model for the warehouse.
 
     It should have learned from bare observation rows (D,) to give commands (4,), as from
     `adapters.SwarmVecEnv`; what normalised its observations is not in the file.
@@ -37,11 +65,7 @@ class StableBaselinesPolicy:
                 f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
                 "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
             )
-        try:
-            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-        except OSError as error:
-            raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
-        self._model = read_model(path)
+        super().__init__(path)
         found = self._model.observation_space.shape, self._model.action_space.shape
         wanted = (n_columns(Scenario()),), (4,)
         if found != wanted:
@@ -49,14 +73,6 @@ class StableBaselinesPolicy:
                 f"{path} maps observations {found[0]} to commands {found[1]}: should map "
                 f"{wanted[0]} to {wanted[1]}"
             )
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        """Begin an episode; nothing here is random."""
-
-    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return commands (N, 4) for observation rows (N, D)."""
-        commands, _ = self._model.predict(observations, deterministic=True)
-        return np.asarray(commands, dtype=np.float64)
 
 
 def read_model(path: Path) -> Any:

@@ -95,7 +95,9 @@ def _asked(results: StudyResults, matrix: VerdictMatrix) -> str:
     n, total = len(matrix.policies), sum(1 for _ in matrix.cells())
     policies = f", {n} policies" if n > 1 else ""
     seeds = wording.seeds_text(results).split(" (")[0]
-    said = f"{results.plan.specification.name}: {total} questions{policies}, {seeds}, Holm"
+    said = (
+        f"{results.plan.specification.name}: {_several(total, 'question')}{policies}, {seeds}, Holm"
+    )
     if results.indicators["flags"].str.contains("assumes_normal").eq(True).any():
         said += "; provisional below ten" if results.plan.paired else "; provisional"
     return f"{said}{'; exploratory' if results.exploratory else ''}."
@@ -104,12 +106,12 @@ def _asked(results: StudyResults, matrix: VerdictMatrix) -> str:
 def _counts(results: StudyResults) -> Iterator[str]:
     for policy, tests in groups_of(results.indicators, "policy"):
         claims = tests[tests["claim"].notna()]
-        what, verdicts = "questions", tests["conclusion"]
+        what, verdicts = "question", tests["conclusion"]
         if not claims.empty:
-            what, verdicts = "claims", claims["claim_verdict_holm"]
+            what, verdicts = "claim", claims["claim_verdict_holm"]
         counts = Counter(verdict or "blocked" for verdict in verdicts)
         said = (f"{counts[name]} {sign.word}" for name, sign in SIGNS.items() if counts[name])
-        yield f"{policy}: {', '.join(said)} of {len(verdicts)} {what}."
+        yield f"{policy}: {', '.join(said)} of {_several(len(verdicts), what)}."
     cells = [one for here in cells_against_baseline(results).values() for one in here]
     # Where the swarm is as it should be, or else in the first condition.
     base = [one for one in cells if one.cell.kind == "fault" and not one.cell.value] or cells
@@ -117,6 +119,10 @@ def _counts(results: StudyResults) -> Iterator[str]:
     if here:
         each = ", ".join(_performance(here[policy]) for policy in reversed(here))
         yield f"P at {_where(base[0])}: {each}."
+
+
+def _several(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _where(one: CellAgainstBaseline) -> str:
@@ -132,10 +138,15 @@ def _performance(one: CellAgainstBaseline) -> str:
 
 
 def _surprises(results: StudyResults) -> Iterator[str]:
-    """Yield the claims that are refuted, the furthest first, and where policies differ most."""
+    """Yield the claims that are refuted, the furthest first, and where policies differ most.
+
+    What rests on too little to be more than provisional surprises nobody, and so do runs that are
+    the same by construction.
+    """
     tests = results.indicators
-    several = len(tests["policy"].unique()) > 1
-    contrast = _contrast(tests) if several else None
+    is_solid = ~tests["flags"].str.contains("assumes_normal").eq(True) & tests["p_value"].notna()
+    tests = tests[is_solid]
+    contrast = _contrast(tests) if len(tests["policy"].unique()) > 1 else None
     if contrast:
         yield contrast
     refuted = tests[tests["claim_verdict_holm"] == "refuted"]
@@ -155,9 +166,23 @@ def _short(comparison: str) -> str:
 
 
 def _contrast(tests: pd.DataFrame) -> str | None:
-    """Return the question whose answers of two policies lie furthest apart, intervals disjoint."""
+    """Return the question whose answers of two policies lie furthest apart; None: none do.
+
+    The intervals are widened until all of them together hold the true values in 95 % (Bonferroni),
+    as the furthest of many answers lie apart by chance alone.
+    """
+    from scipy.special import stdtrit
+
     found: list[tuple[float, str]] = []
     known = tests[(tests["kind"] != "policy") & tests["low"].notna()]
+    if known.empty:
+        return None
+    df = known["n_seeds"].astype(float) - 1
+    wider = stdtrit(df, 1 - 0.025 / len(known)) / stdtrit(df, 0.5 + known["confidence"] / 2)
+    known = known.assign(
+        low=known["value"] - wider * (known["value"] - known["low"]),
+        high=known["value"] + wider * (known["high"] - known["value"]),
+    )
     for (_, indicator, comparison), here in groups_of(known, "table", "indicator", "comparison"):
         here = here.sort_values("value", kind="stable")
         worst, best = here.iloc[0], here.iloc[-1]
@@ -174,7 +199,9 @@ def _unanswered(results: StudyResults) -> str:
     """Return how many questions are open, and the seeds that would decide them."""
     tests = results.indicators
     blocked = int(tests["conclusion"].isna().sum())
-    said = [f"{blocked} blocked, since runs failed or are missing"] if blocked else []
+    reason = next(iter(tests["problem"].dropna()), "")
+    said = [f"{blocked} blocked, {'the first ' if blocked > 1 else ''}because {reason}"]
+    said = said if blocked else []
     left = tests[tests["conclusion"] == "inconclusive"]
     if left.empty:
         return f"Open: {'; '.join(said) or 'nothing'}."
@@ -185,9 +212,10 @@ def _unanswered(results: StudyResults) -> str:
         counts = (f"{seeds} seeds decide {(needed <= seeds).sum()}" for seeds in _BUDGETS)
         said.append(f"if the paper is right, {', '.join(counts)}")
     elif left["detectable"].notna().any():
-        low, high = left["detectable"].min(), left["detectable"].max()
+        least, most = (f"{x:.2f}" for x in (left["detectable"].min(), left["detectable"].max()))
+        size = least if least == most else f"{least} to {most}"
         said.append(
-            f"these seeds find an effect of {low:.2f} to {high:.2f} with 80 % power; `study power "
-            "DIR --effect X` counts the seeds for a smaller one"
+            f"these seeds find an effect of {size} with 80 % power; `study power DIR --effect X` "
+            "counts the seeds for a smaller one"
         )
     return f"{'; '.join(said)}."

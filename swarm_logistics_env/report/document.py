@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.studies.few_real_runs import narrowed, replays
@@ -16,7 +17,7 @@ from .answer import Answer, answer
 from .figures import Figure, indicator_figures, scaling_figure
 from .further_measures import budget_sections, load_sections, look_sections, size_sections
 from .policies_compared import policy_sections
-from .resilience_sections import resilience_sections
+from .resilience_sections import attribution_section, resilience_sections
 from .result_tables import Column, Section, table_section, tables, warnings
 from .setup_sheet import glossary, methods, setup_sheet
 from .wording import sentence
@@ -182,3 +183,15 @@ def with_simulation(whole: Document, real: StudyResults, simulated: StudyResults
         chapters=(*whole.chapters, Chapter("With simulation", "", (section,))),
         summary=(*whole.summary, section),
     )
+
+
+def with_attributions(whole: Document, folder: Path) -> Document:
+    """Return a report with a chapter on what `blame` found, in folders of the study's own."""
+    found = tuple(attribution_section(path) for path in sorted(folder.glob("*/attribution.csv")))
+    if not found:
+        return whole
+    text = (
+        "Which robots and which lost capabilities cost the deliveries that a fault costs, from "
+        "copies of the world at the onset. None of it enters a verdict above."
+    )
+    return replace(whole, chapters=(*whole.chapters, Chapter("Who is to blame", text, found)))

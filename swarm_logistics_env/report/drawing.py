@@ -1,7 +1,7 @@
 """Drawing with matplotlib, which is loaded only when a figure is drawn.
 
-Colours are Okabe and Ito's, every series has its own marker as well, and all ink is `INK` and all
-paper `PAPER`, so that a page can put its own colours in their place.
+The colours are those of Okabe and Ito, and every series has a marker of its own as well. Lines and
+letters are drawn in `INK` on `PAPER`, and a page puts its own colours in the place of these two.
 """
 
 from __future__ import annotations
@@ -271,6 +271,23 @@ def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None
             if curve.censored:
                 axes.plot(seconds[-1], share[-1], "x", color=colour, markersize=6, clip_on=False)
         axes.set(xlim=(0.0, None), ylim=(0.0, 1.05))
+
+
+def losses(canvas: Canvas, table: pd.DataFrame) -> None:
+    """Draw the deliveries that a fault costs, a panel for each group of parts, on one scale."""
+    groups = list(groups_of(table, "group"))
+    heights = [len(here) for _, here in groups]
+    panels = canvas.subplots(len(groups), 1, sharex=True, squeeze=False, height_ratios=heights)
+    for axes, (group, here) in zip(panels[:, 0], groups):
+        places = range(len(here))
+        axes.barh(places, here["lost"], color=COLOURS[0], height=0.6)
+        axes.hlines(places, here["low"], here["high"], color=INK, linewidth=1.5)
+        axes.set_yticks(places, here["part"])
+        axes.invert_yaxis()
+        axes.axvline(0.0, color=INK, linewidth=0.8)
+        axes.grid(visible=False)
+        axes.set_title(group)
+    panels[-1, 0].set_xlabel("deliveries lost after the onset, per episode")
 
 
 def _over_time(

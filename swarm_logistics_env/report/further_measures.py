@@ -24,6 +24,10 @@ _LAWS_TEXT = (
     "given; the better law by AICc stands first. N* is the size of the largest P; it "
     "moves with the weights, so it is quoted with its interval and its weights."
 )
+_CAPPED_TEXT = (
+    f"{wording.SATURATED}: at some size every item was delivered in a run, so P is capped there, "
+    "and the law bends too early."
+)
 _LAW_COLUMNS: list[Column] = [
     ("P(N) of", lambda row: row[0]),
     ("weights", lambda row: row[1].weighting),
@@ -53,11 +57,17 @@ def size_sections(results: StudyResults, series: tuple[SizeSeries, ...]) -> Iter
     if not series:
         return
     named = [(f"{one.policy or 'published runs'}: {one.table}", one) for one in series]
+    marks = [wording.SATURATED if one.cells["saturated"].any() else "" for one in series]
     yield table_section(
         "Scaling laws",
-        [(who, fit) for who, one in named for fit in one.fits],
+        [
+            (who + mark, fit)
+            for (who, one), mark in zip(named, marks, strict=True)
+            for fit in one.fits
+        ],
         _LAW_COLUMNS,
         _LAWS_TEXT,
+        *([_CAPPED_TEXT] if any(marks) else ()),
         *(f"{who}: no law is fitted: {one.problem}." for who, one in named if one.problem),
     )
     for who, one in named:

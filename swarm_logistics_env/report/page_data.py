@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import json
+import shlex
 import zlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -78,15 +80,20 @@ def watch_command(arm: Arm) -> str | None:
     condition = arm.condition
     if condition.task.name != DEFAULT or not isinstance(condition.policy.source, str):
         return None
-    words = ["swarm-logistics watch", f"--policy {condition.policy.source}"]
+    if condition.behaviour:
+        return None
+    words = ["swarm-logistics", "watch", "--policy", condition.policy.source]
     default = condition.task.default.model_dump(mode="json")
     for name, value in condition.scenario.model_dump(mode="json").items():
         if value != default[name]:
-            words.append(f"--set {name}={str(value).lower() if value in (True, False) else value}")
+            text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
+            words += ["--set", f"{name}={text}"]
     for fault in condition.faults:
+        if fault != type(fault)(fault.mode, fault.robots, fault.onset):
+            return None  # no option says how long it lasts, and the like
         start = f"@{fault.onset:g}" if fault.onset else ""
-        words.append(f"--fault {fault.mode}:{fault.robots}{start}")
-    return " ".join(words)
+        words += ["--fault", f"{fault.mode}:{fault.robots}{start}"]
+    return shlex.join(words)
 
 
 def _question(results: StudyResults, test: Row, places: dict[str, int]) -> dict[str, Any]:
@@ -149,7 +156,7 @@ def _short(told: str) -> str:
 
 
 def _over(row: Row) -> str:
-    """Return what stands on the axis of the categories."""
+    """Return the label of the axis of a figure on which the conditions stand."""
     factors = {
         "size": "swarm size N",
         "fault": "failure mode and number m of faulty robots",

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.verdict_signs import SIGNS
@@ -18,12 +19,14 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
 
 from .answer import digest
-from .attributions import with_attributions
-from .document import Document, document
+from .document import Document, document, with_attributions
 from .drawing import INK, PAPER, images
 from .page_data import page_data
 from .result_tables import Section
 from .verdict_matrix import matrix_lines
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 WIDTH = 100  # of the answer [characters]
 
@@ -157,21 +160,9 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         document: the report.
         drawings: inline SVG of every figure, by name.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("swarm_logistics_env", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["unbroken"] = _unbroken
-    environment.filters["arrows"] = _arrows
     matrix = document.answer.matrix
     data = page_data(results, matrix)
-    return environment.get_template("page.html.jinja").render(
+    return template("page.html.jinja").render(
         document=document,
         answer=document.answer,
         lines=tuple(matrix_lines(matrix)),
@@ -185,6 +176,23 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
     )
+
+
+def template(name: str) -> Template:
+    """Return a template of this folder, in which all text is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("swarm_logistics_env", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["unbroken"] = _unbroken
+    environment.filters["arrows"] = _arrows
+    return environment.get_template(name)
 
 
 def _unbroken(text: str) -> str:

@@ -1,4 +1,6 @@
-"""Sections on faults that begin during the run: resilience, self-repair, deliveries over time."""
+"""Sections on faults that begin during the run: resilience, self-repair, deliveries over time,
+and who is to blame for what they cost.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
+from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
@@ -22,7 +26,7 @@ from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_o
 from swarm_logistics_env.studies.results import StudyResults
 
 from . import wording
-from .drawing import rates, repairs
+from .drawing import losses, rates, repairs
 from .figures import Figure, slug
 from .result_tables import Column, Section, table_section
 
@@ -98,7 +102,11 @@ def resilience_sections(results: StudyResults) -> Iterator[Section]:
 
 
 def _verdict(estimate: Estimate | None) -> str:
-    return "undefined" if estimate is None else estimate.verdict
+    if estimate is None:
+        return "undefined"
+    if estimate.identical:
+        return wording.UNAFFECTED
+    return estimate.verdict + (wording.SATURATED if "capped" in estimate.flags else "")
 
 
 def _seconds(repair: SelfRepair) -> str:
@@ -181,3 +189,63 @@ def _where(policy: str, table: str, n_robots: int) -> str:
 
 def _members(test: Row) -> str:
     return f"m = {test.after:g}"
+
+
+_LOSSES: list[Column] = [
+    ("what", lambda row: row.part),
+    ("meaning", lambda row: row.meaning),
+    ("robots", lambda row: f"{row.robots:.0f}" if wording.is_known(row.robots) else ""),
+    (
+        "deliveries lost [95 %]",
+        lambda row: wording.bracketed(Interval(row.lost, row.low, row.high), 2),
+    ),
+]
+
+
+_COLUMNS = (
+    *("policy", "fault", "seeds", "capped", "blocked_seconds", "anchoring_seconds"),
+    *("group", "part", "meaning", "robots", "lost", "low", "high"),
+)
+
+
+def attribution_section(path: Path) -> Section:
+    """Return the table of losses that `blame` wrote (`attribution.csv`), with its figure.
+
+    Raises:
+        StudyError: it wrote none such.
+    """
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(path)
+        one = next(rows_of(table[list(_COLUMNS)]))
+    except (OSError, KeyError, ValueError, StopIteration):
+        raise StudyError(
+            f"{path} is no table of this version of `blame`: should be written anew by the same "
+            "command, or be deleted"
+        ) from None
+    title = f"{one.policy}: deliveries that {one.fault} costs, per episode"
+    over = f"Means over {one.seeds} seeds" if one.seeds > 1 else "Of one seed, without an interval"
+    means = (
+        f"{over}. The rows of roles sum to all, and so do those of lost "
+        "capabilities (Shapley values); robots: how many failed in that role, over all seeds."
+    )
+    contacts = (
+        f"The requested item was held by a failed robot for {one.blocked_seconds:.0f} s, and "
+        f"working robots touched failed ones for {one.anchoring_seconds:.0f} robot-seconds."
+    )
+    lines = [means, contacts]
+    if one.capped:
+        lines.append(
+            f"Capped: in {one.capped} of them every item was delivered without the fault, so it "
+            "costs more than is shown. Where items come back (restock) there is no cap."
+        )
+    figure = Figure(
+        slug(path.parent.name),
+        f"{title}, with 95 % intervals over {one.seeds} seeds.",
+        table,
+        1.0 + 0.3 * len(table),
+        partial(losses, table=table),
+    )
+    section = table_section(title, rows_of(table), _LOSSES, *lines)
+    return replace(section, figures=(figure,))

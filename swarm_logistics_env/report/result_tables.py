@@ -214,7 +214,7 @@ def warnings(results: StudyResults) -> Iterator[str]:
             "refute it."
         )
     if results.exploratory:
-        because = "seeds were added after the study began"
+        because = "they are over other seeds than the study declared before its first run"
         if results.looks:
             because = "the study is judged at a look that was not declared before its first run"
         yield f"The verdicts are exploratory: {because}, so they err more often than their level."

@@ -47,8 +47,10 @@ class Line:
     @property
     def text(self) -> str:
         """The value with its interval."""
+        if not wording.is_known(self.value):
+            return wording.NOTHING
         if self.name == "fault budget":
-            return f"{self.value:.0f}" if wording.is_known(self.value) else wording.NOTHING
+            return f"{self.value:.0f}"
         digits = wording.digits_of(self.value) if self.name == "P" else 3
         return wording.bracketed(Interval(self.value, self.low, self.high), digits)
 

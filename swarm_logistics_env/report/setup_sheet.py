@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 
 from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
@@ -79,8 +79,13 @@ def _failure_modes(plan: Plan) -> Iterator[Section]:
     modes = dict.fromkeys(fault.mode for c in plan.conditions for fault in c.faults)
     known = plan.conditions[0].task.failure_modes
     if modes:
-        rows = tuple((mode, known[mode]) for mode in modes)
+        rows = tuple((mode, _described(mode, known)) for mode in modes)
         yield Section("Failure modes", ("mode", "what it does to a robot"), rows)
+
+
+def _described(mode: str, known: Mapping[str, str]) -> str:
+    whole, _, lost = mode.partition("[")
+    return f"{known[whole]}; of this: {lost[:-1].replace(',', ', ')}" if lost else known[whole]
 
 
 def _variations(plan: Plan) -> Iterator[str]:
@@ -92,6 +97,9 @@ def _variations(plan: Plan) -> Iterator[str]:
         if differing:
             title = factor.title or type(factor).__name__
             yield f"{title} differs: {', '.join(differing)}."
+    for faults in asked.faults:
+        if manner := str(faults):
+            yield f"{faults.title or 'Faults'}: robots fail {manner}."
 
 
 def _recorded_setup(plan: Plan) -> tuple[Section, ...]:
@@ -165,7 +173,7 @@ _WORDS = (
     ("equivalent", "the indicator is open, but P changes by less than the declared margin"),
     ("open, inconclusive", "these seeds cannot tell"),
     ("same runs, unaffected", "both conditions gave the same runs: exact, and no evidence"),
-    ("blocked", "runs failed or are missing"),
+    ("blocked", "runs failed or are missing, or nothing was delivered in the reference"),
     ("Holm", "adjustment of a family of verdicts so that any error among them has 5 % at most"),
     ("provisional", "the verdict assumes normal differences: below ten seeds, or unpaired"),
     ("claim", "what the reference says of an indicator"),

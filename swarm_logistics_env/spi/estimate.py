@@ -108,7 +108,9 @@ class Estimate:
         limits = ""
         if self.low is not None and self.high is not None and not self.identical:
             limits = f" [{self.low:.3f}, {self.high:.3f}]"
-        n = f"{self.n_seeds} {'paired seeds' if self.paired else 'runs a condition'}"
+        unit = "paired seed" if self.paired else "run"
+        n = f"{self.n_seeds} {unit}{'' if self.n_seeds == 1 else 's'}"
+        n += "" if self.paired else " a condition"
         p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
         return (
             f"{shown.mark} {self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "

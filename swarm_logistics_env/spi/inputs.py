@@ -85,7 +85,7 @@ def between_0_and_1(name: str, value: float) -> float:
 
 
 def delivery_times(name: str, runs: Sequence[ArrayLike]) -> list[Numbers]:
-    """Delivery times [s] of each seed, ascending: at least one seed, finite, not negative."""
+    """Return delivery times [s] of each seed, ascending: at least one seed, finite, 0 or more."""
     if len(runs) == 0:
         raise IndicatorError(f"{name} is empty: should hold the delivery times of each seed")
     checked = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,8 @@ def resilience_index(
     threshold: float = 1.0,
     confidence: float = 0.95,
     paired: bool = True,
+    saturated: Collection[str] = (),
+    identical: bool = False,
 ) -> Estimate:
     """Deliveries after the onset over the paired reference's, as a ratio of means over seeds.
 
@@ -32,6 +34,8 @@ def resilience_index(
         threshold: What the index is tested against.
         confidence: Of the interval, in (0, 1).
         paired: Whether both share their seeds, run by run.
+        saturated: "faulty" or "reference", or both: where a run delivered every item.
+        identical: Whether both are the same runs, seed by seed.
 
     Raises:
         IndicatorError: No seeds, unequal numbers of seeds, a time negative or not finite, or no
@@ -53,4 +57,6 @@ def resilience_index(
         threshold=threshold,
         confidence=confidence,
         paired=paired,
+        saturated=saturated,
+        identical=identical,
     )

@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -32,8 +32,12 @@ def look_alphas(
             in proportion to the seeds (Kim and DeMets 1987), so that clear cases stop early.
 
     Raises:
-        IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1).
+        IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1); no such spending.
     """
+    if spending not in get_args(Spending):
+        raise IndicatorError(
+            f"spending = {spending!r}: should be one of {', '.join(get_args(Spending))}"
+        )
     between_0_and_1("alpha", alpha)
     seeds = [count("look", look) for look in looks]
     if not seeds or any(later <= earlier for earlier, later in pairwise(seeds)):

@@ -21,7 +21,6 @@ _FAULTS = {
     REPEATED: ("none again", "keine nochmal"),
 }
 _FAULT_NAMES = {word: name for name, words in _FAULTS.items() for word in (name, *words)}
-_KINDS = ("size", "fault", "parameter")
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Trial:
     Attributes:
         line: of the file, for an event log that of its first row.
         policy: what controlled the robots.
-        table: "" in the wide form; in the long form the kind and name, whose P_o is its own.
+        table: of the file's tables, each of which has a P_o of its own; "" where none is named.
         n_robots: swarm size N; None: not given.
         fault: "none", "removed" (the m robots are not there), or a failure mode of any name.
         faulty: m, 0 without a fault.
@@ -119,12 +118,12 @@ def read_trials(
 ) -> Trials:
     """Read one run a row, or one delivery a row (an event log), from a CSV file.
 
-    Delimiter (comma, semicolon, tab) and decimal sign are found out. The wide form has columns
-    `robots`, `fault`, `faulty`, `onset`, `policy`, `seed`, `trial` and `performance`, or words of
+    Delimiter (comma, semicolon, tab) and decimal sign are found out. The columns are `robots`,
+    `fault`, `faulty`, `onset`, `policy`, `seed`, `trial` and `performance`, or words of
     `trials_table.NAMES` for them, as far as they apply; any other column of numbers that vary is a
     parameter of that name. An event log has `time` instead of `performance`; a run without any
-    delivery is a row with an empty time. The long form has `kind` (size, fault, parameter), `name`
-    and `value` instead; there each kind and name has runs of its own.
+    delivery is a row with an empty time. A column `table` tells tables apart of which each has
+    runs of its own, also without a fault.
 
     Args:
         columns: what a column is to its name in the file, e.g. {"performance": "boxes"}.
@@ -193,33 +192,18 @@ def _events(table: Table, duration: float | None) -> list[Trial]:
 
 
 def _trial(table: Table, line: int, duration: float | None, performance: float) -> Trial:
-    kind = name = ""
-    fault, faulty, parameters = NO_FAULT, 0, table.parameters(line)
     n_robots = table.whole(line, "n_robots", least=1)
-    if "kind" in table.places:
-        kind, name = table.text(line, "kind"), table.text(line, "name")
-        if kind not in _KINDS:
-            raise table.error(line, "kind", f"should be one of {', '.join(_KINDS)}")
-        if kind == "size":
-            n_robots = table.needed_whole(line, "value", least=1)
-        elif kind == "parameter":
-            parameters = ((name, table.number(line, "value")), *parameters)
-        else:
-            fault, faulty = name, table.needed_whole(line, "value", least=0)
-    else:
-        fault = table.text(line, "fault")
-        faulty = table.whole(line, "faulty", least=0) or 0
+    fault, faulty = table.text(line, "fault"), table.whole(line, "faulty", least=0) or 0
     fault = _FAULT_NAMES.get(fault.lower(), fault)
     is_fault = fault not in (NO_FAULT, REPEATED)
-    count = "value" if kind else "faulty"
     if is_fault and not faulty:
-        raise table.error(line, count, f"should be how many robots fail by {fault!r}, 1 or more")
+        raise table.error(line, "faulty", f"should be how many robots fail by {fault!r}, 1 or more")
     if faulty and not is_fault:
-        raise table.error(line, count, "should be 0 without a fault, or the fault be named")
-    if kind in ("", "fault") and is_fault and n_robots is None:
+        raise table.error(line, "faulty", "should be 0 without a fault, or the fault be named")
+    if is_fault and n_robots is None:
         raise table.error(line, "n_robots", "should be the swarm's size, or R is undefined")
     if n_robots is not None and faulty >= n_robots:
-        raise table.error(line, count, f"should be less than the {n_robots} robots")
+        raise table.error(line, "faulty", f"should be less than the {n_robots} robots")
     onset = table.number(line, "onset", least=0.0) if table.text(line, "onset") else 0.0
     if table.text(line, "duration"):
         duration = table.number(line, "duration", least=0.0)
@@ -228,13 +212,13 @@ def _trial(table: Table, line: int, duration: float | None, performance: float) 
     return Trial(
         table.lines[line],
         table.text(line, "policy") or "recorded",
-        f"{kind} {name}" if kind == "parameter" else kind,
+        table.text(line, "table"),
         n_robots,
         fault,
         faulty,
         # Without a fault nothing fails at any time, whatever the column says.
         onset if is_fault else 0.0,
-        parameters,
+        table.parameters(line),
         table.whole(line, "seed", least=0),
         performance,
         duration=duration,

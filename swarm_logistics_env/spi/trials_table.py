@@ -28,13 +28,11 @@ NAMES: dict[str, tuple[str, ...]] = {
     "trial": ("run", "id", "repetition", "versuch", "lauf", "nr"),
     "time": ("t", "delivery_time", "delivered_at", "zeit", "zeitpunkt"),
     "duration": ("length", "trial_length", "dauer"),
-    "kind": (),
-    "name": (),
-    "value": (),
+    "table": ("tabelle",),
 }
 _MEANING = {word: column for column, words in NAMES.items() for word in (column, *words)}
-_LONG = ("kind", "name", "value")
 _COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
@@ -76,12 +74,10 @@ class Table:
         return self._number(row, self.places[column], least)
 
     def whole(self, row: int, column: str, *, least: int) -> int | None:
-        """Return a cell as a whole number; None where it is empty or there is no such column."""
-        return self.needed_whole(row, column, least=least) if self.text(row, column) else None
-
-    def needed_whole(self, row: int, column: str, *, least: int) -> int:
-        """Return a cell as a whole number of at least `least`."""
-        value = self._parsed(self.rows[row][self.places[column]])
+        """Return a cell as a whole number of at least `least`; None: it is empty or not there."""
+        if not (cell := self.text(row, column)):
+            return None
+        value = self._parsed(cell)
         if value is None or not (value >= least and value == int(min(value, 1e15))):
             raise self.error(row, column, f"should be a whole number, {least} or more")
         return int(value)
@@ -131,12 +127,14 @@ class Table:
     def _decimal_comma(self) -> bool:
         """Whether decimals have a comma; a file with both signs could mean anything."""
         first: dict[str, tuple[int, int]] = {}
+        only_thousands = True  # as far as can be seen
         places = [*(p for name, p in self.places.items() if name not in _TEXTS), *self.others]
         for row, cells in enumerate(self.rows):
             for place in places:
                 for sign, form in ((",", _COMMA), (".", _POINT)):
                     if form.fullmatch(cells[place]):
                         first.setdefault(sign, (row, place))
+                        only_thousands &= _THOUSANDS.fullmatch(cells[place]) is not None
         if len(first) == 2:
             raise self._error(
                 *first["."],
@@ -144,10 +142,16 @@ class Table:
                 f"({self.rows[first[','][0]][first[','][1]]!r}), or all a point; no sign between "
                 "thousands",
             )
+        if first and only_thousands:
+            raise self._error(
+                *first[","],
+                "could be thousands or decimals: should have a point before decimals, and no sign "
+                "between thousands",
+            )
         return "," in first
 
 
-_TEXTS = ("fault", "policy", "trial", "kind", "name")
+_TEXTS = ("fault", "policy", "trial", "table")
 
 
 def read_table(path: Path, columns: dict[str, str], ignore: tuple[str, ...]) -> tuple[Table, bytes]:
@@ -233,13 +237,6 @@ def _columns(
             )
         else:
             places[known] = place
-    long = [column for column in _LONG if column in places]
-    if long and len(long) < len(_LONG):
-        lacking = next(column for column in _LONG if column not in places)
-        raise IndicatorError(
-            f"{path} has no column {lacking!r}, as it has {long[0]!r}: should have kind, name and "
-            f"value, or none of them (--ignore {header[places[long[0]]]!r})"
-        )
     return places, tuple(others)
 
 

@@ -17,8 +17,10 @@ from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.self_repair import SelfRepair
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.spi.survival import SurvivalCurve
+from swarm_logistics_env.tasks.task import Outcome
 
 from .comparisons import Comparison
+from .judged_comparisons import same_runs
 from .performance_table import Row, rows_of
 from .results import StudyResults, Times
 
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Pair = tuple[Times, Times]
+Outcomes = tuple[Outcome, ...]
 
 
 class RepairCurve(NamedTuple):
@@ -73,8 +76,8 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
     for comparison in mid_run_faults(results)["compared"]:
         m, n = comparison.changed.setting.value, comparison.original.condition.size
-        faulty, whole = map(results.times_of, (comparison.changed, comparison.original))
-        removed = results.times_of(comparison.removed) if comparison.removed else None
+        faulty, whole = map(results.outcomes_of, (comparison.changed, comparison.original))
+        removed = results.outcomes_of(comparison.removed) if comparison.removed else None
         if faulty is None or whole is None or (comparison.removed and removed is None):
             continue
         onset, paired = comparison.changed.setting.onset, results.plan.paired
@@ -86,7 +89,7 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
             if removed is None:
                 raise StudyError("no runs with the robots removed are there to compare with")
             null = _null(results, comparison)
-            repair = _self_repair(comparison, (faulty, removed), null)
+            repair = _self_repair(comparison, (_times(faulty), _times(removed)), null)
         except (StudyError, spi.IndicatorError) as error:
             yield Resilience(comparison, *indices, problem=str(error))
         else:
@@ -103,12 +106,23 @@ def mid_run_faults(results: StudyResults) -> pd.DataFrame:
     return late[np.array(kept, dtype=np.bool_)]
 
 
+def _times(runs: Outcomes) -> Times:
+    return tuple(run.delivery_times for run in runs)
+
+
 def _index(
-    faulty: Times, reference: Times, onset: float, threshold: float, *, paired: bool
+    faulty: Outcomes, reference: Outcomes, onset: float, threshold: float, *, paired: bool
 ) -> Estimate | None:
+    named = {"faulty": faulty, "reference": reference}
     try:
         return spi.resilience_index(
-            faulty, reference, onset=onset, threshold=threshold, paired=paired
+            _times(faulty),
+            _times(reference),
+            onset=onset,
+            threshold=threshold,
+            paired=paired,
+            saturated=[name for name, runs in named.items() if any(r.all_delivered for r in runs)],
+            identical=same_runs([r.digest for r in faulty], [r.digest for r in reference]),
         )
     except spi.IndicatorError:  # nothing is delivered after the onset in the reference
         return None
@@ -251,6 +265,8 @@ def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
         if any(outcome.anchoring_seconds is None for outcome in outcomes):
             continue  # the task does not tell
         (fault,) = comparison.changed.condition.faults
+        if getattr(fault, "intermittent", None) is not None:
+            continue  # how long each robot had failed is not recorded
         end = fault.onset + (fault.duration or math.inf)
         seconds = np.array([outcome.anchoring_seconds for outcome in outcomes], dtype=np.float64)
         lasted = np.array([max(0.0, min(o.ended_at, end) - fault.onset) for o in outcomes])

@@ -8,7 +8,8 @@ P_old of every condition under which both judge a policy, over the seeds that th
 fails where R lies below 0 beyond chance, "possibly R < 0" wherever that is not ruled out, for want
 of seeds as well.
 `at` keeps the comparisons and conditions whose name holds the text, e.g. "R < 0 at FM4, m = 1".
-Verdicts are Holm-adjusted over what is kept. What cannot be judged fails: a policy without a match
+Verdicts are Holm-adjusted over what is kept, and at one of the newer study's declared looks they
+are as strict as those of its report. What cannot be judged fails: a policy without a match
 in the other study, failed runs, studies that share no seed. If both studies have the same runs, the
 change is exactly 0, and the gate fails if "0 < number" (or ">") is true.
 """
@@ -107,7 +108,8 @@ class Answer:
     Attributes:
         name: policy, subject and comparison.
         fails: whether it makes the gate fail; what cannot be judged does.
-        estimate: against the gate's number; None: it is exact, or cannot be judged.
+        estimate: the indicator tested against the gate's number; None: it is exact, or cannot be
+            judged.
         verdict: on "above the number", Holm-adjusted over the gate's estimates.
         exact: the value where the runs compared are the same runs, so that nothing is estimated.
         problem: why it cannot be judged.
@@ -164,7 +166,9 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
             name += f" ({comparison.table})"
         if gate.at not in name:
             continue
-        found = estimate_of(comparison, new.by_arm, paired=new.plan.paired)
+        found = estimate_of(
+            comparison, new.by_arm, paired=new.plan.paired, confidence=new.confidence
+        )
         yield name, found.value if isinstance(found, Estimate) and found.identical else found
 
 
@@ -205,6 +209,7 @@ def _change(
             p_o,
             p_new,
             threshold=gate.number,
+            confidence=new.confidence,
             paired=seeds is not None,
             saturated=[
                 name for name, cell in (("p_o", before), ("p_new", after)) if cell.saturated

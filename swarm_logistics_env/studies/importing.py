@@ -167,16 +167,15 @@ def _tables(origin: Origin) -> Iterator[tuple[str, _Arms]]:
     for policy, table in dict.fromkeys((row.policy, row.table) for row in origin.trials):
         here = [row for row in origin.trials if (row.policy, row.table) == (policy, table)]
         plain = [row for row in here if row.fault == NO_FAULT]
-        if table in ("", "size"):
-            sized = [row for row in plain if row.n_robots is not None]
-            arms_of = partial(_size_arms, origin)
-            yield from _split("Scalability", sized, lambda row: row.parameters, arms_of)
-        if table in ("", "fault"):
-            title = "Fault tolerance and robustness"
-            yield from _split(title, here, _all_but(None), partial(_fault_arms, origin))
+        sized = [row for row in plain if row.n_robots is not None]
+        of = f"{table}: " if table else ""
+        arms_of = partial(_size_arms, origin)
+        yield from _split(f"{of}Scalability", sized, lambda row: row.parameters, arms_of)
+        title = f"{of}Fault tolerance and robustness"
+        yield from _split(title, here, _all_but(None), partial(_fault_arms, origin))
         for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
             arms_of = partial(_parameter_arms, origin, name, dict(plain[0].parameters)[name])
-            yield from _split(f"Adaptability to {name}", plain, _all_but(name), arms_of)
+            yield from _split(f"{of}Adaptability to {name}", plain, _all_but(name), arms_of)
 
 
 def _split(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 from pydantic_core import to_json
@@ -33,15 +33,7 @@ class StoredSpecification(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True)
 
     name: str
-    seeds: _Count
-    policies: tuple[Any, ...]
-    first_seed: _Seed
     task: str
-
-    @property
-    def seed_numbers(self) -> range:
-        """The seeds of every condition."""
-        return range(self.first_seed, self.first_seed + self.seeds)
 
     def read(
         self, place: Path, *, task: Task | None = None, trust_code: bool = False
@@ -91,7 +83,8 @@ class Declaration(BaseModel):
         if plan.imported_from is not None:
             return True  # nothing is added to what was imported
         if not self.looks:
-            return plan.seeds[0] in self.seed_numbers and plan.seeds[-1] in self.seed_numbers
+            # A part of the declared seeds is a choice as well, made with the results at hand.
+            return plan.seeds == self.seed_numbers
         return (
             len(plan.seeds) in self.looks
             and plan.specification.looks == self.looks
@@ -119,7 +112,7 @@ def _counted(seeds: Sequence[int]) -> str:
 
 
 class Origin(BaseModel):
-    """Where recorded trials came from.
+    """The source of recorded trials.
 
     Attributes:
         file: its name.
@@ -212,85 +205,45 @@ def rows_of(
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
-    """Write the runs of several stores into a new one; return how many runs it holds.
+    """Write the runs of one study's shards into a new store; return how many runs it holds.
 
-    The studies must be one but for their seeds and their policies, of which the merged one has
-    all. A run that failed in one store and succeeded in another succeeded. Only the seeds that
-    every study declared count as declared, so verdicts over more of them are exploratory.
+    A run that failed in one store and succeeded in another succeeded.
 
     Args:
-        directories: of the studies.
+        directories: of the stores.
         out: directory of the merged one; it may hold theirs, but no study of its own.
 
     Raises:
-        StudyError: a store cannot be read, the studies differ, seeds lie between theirs that none
-            has, two stores have different results of one run, or `out` holds a study.
+        StudyError: a store cannot be read, they are not of one study, two of them have different
+            results of one run, or `out` holds a study.
     """
     refuse_study_in(out, "merge")
     stored = {directory: of_existing(directory) for directory in directories}
-    for directory, found in stored.items():
-        if found.imported is not None:
+    first, one = next(iter(stored.items()))
+    for directory, other in stored.items():
+        if other.imported is not None:
             raise StudyError(f"{directory} was imported: only studies that were run are merged")
-    merged = _united(stored)
+        if differing := _differing(one, other):
+            raise StudyError(
+                f"{first} and {directory} differ in {', '.join(differing)}: should be shards of "
+                "one study"
+            )
     with new_store(out) as store:
         for directory in directories:
             store.absorb(directory / FILE_NAME)
-        store.note(merged)
+        store.note(rows_of(one.specification, one.code, one.identities, one.declared))
         return len(store)
 
 
-def _united(stored: dict[Path, Metadata]) -> dict[str, str]:
-    """Return the metadata of studies as that of one."""
-    # Sort by seeds, so that each study joins the seeds of those before it.
-    first, *others = sorted(
-        stored, key=lambda directory: stored[directory].specification.first_seed
+def _differing(one: Metadata, other: Metadata) -> list[str]:
+    """Return in words what two studies do not have in common."""
+    mine, theirs = (
+        {
+            **found.specification.model_dump(),
+            "code version": found.code,
+            "the code of their policies": found.identities,
+            "what they declared": found.declared,
+        }
+        for found in (one, other)
     )
-    one = stored[first]
-    fields, identities, declared = one.specification.model_dump(), one.identities, one.declared
-    for directory in others:
-        other = stored[directory]
-        if other.code != one.code:
-            raise StudyError(
-                f"{first} was played under code version {one.code}, {directory} under "
-                f"{other.code}: a verdict never mixes two versions"
-            )
-        for name in ("looks", "margin"):
-            if getattr(other.declared, name) != getattr(declared, name):
-                raise StudyError(f"{first} and {directory} declared different {name}")
-        fields = _joined(fields, other.specification, first, directory)
-        for part in identities.keys() & other.identities.keys():
-            if identities[part] != other.identities[part]:
-                raise StudyError(
-                    f"the {part} of {first} is not the one of {directory}: its code differs"
-                )
-        identities = {**identities, **other.identities}
-        mine, theirs = declared.seed_numbers, other.declared.seed_numbers
-        both = range(max(mine.start, theirs.start), min(mine.stop, theirs.stop))
-        # Without a common seed any part will do: nobody declared the whole.
-        if both:
-            common = {"first_seed": both.start, "seeds": len(both)}
-            declared = declared.model_copy(update=common)
-    return rows_of(fields, one.code, identities, declared)
-
-
-def _joined(
-    fields: dict[str, Any], other: StoredSpecification, first: Path, directory: Path
-) -> dict[str, Any]:
-    """Return the fields of a specification, with the seeds and the policies of another as well."""
-    theirs = other.model_dump()
-    free = ("first_seed", "seeds", "policies")
-    names = [name for name in {**fields, **theirs} if name not in free]
-    differing = [name for name in names if fields.get(name) != theirs.get(name)]
-    if differing:
-        raise StudyError(f"{first} and {directory} differ in {', '.join(differing)}: not one study")
-    stop = fields["first_seed"] + fields["seeds"]
-    if other.first_seed > stop:
-        raise StudyError(
-            f"{directory} has the seeds from {other.first_seed} on, the studies before it end with "
-            f"seed {stop - 1}: seeds lie between them that no study has, and to judge them as one "
-            "study each seed is needed"
-        )
-    seeds = max(stop, other.seed_numbers.stop) - fields["first_seed"]
-    policies = [*fields["policies"], *theirs["policies"]]
-    distinct = [policy for n, policy in enumerate(policies) if policy not in policies[:n]]
-    return {**fields, "seeds": seeds, "policies": distinct}
+    return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]

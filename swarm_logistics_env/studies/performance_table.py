@@ -38,7 +38,10 @@ PERFORMANCE: Columns = {
     "high": (float, "upper limit of it"),
     "prediction_low": (float, "lower limit of the 95 % interval of one further run"),
     "prediction_high": (float, "upper limit of it"),
-    "published_inside": (object, "whether the published P lies in that interval; None: unknown"),
+    "published_inside": (
+        object,
+        "whether the published P lies in the interval of one run; None: unknown",
+    ),
     "saturated": (bool, "whether a run delivered every item, so that P is capped"),
     "problem": (object, "why runs are missing; None: they are complete"),
     "arm": (object, "the setting and the condition"),

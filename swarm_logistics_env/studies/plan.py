@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 
-from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, load_reference
 from .runs import Condition, Run, StudiedPolicy
 from .specification import Ablation, Factor, Faults, Parameter, Sizes, Specification
 
@@ -99,9 +100,11 @@ def make_plan(
         identities: of its policies when it was played; None: they are loaded and asked.
 
     Raises:
-        StudyError: the specification varies nothing, or a step of it cannot be.
+        StudyError: the specification varies nothing, a step of it cannot be, two factors with one
+            heading vary the same under different conditions, or there is no such reference.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
+    load_reference(specification.reference)  # a name that is wrong is told before anything is run
     known: dict[str, str] = {}
 
     def policy_of(part: str, source: object) -> StudiedPolicy:
@@ -115,11 +118,13 @@ def make_plan(
         known[part] = policy.identity
         return policy
 
+    asked = _asked(specification, policy_of)
+    # What two factors ask alike is asked once, or Holm's family would count it twice.
     comparisons = tuple(
-        comparison
-        for comparison in _asked(specification, policy_of)
-        if comparison.indicator in specification.indicators
+        dict.fromkeys(one for one in asked if one.indicator in specification.indicators)
     )
+    if code is None:  # what was played so stays readable
+        _refuse_one_name_for_two(comparisons)
     if not comparisons:
         raise StudyError(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
@@ -132,6 +137,18 @@ def make_plan(
         if one.removed and one.changed.setting.onset
     }
     return Plan(specification, comparisons, code or specification.played.code(), known, nulls)
+
+
+def _refuse_one_name_for_two(comparisons: Sequence[Comparison]) -> None:
+    found: dict[object, str] = {}
+    for comparison in comparisons:
+        for arm in comparison.arms:
+            place = comparison.policy, comparison.table, arm.setting
+            if found.setdefault(place, arm.condition.key) != arm.condition.key:
+                raise StudyError(
+                    f"title = {comparison.table!r} heads {str(arm.setting)!r} under two different "
+                    "conditions: each factor should have a title of its own"
+                )
 
 
 def _asked(
@@ -154,9 +171,9 @@ def _asked(
                 yield from _ablation(specification, ablation, policy, part)
 
 
-def _title(factor: Factor, general: str) -> str:
-    changes = ", ".join(f"{name} = {value}" for name, value in factor.scenario.items())
-    return factor.title or (f"{general} ({changes})" if changes else general)
+def _title(factor: Factor, general: str, manner: str = "") -> str:
+    changes = [*filter(None, [manner]), *(f"{name} = {x}" for name, x in factor.scenario.items())]
+    return factor.title or (f"{general} ({', '.join(changes)})" if changes else general)
 
 
 def _scalability(asked: Specification, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
@@ -190,7 +207,7 @@ def _robustness(
 
     An indicator that needs robots removed is left out where the task cannot remove any.
     """
-    task, table = asked.played, _title(faults, "Fault tolerance and robustness")
+    task, table = asked.played, _title(faults, "Fault tolerance and robustness", str(faults))
     scenario = task.vary(asked.scenario, faults.scenario)
     for m in faults.robots:
         if m >= scenario.n_robots:
@@ -206,8 +223,10 @@ def _robustness(
             )
     original = Arm(NO_FAULT, Condition(policy, scenario, task=task))
 
-    def arm(mode: str, m: int, onset: float, duration: float | None) -> Arm:
+    def arm(mode: str, m: int, onset: float, duration: float | None, manner: dict[str, Any]) -> Arm:
         fault = task.fault(mode, m, onset, duration)
+        if manner:
+            fault = fault.replace(**manner)
         condition = Condition(policy, scenario, (fault,), task=task)
         return Arm(Setting("fault", mode, m, onset), condition)
 
@@ -215,9 +234,9 @@ def _robustness(
     if task.removed is None:
         wanted = [one for one in wanted if not one.needs_removed]
     for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
-        failed = arm(mode, m, onset, faults.duration)
+        failed = arm(mode, m, onset, faults.duration, faults.manner)
         for definition in wanted:
-            third = arm(str(task.removed), m, onset, None) if definition.needs_removed else None
+            third = arm(str(task.removed), m, onset, None, {}) if definition.needs_removed else None
             yield Comparison(table, definition.symbol, original, failed, third)
 
 

@@ -39,8 +39,8 @@ class StudyResults:
         performance: P of every policy and condition; its columns are those of
             `performance_table.PERFORMANCE`, with P seed by seed in `by_seed`.
         indicators: every comparison; its columns are those of `indicator_table.INDICATORS`.
-        exploratory: whether seeds were added that were not declared at the study's start, or a
-            look that was not, so that the verdicts' error level is not the nominal one.
+        exploratory: whether the seeds are not those that were declared at the study's start, or the
+            look is none of them, so that the verdicts' error level is not the nominal one.
         outcomes: of the plan's runs, by key: delivery times and what else P does not tell.
         confidence: confidence level of the indicators' intervals and verdicts; above 0.95 at a
             declared look, so that all looks together err in 5 %.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -20,7 +19,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.records import Record, read_toml
+from swarm_logistics_env.records import Record, each_of, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
@@ -32,16 +31,6 @@ ScenarioFields = dict[str, Any]
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
-
-
-def _each(record: type[Record]) -> Callable[[object], object]:
-    # Through the record's own constructor, whose errors suggest the field that was meant.
-    def build(values: object) -> object:
-        if not isinstance(values, list | tuple):
-            return values
-        return tuple(record(**value) if isinstance(value, dict) else value for value in values)
-
-    return build
 
 
 class _Part(Record):
@@ -92,16 +81,38 @@ class Faults(Factor):
     """Failure modes, numbers of faulty robots and onsets; all combinations give FT and R.
 
     Args:
-        modes: failure modes of the task other than "removed", which is the reference P_S.
+        modes: failure modes of the task other than "removed", which is the reference P_S: there the
+            robots are removed for good. In the warehouse also a part of a mode, as "dead[move]".
         robots: numbers m of faulty robots, each below the swarm size.
         onsets: the times at which robots fail [s].
         duration: how long a failure lasts [s]; without it, until the end of the episode.
+        factor: the share of speed or view that `motor_slow`, `motor_wear` and `view_reduced` leave,
+            in [0, 1); without it, the mode's own.
+        intermittent: for how long [s] a failure holds, and for how long not, both on average, in
+            turn: random failure and repair; without it, it holds without a break.
     """
 
     modes: Annotated[tuple[str, ...], Field(min_length=1), _ONCE]
     robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1), _ONCE] = (1, 2, 3)
     onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), _ONCE] = (0.0,)
     duration: PositiveFloat | None = None
+    factor: Annotated[float, Field(ge=0, lt=1)] | None = None
+    intermittent: tuple[PositiveFloat, PositiveFloat] | None = None
+
+    @property
+    def manner(self) -> dict[str, Any]:
+        """The fields of a fault that say how it fails, as far as they are given."""
+        given = {"factor": self.factor, "intermittent": self.intermittent}
+        return {name: value for name, value in given.items() if value is not None}
+
+    def __str__(self) -> str:
+        """Return in words how long, how far and how steadily robots fail; empty: for good."""
+        said = [] if self.duration is None else [f"for {self.duration:g} s"]
+        said += [] if self.factor is None else [f"factor {self.factor:g}"]
+        if self.intermittent is not None:
+            held, paused = self.intermittent
+            said.append(f"{held:g} s failed, {paused:g} s not, in turn")
+        return ", ".join(said)
 
 
 class Parameter(Factor):
@@ -170,10 +181,10 @@ class Specification(_Part):
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
     scenario: Any = Field(default_factory=dict)
-    sizes: Annotated[tuple[Sizes, ...], BeforeValidator(_each(Sizes))] = ()
-    faults: Annotated[tuple[Faults, ...], BeforeValidator(_each(Faults))] = ()
-    parameters: Annotated[tuple[Parameter, ...], BeforeValidator(_each(Parameter))] = ()
-    ablations: Annotated[tuple[Ablation, ...], BeforeValidator(_each(Ablation))] = ()
+    sizes: Annotated[tuple[Sizes, ...], BeforeValidator(each_of(Sizes))] = ()
+    faults: Annotated[tuple[Faults, ...], BeforeValidator(each_of(Faults))] = ()
+    parameters: Annotated[tuple[Parameter, ...], BeforeValidator(each_of(Parameter))] = ()
+    ablations: Annotated[tuple[Ablation, ...], BeforeValidator(each_of(Ablation))] = ()
     indicators: Annotated[tuple[str, ...], Field(min_length=1), _ONCE] = tuple(DEFINITIONS)
     looks: tuple[PositiveInt, ...] = ()
     until_clear: bool = False
@@ -209,7 +220,8 @@ class Specification(_Part):
             task = task_of(info.data["task"])
             known = set(task.failure_modes) - {task.removed}
             for mode in (mode for factor in faults for mode in factor.modes):
-                if mode not in known:
+                # The task tells whether a robot can lose that part of a mode.
+                if mode.partition("[")[0] not in known:
                     raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
         return faults
 
@@ -275,7 +287,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         StudyError: the file cannot be read, is not TOML, names code that it may not, or a field of
             it is unknown or cannot be.
     """
-    fields = read_toml(path, "study file", StudyError)
+    fields = read_table(path, "study file", StudyError)
     refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
     try:
         specification = Specification(**{"name": path.stem, **fields})

@@ -44,7 +44,7 @@ def looks_up_to(most: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Standing:
-    """Where the comparisons of a study stand.
+    """The state of the comparisons of a study at its latest look.
 
     Attributes:
         judged: every comparison, as it was when it stopped or at the last complete look.
@@ -59,7 +59,7 @@ class Standing:
 
 
 def standing(plan: Plan, outcomes: Mapping[str, Outcome]) -> Standing:
-    """Return where the comparisons of a plan stand after these outcomes, keyed by run."""
+    """Return the state of a plan's comparisons after these outcomes, keyed by run."""
     runs = _Runs(plan, outcomes)
     families: dict[tuple[str, str], list[Comparison]] = {}
     for comparison in plan.comparisons:
@@ -106,10 +106,10 @@ class _Runs:
 
 
 class _Family:
-    """The comparisons of one indicator and policy, taken from look to look.
+    """The comparisons of one indicator for one policy, judged look after look.
 
     Attributes:
-        wanted: by key, the runs that its next look needs.
+        wanted: the runs that its next look needs and that are not played yet, by their keys.
     """
 
     def __init__(self, members: Sequence[Comparison], runs: _Runs) -> None:

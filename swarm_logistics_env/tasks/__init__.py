@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from swarm_logistics_env.policies.sb3_policy import StableBaselinesModel
+
 from .failing_robots import FailingRobots, RobotFault
-from .parallel_policies import RandomActions, StableBaselinesModel
+from .parallel_policies import RandomActions
 from .parallel_task import ParallelTask
 from .performance import SumOfInfos, SumOfRewards
 from .task import Outcome, Task

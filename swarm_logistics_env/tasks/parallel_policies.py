@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import copy
-import hashlib
 from collections.abc import Container, Mapping, Sequence
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,7 +13,6 @@ from pettingzoo import ParallelEnv
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.errors import PolicyError, StudyError
-from swarm_logistics_env.policies.sb3_policy import read_model
 
 Env: TypeAlias = ParallelEnv[Any, Any, Any]
 
@@ -38,34 +35,6 @@ class RandomActions:
     def act(self, observations: NDArray[np.float32]) -> list[Any]:
         """Return an action for each row."""
         return [None if space is None else space.sample() for space in self._spaces]
-
-
-class StableBaselinesModel:
-    """A PPO model that stable-baselines3 saved; it gives its most likely action each time.
-
-    It decides for one robot at a time, from the robot's observation row.
-
-    Args:
-        path: of the .zip file. Reading it executes the code in it.
-
-    Raises:
-        PolicyError: it cannot be read, or stable-baselines3 is missing.
-    """
-
-    def __init__(self, path: Path) -> None:
-        try:
-            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-        except OSError as error:
-            raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
-        self._model = read_model(path)
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        """Begin an episode; nothing here is random."""
-
-    def act(self, observations: NDArray[np.float32]) -> NDArray[Any]:
-        """Return an action for each row of observations (N, D)."""
-        actions, _ = self._model.predict(observations, deterministic=True)
-        return np.asarray(actions)
 
 
 def agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str | None]:

@@ -202,7 +202,7 @@ class ParallelTask:
                 gains.append(float(self._gain(env, rewards, infos)))
         finally:
             env.close()
-        return self._outcome(gains, recorded.digest(), _failed(seed, n_robots, faults))
+        return self._outcome(gains, recorded.digest(gains), _failed(seed, n_robots, faults))
 
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
@@ -276,8 +276,10 @@ class _Recorded(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is u
         self._add(observations, rewards)
         return observations, rewards, *others
 
-    def digest(self) -> str:
-        """Return 32 hexadecimal digits that equal runs share."""
+    def digest(self, gains: list[float]) -> str:
+        """Return 32 hexadecimal digits that equal runs share, whose steps gave these `gains`."""
+        # What P counts need be in no observation and no reward.
+        self._hash.update(np.array(gains).tobytes())
         return self._hash.hexdigest()
 
     def _add(self, observations: dict[str, Any], rewards: dict[str, Any]) -> None:

@@ -17,9 +17,8 @@ from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
+from swarm_logistics_env.policies.sb3_policy import StableBaselinesModel
 from swarm_logistics_env.records import Record, canonical_json
-
-from .parallel_policies import StableBaselinesModel
 
 Known = Mapping[str, Callable[..., Policy]]
 NONE: Known = MappingProxyType({})

@@ -33,7 +33,7 @@ def task_of(source: object) -> Task:
         module, colon, attribute = NAMES.get(source, source).partition(":")
         if not colon:
             raise StudyError(
-                f"no task {source!r}{suggest(source, NAMES)}, or 'package.module:OBJECT'"
+                f"no task {source!r} (a name or 'package.module:OBJECT'){suggest(source, NAMES)}"
             )
         try:
             found = getattr(importlib.import_module(module), attribute)

@@ -1,4 +1,4 @@
-"""Plays episodes for the checks, through the dict methods; the errors that checks raise."""
+"""Episodes that the checks play through the dict methods, and the errors that checks raise."""
 
 from __future__ import annotations
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Self
 
 from pydantic import PositiveInt, model_validator
 from rich.console import Console
 
-from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.policies import load
-from swarm_logistics_env.records import Record
 from swarm_logistics_env.train.evaluation import evaluate
 from swarm_logistics_env.train.run_record import enter
-from swarm_logistics_env.train.settings import Scores
+from swarm_logistics_env.train.settings import Part, Scores
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.train.tuning import Trial, search
 
@@ -26,7 +24,7 @@ OBJECTIVES = ("P", "worst R")
 FACTORS = (0.25, 4.0)  # of each weight
 
 
-class RewardSearch(Record):
+class RewardSearch(Part):
     """The specification of a search: each trial is a training of its own, with other weights.
 
     Each weight of `rewards` and `indicators` of the training is tried between a quarter and four
@@ -39,8 +37,6 @@ class RewardSearch(Record):
     Raises:
         TrainingError: a field is unknown or cannot be.
     """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
 
     training: Training
     trials: PositiveInt = 12

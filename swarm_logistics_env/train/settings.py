@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -19,7 +18,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import Record, each_of
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import Fault
@@ -35,20 +34,6 @@ def _known(modes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 Modes = Annotated[tuple[str, ...], AfterValidator(_known)]
-
-
-def one_of(record: type[Record]) -> Callable[[object], object]:
-    """Return what makes a record of a table, and leaves anything else as it is."""
-    # The record's own constructor raises errors that suggest the field that was meant.
-    return lambda value: record(**value) if isinstance(value, dict) else value
-
-
-def each_of(record: type[Record]) -> Callable[[object], object]:
-    """Return what makes a tuple of records of a list of tables."""
-    one = one_of(record)
-    return lambda values: (
-        tuple(one(value) for value in values) if isinstance(values, list | tuple) else values
-    )
 
 
 class Part(Record):
@@ -148,8 +133,10 @@ class PPOSettings(Part):
         gamma: the discount of a control step.
         gae_lambda: lambda of generalised advantage estimation (Schulman et al. 2016).
         clip: the largest distance from 1 at which the ratio of an action's probabilities pays.
-        entropy, value_weight: the weight of this loss relative to the policy's.
-        max_grad_norm: longer gradients are shortened to this length.
+        entropy: the weight of the actions' entropy relative to the policy's loss; it keeps
+            exploration up.
+        value_weight: the weight of the value network's loss relative to the policy's.
+        max_grad_norm: the length to which longer gradients are shortened.
         target_kl: an update stops early beyond 1.5 times this divergence; without it, never.
         deviations: standard deviations of the outputs' exploration noise at the start, one for each
             output; they are learned.
@@ -187,13 +174,13 @@ class PPOSettings(Part):
 
 
 class Evaluation(Part):
-    """What is measured on the way, on seeds of its own.
+    """What is measured during the training, on seeds of its own.
 
     Args:
         every: agent-steps between two evaluations.
-        seeds: how many.
+        seeds: the number of episodes of each evaluation and condition.
         n_robots: the swarm size.
-        faults: mode -> m, each giving R.
+        faults: failure modes with their numbers m of faulty robots; R is measured for each.
     """
 
     every: PositiveInt = 1_000_000
@@ -218,8 +205,8 @@ class Scores(Part):
     Args:
         seeds: the number of seeds; with 0 nothing is measured.
         sizes: the swarm sizes N at which P is measured.
-        modes, robots: the failure modes, and the numbers m of faulty robots, for which R and FT are
-            measured at `n_robots`.
+        modes: the failure modes for which R and FT are measured at `n_robots`.
+        robots: the numbers m of faulty robots for which they are measured.
         n_robots: the swarm size with faults.
     """
 

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model
 from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
-from swarm_logistics_env.records import read_toml
+from swarm_logistics_env.records import each_of, one_of, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
@@ -20,19 +20,12 @@ from swarm_logistics_env.train.settings import (
     PPOSettings,
     Scores,
     WorldKind,
-    each_of,
-    one_of,
 )
 
 PRESETS = Path(__file__).parent / "presets"
 
 # stable-baselines3 shuffles with numpy's global generator, which takes seeds of 32 bits.
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
-
-
-def as_scenario(value: object) -> object:
-    """Return the scenario of a table of fields; anything else as it is."""
-    return Scenario(**value) if isinstance(value, dict) else value
 
 
 class Training(Part):
@@ -43,17 +36,20 @@ class Training(Part):
         about: a sentence about the policy, for its card.
         scenario: the conditions; a table of fields makes one.
         start: name or path of a trained policy that this one goes on from; none: from nothing.
-        worlds: those that run side by side, kind by kind: easy ones beside hard ones are what lets
-            a training from nothing begin.
-        threads: in which worlds step, and processes that measure scores; no result depends on it.
-        seed: decides everything random.
+        worlds: kinds of worlds that run side by side. A training from nothing begins to learn in
+            easy ones, which therefore stand beside the hard ones.
+        threads: how many threads step the worlds, and how many processes measure the scores; no
+            result depends on it.
+        seed: the number that decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
             added to them. Potentials are discounted by `ppo.gamma`.
-        indicators: pays them instead of the task.
-        conditions: kinds of episodes that are mixed; none: nobody fails.
+        indicators: the indicators that are paid instead of the task reward; none: the task reward.
+        conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
-        ppo, evaluation, scores: see there.
+        ppo: settings of the learner.
+        evaluation: what is measured during the training.
+        scores: what is measured at its end.
 
     Raises:
         TrainingError: a field is unknown, or its value is not allowed.
@@ -61,7 +57,7 @@ class Training(Part):
 
     name: str = "policy"
     about: str = ""
-    scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
+    scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
     start: str | None = None
     worlds: Annotated[
         tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
@@ -139,7 +135,7 @@ class Training(Part):
 
     @property
     def rows(self) -> int:
-        """Robots in all worlds together."""
+        """The number of robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
 
 
@@ -161,7 +157,7 @@ def load_training(asked: str, **fields: object) -> Training:
     path = Path(asked) if asked.endswith(".toml") else PRESETS / f"{asked}.toml"
     if path.parent == PRESETS and path.stem not in preset_names():
         raise TrainingError(f"no training preset {asked!r}{suggest(asked, preset_names())}")
-    given = read_toml(path, "training", TrainingError)
+    given = read_table(path, "training", TrainingError)
     try:
         return Training(**{"name": path.stem, **given, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses

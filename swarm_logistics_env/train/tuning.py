@@ -6,23 +6,23 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, NonNegativeInt, PositiveInt, field_validator
 
 from swarm_logistics_env import policies, spi
-from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
+from swarm_logistics_env.errors import suggest
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.policies.card import Score
 from swarm_logistics_env.policies.tuned import TunedPolicy
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import one_of
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.evaluation import Evaluated, evaluate, performances
 from swarm_logistics_env.train.live_table import LiveTable
 from swarm_logistics_env.train.run_record import enter, versions
-from swarm_logistics_env.train.settings import Evaluation, Modes
-from swarm_logistics_env.train.training import Seed, as_scenario
+from swarm_logistics_env.train.settings import Evaluation, Modes, Part
+from swarm_logistics_env.train.training import Seed
 
 if TYPE_CHECKING:
     import optuna
@@ -43,7 +43,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 Objective = Literal["P", "R", "FT"]
 
 
-class Tuning(Record):
+class Tuning(Part):
     """The specification of a search.
 
     Args:
@@ -62,13 +62,11 @@ class Tuning(Record):
         TrainingError: a field is unknown or cannot be.
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
-
     policy: str
     objectives: Annotated[tuple[Objective, ...], Field(min_length=1)] = ("P", "R")
     trials: PositiveInt = 60
     seeds: PositiveInt = 8
-    scenario: Annotated[Scenario, BeforeValidator(as_scenario)] = Scenario(restock=True)
+    scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
     modes: Annotated[Modes, Field(min_length=1)] = ("FM1", "FM2", "FM3", "FM4")
     robots: PositiveInt = 2
     seed: Seed = 0

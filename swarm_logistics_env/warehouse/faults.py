@@ -41,8 +41,8 @@ class Fault(Record):
         mode: a key of `FAILURE_MODES`, or a part of one, see `failure_mode`.
         robots: how many robots fail (1..N), chosen by the seed alone, so that every mode hits the
             same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
-        onset: when [s], from the start of the episode.
-        duration: for how long [s]; None: for good. A removed robot does not come back.
+        onset: when it begins [s], from the start of the episode.
+        duration: for how long it holds [s]; None: for good. A removed robot does not come back.
         factor: for `motor_slow`, `motor_wear` and `view_reduced`: what is left, in [0, 1).
         intermittent: for how long [s] it holds, and for how long not, both on average, in turn
             from its onset on; each robot's times are drawn from its own stream (exponential).
@@ -196,7 +196,8 @@ class Occurrence:
         switches, fault = self._switches[robot], self.fault
         while switches[-1] <= time + GRACE:
             about = (robot, len(switches) // _SWITCHES)
-            rng = generator(self._seed, f"intermittent {fault.mode}", *about)
+            # A part of a mode, as "dead[move]", comes and goes with the whole of it.
+            rng = generator(self._seed, f"intermittent {fault.mode.partition('[')[0]}", *about)
             means = np.resize(fault.intermittent or (), _SWITCHES)
             switches += (switches[-1] + np.cumsum(rng.exponential(means))).tolist()
         return bisect_right(switches, time + GRACE)

@@ -103,10 +103,11 @@ def _address(thing: Any) -> int:
 
 
 def _function_addresses() -> Functions:
-    """Return where the functions that kernels call are.
+    """Return the addresses of pymunk's C functions, by which kernels call them.
 
     Raises:
-        SetupError: kernels cannot call this pymunk, or any C function on this machine.
+        SetupError: this pymunk lacks one of them, or this machine's words are not of 64 bits with
+            the lowest byte first, as kernels need them.
     """
     if sys.maxsize < 2**32 or sys.byteorder != "little":
         raise SetupError("this machine's words: should be of 64 bits, lowest byte first")

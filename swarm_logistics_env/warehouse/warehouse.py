@@ -39,8 +39,8 @@ class Warehouse:
         state: what is true now, see `WarehouseState`.
         faults: what affects whom in this episode.
         n_removed: how many robots were taken out of the arena so far.
-        is_eventful: whether the last step has more to tell than observations, see
-            `stepping.take_step`.
+        is_eventful: whether something happened in the last step that observations do not tell, as
+            a delivery, see `stepping.take_step`.
 
     Example:
         >>> world = Warehouse(Scenario(n_robots=3))

@@ -94,7 +94,7 @@ def test_simulation_narrows_the_intervals_of_few_real_trials(
         (["lab.csv"], "has no column 'performance'"),
         (["lab.cvs"], "cannot read lab.cvs"),
         (["real.csv", "--setup", "nowhere.toml"], "--setup nowhere.toml: should be NAME=VALUE, or"),
-        (["real.csv", "--setup", "lab.csv"], "--setup lab.csv: is not TOML"),
+        (["real.csv", "--setup", "lab.csv"], "--setup lab.csv is not TOML"),
         (["real.csv", "--simulated", "bare.csv"], "the simulated trials have no seeds"),
         (["real.csv", "--simulated", "few.csv"], "seed 5 of the real trials was not simulated"),
         (["real.csv", "--simulated", "other.csv"], "the simulated trials compare N 4 -> 8"),

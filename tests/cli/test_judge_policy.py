@@ -23,6 +23,10 @@ class Mine:
         commands[:, 0] = 1.0
         return commands
 
+class Failing(Mine):
+    def act(self, observations):
+        raise RuntimeError("no more")
+
 class NoAct:
     def reset(self, n_robots, seed): ...
 """
@@ -97,3 +101,16 @@ def test_a_policy_of_ones_own_is_judged_where_it_lies(
     assert "| P | N = 25, no fault | 0.0" in printed
     assert "| A | delivery_width 2 -> 1 m | – | ! blocked | – |" in printed
     assert {"card.html", "badge.svg", "report.md"} <= {path.name for path in Path("card").iterdir()}
+
+
+def test_a_policy_that_fails_in_every_run_gets_a_card_without_numbers(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = PRESETS["scorecard"].replace(seeds=1, scenario={"duration": 1.0, "restock": True})
+    monkeypatch.setitem(PRESETS, "scorecard", short)
+    assert app.run(["judge", "judged_policy:Failing", "--processes", "1", "--out", "card"]) == 1
+    printed = capsys.readouterr().out
+    assert "| P | N = 25, no fault | – |  | – |" in printed
+    assert "19 failed, the first with RuntimeError: no more" in printed.splitlines()[-1]
+    ET.fromstring((folder / "card" / "badge.svg").read_text())
+    assert "nan" not in (folder / "card" / "card.html").read_text().casefold()

@@ -155,9 +155,11 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     printed = capsys.readouterr().out
     # It warns before it plays, so that one can still stop it.
     warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
-    assert warning < printed.index("questions, 4 paired seeds")
+    assert warning < printed.index("question, 4 paired seeds")
     assert "4 seeds (0 to 3) every verdict is exploratory." in printed
-    assert "The verdicts are exploratory: seeds were added" in (out / "report.md").read_text()
+    assert (
+        "The verdicts are exploratory: they are over other seeds" in (out / "report.md").read_text()
+    )
     assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
     assert "holds the study 'mine'" in capsys.readouterr().err
 
@@ -191,14 +193,14 @@ def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
     assert stored(out) == 34
 
 
-TABLE = "kind,name,value,n_robots,seed,delivered\n"
+TABLE = "fault,faulty,robots,seed,delivered\n"
 
 
 def imported(path: Path, faulty: tuple[int, ...], first: int = 0) -> str:
     """A study of four seeds of P_o, P_S and the P_F that are given."""
     seeds = range(first, first + 4)
-    rows = [f"fault,none,0,25,{s},{40 + s}\nfault,removed,1,25,{s},{38 + s}\n" for s in seeds]
-    rows += [f"fault,FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
+    rows = [f"none,0,25,{s},{40 + s}\nremoved,1,25,{s},{38 + s}\n" for s in seeds]
+    rows += [f"FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
     path.with_suffix(".csv").write_text(TABLE + "".join(rows))
     assert app.run(["study", "import", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
     return str(path)
@@ -251,6 +253,7 @@ def test_power_of_a_stored_study_and_of_a_pilot(
         "[[sizes]]\nvalues = [2, 3]\n"
     )
     arguments = ["--pilot-seeds", "3", "--processes", "1", "--effect", "1"]
+    path.write_text("until_clear = true\n" + path.read_text())
     assert app.run(["study", "power", str(path), *arguments]) == 0
     assert "Seeds needed, from 3 seeds" in capsys.readouterr().out
     capsys.readouterr()

@@ -229,6 +229,23 @@ def test_contact_pays_its_seconds(world: Warehouse) -> None:
     assert terms.pay(world) == pytest.approx([-0.1, 0.0, 0.0, -0.1])
 
 
+def test_a_robot_that_cannot_deliver_is_charged_while_it_holds_the_requested_item() -> None:
+    world = Warehouse(Scenario(n_robots=4, n_items=6))
+    world.reset(0, [Fault("FM4", 1)])
+    (faulty,) = np.flatnonzero(~world.state.delivers).tolist()
+    healthy = (faulty + 1) % 4
+    world.state.requested = 2
+    terms = started(world, blocked_request=-1.0)
+    give(world, faulty, 3)
+    assert not terms.pay(world).any(), "no robot waits for this item"
+    put_down(world, faulty)
+    give(world, healthy, 2)
+    assert not terms.pay(world).any(), "it is on its way"
+    put_down(world, healthy)
+    give(world, faulty, 2)
+    assert terms.pay(world) == pytest.approx(np.where(np.arange(4) == faulty, -0.1, 0.0))
+
+
 def test_terms_are_weighed_and_added(world: Warehouse) -> None:
     give(world, 1, 2)
     terms = started(world, delivery=0.5, own_delivery=2.0, contact=-10.0)
@@ -259,7 +276,10 @@ def test_after_the_last_delivery_every_term_still_pays(world: Warehouse) -> None
     ("weights", "complaint"),
     [
         ({"delivry": 1.0}, "no reward term 'delivry'; did you mean 'delivery'?"),
-        ({"speed_of_light": 1.0}, "no reward term 'speed_of_light'; known: approach, carried_way"),
+        (
+            {"speed_of_light": 1.0},
+            "no reward term 'speed_of_light'; known: approach, blocked_request",
+        ),
         ({"delivery": float("nan")}, r"rewards\['delivery'\] = nan: should be a finite number"),
         ({"delivery": None}, r"rewards\['delivery'\] = None: should be a finite number"),
         ({"delivery": "1"}, r"rewards\['delivery'\] = '1': should be a finite number"),

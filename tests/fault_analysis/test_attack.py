@@ -85,3 +85,27 @@ def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
     short = Attack("swarm-dt", SCENARIO.replace(duration=0.5), budget=10, fresh=3)
     with pytest.raises(SetupError, match="delivers nothing without faults"):
         attack(short, serial, tmp_path)
+
+
+def test_a_cap_on_the_runs_without_faults_is_told(tmp_path: Path) -> None:
+    scenario = SCENARIO.replace(restock=False, n_items=3)  # all are delivered early
+    asked = Attack("homing", scenario, 1, modes=("FM2",), budget=10, fresh=12)
+    result = attack(asked, serial, tmp_path)
+    assert result.is_capped
+    assert "supported" not in {found.robustness.verdict for found in result.found}
+
+
+def test_a_fault_that_changes_no_run_is_no_evidence(tmp_path: Path) -> None:
+    asked = Attack("random-walk", SCENARIO, 1, modes=("FM3_hear",), budget=10, fresh=3)
+    result = attack(asked, serial, tmp_path)
+    assert all(found.robustness.identical for found in result.found)
+    assert not result.is_capped
+
+
+def test_few_tries_leave_the_seeds_of_the_estimates_fresh(tmp_path: Path) -> None:
+    asked = Attack("swarm-dt", SCENARIO, modes=("FM2", "FM4"), budget=1, fresh=3)
+    attack(asked, serial, tmp_path)
+    with Store(tmp_path / STORE) as store:
+        seeds = [row["seed"] for row in store.rows() if row["faults"] == "[]"]
+    # Five for the choice among the named modes, and three that had no part in any choice.
+    assert sorted(seeds) == [0, 1, 2, 3, 4, 5, 6, 7]

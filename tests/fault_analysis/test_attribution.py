@@ -52,7 +52,7 @@ def test_copies_without_a_fault_are_equal_and_lose_nothing() -> None:
 
 def test_a_planted_robot_bears_the_whole_loss() -> None:
     found = attribute(SCENARIO, OneWorker(), Fault("dead", (0, 3), onset=20.0), range(4))
-    assert found.total.lost.value > 0.0
+    assert found.table()["lost"][0] > 0.0
     for seed in found.seeds:
         assert seed.robots[3][1] == 0.0
         assert seed.robots[0][1] == seed.total
@@ -62,9 +62,31 @@ def test_a_planted_capability_bears_the_whole_loss() -> None:
     # A policy that does not listen loses nothing by deafness.
     fault = Fault("dead[deliver,hear]", (0, 3), onset=20.0)
     found = attribute(SCENARIO, OneWorker(), fault, range(4))
-    assert found.total.lost.value > 0.0
+    assert found.table()["lost"][0] > 0.0
     for seed in found.seeds:
         assert seed.capabilities == {"deliver": seed.total, "hear": 0.0}
+
+
+def test_a_role_is_struck_however_short_the_fault_is() -> None:
+    whole = losses(SCENARIO, policies.load("swarm-dt"), Fault("FM4", 2, 20.0, role="carrier"), 0)
+    short = Fault("FM4", 2, onset=20.0, duration=5.0, role="carrier")
+    assert (
+        losses(SCENARIO, policies.load("swarm-dt"), short, 0).robots.keys() == whole.robots.keys()
+    )
+
+
+@pytest.mark.parametrize("damage", ["no JSON\nat all\n", "[1]\n[2]\n"])
+def test_a_damaged_file_is_told(damage: str, tmp_path: Path) -> None:
+    (tmp_path / FINISHED).write_text(damage)
+    with pytest.raises(StudyError, match=r"is damaged .*: should be deleted"):
+        attribute_in(tmp_path, SCENARIO, "swarm-dt", Fault("FM4", 1, onset=20.0), [0])
+
+
+def test_a_directory_in_which_no_seed_is_finished_takes_another_question(tmp_path: Path) -> None:
+    fault = Fault("FM4", 1, onset=20.0)
+    with pytest.raises(FaultError, match="ended at 10 s"):
+        attribute_in(tmp_path, SCENARIO.replace(duration=10.0), "swarm-dt", fault, [0])
+    assert len(attribute_in(tmp_path, SCENARIO, "swarm-dt", fault, [0]).seeds) == 1
 
 
 def test_the_shares_sum_to_the_loss() -> None:
@@ -73,10 +95,12 @@ def test_the_shares_sum_to_the_loss() -> None:
     for seed in found.seeds:
         assert sum(lost for _, lost in seed.robots.values()) == pytest.approx(seed.total)
         assert sum(seed.capabilities.values()) == pytest.approx(seed.total)
-    total = found.total.lost.value
-    for rows in (found.parts, found.roles, found.capabilities):
-        assert sum(row.lost.value for row in rows) == pytest.approx(total)
-    assert sum(row.robots or 0 for row in found.roles) == 4
+    table = found.table()
+    total, *others = table["lost"]
+    for _, rows in table[1:].groupby("group"):
+        assert rows["lost"].sum() == pytest.approx(total)
+    assert len(others) > 4
+    assert table["robots"].sum() == 4
 
 
 @pytest.mark.parametrize(

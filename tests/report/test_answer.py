@@ -30,7 +30,7 @@ def compared() -> StudyResults:
         collapses = setting.name == "FM1"
         return published if policy == "swarm-dt" else published * (0.1 if collapses else 0.5)
 
-    return results(4, p, policies=["swarm-dt", "swarm-dt-follow-tuned"])
+    return results(10, p, policies=["swarm-dt", "swarm-dt-follow-tuned"])
 
 
 def test_every_question_has_the_sign_of_its_verdict(found: StudyResults) -> None:
@@ -76,9 +76,29 @@ def test_digest_counts_claims_and_names_what_contradicts_the_paper(found: StudyR
     assert f" of {len(claims)} claims." in text
     assert "if the paper is right, 20 seeds decide " in text
     # The robots of a fleet that FM4 spares deliver all the same: the paper says they do not.
-    tough = results(4, lambda _, setting: 39.0 if setting.name == "FM4" else 20.0)
+    tough = results(10, lambda _, setting: 39.0 if setting.name == "FM4" else 20.0)
     surprises = answer(tough).surprises
     assert any("FM4, m=3" in one and "swarm-dt is tolerant, " in one for one in surprises)
+
+
+def test_blocked_questions_tell_why() -> None:
+    said = answer(results(1, lambda *_: 0.0)).unanswered
+    assert "blocked, the first because mean of p_n = 0: nothing was delivered" in said
+
+
+def test_what_is_provisional_surprises_nobody() -> None:
+    def p(policy: str, setting: Setting) -> float:
+        return 39.0 if setting.name == "FM4" and policy == "swarm-dt" else 20.0
+
+    few = results(4, p, policies=["swarm-dt", "swarm-dt-follow-tuned"])
+    assert "refuted" in set(few.indicators["claim_verdict_holm"])
+    assert not answer(few).surprises
+
+
+def test_the_furthest_of_many_answers_is_no_surprise_by_chance() -> None:
+    for seeds in (15, 20, 29):  # the same policy twice
+        twins = results(seeds, policies=["swarm-dt", "swarm-dt-follow-tuned"])
+        assert not any("differs most" in one for one in answer(twins).surprises)
 
 
 def test_policies_stand_side_by_side_with_their_greatest_contrast(compared: StudyResults) -> None:
@@ -89,7 +109,7 @@ def test_policies_stand_side_by_side_with_their_greatest_contrast(compared: Stud
         for one in found.surprises
     )
     text = digest(found, 80, None)
-    assert "P at N = 25, no fault: swarm-dt 3" in text
+    assert "P at N = 25, no fault: swarm-dt 4" in text
     assert "times)" in text
 
 

@@ -158,6 +158,17 @@ def test_null_that_ran_out_of_items_is_none(repaired: StudyResults) -> None:
     assert "the items ran out" in str(one.problem)
 
 
+def test_runs_that_deliver_everything_are_no_evidence_of_resilience() -> None:
+    found = after_a_fault(1.0, back=END)
+    (comparison,) = (c for c in found.plan.comparisons if c.indicator == "FT")
+    key = comparison.original.condition.run(found.plan.code, 0).key
+    capped = {**found.outcomes, key: replace(found.outcomes[key], all_delivered=True)}
+    one = only(judge(found.plan, capped))
+    assert one.against_whole is not None
+    assert one.against_whole.verdict == "inconclusive"
+    assert "| inconclusive† |" in markdown(document(judge(found.plan, capped)))
+
+
 def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) -> None:
     (comparison,) = (c for c in repaired.plan.comparisons if c.indicator == "FT")
     rates = rate_curves(repaired, comparison)
@@ -364,3 +375,19 @@ def test_no_law_is_fitted_to_a_flat_series() -> None:
     found = judged(study, lambda *_: Outcome("", np.arange(60.0)))
     assert table(found, "Scaling laws") == []
     assert "no law is fitted: P is 60.0 at every size" in markdown(document(found))
+
+
+def test_a_law_that_is_fitted_to_a_capped_series_is_marked() -> None:
+    def play(_: str, level: Setting, seed: int) -> Outcome:
+        return Outcome("", np.arange(min(30.0, 2.0 * level.value**0.8 + seed % 2)))
+
+    study = Study(seeds=2, sizes=[{"values": [5, 10, 20, 40, 60]}])
+    found = judged(study, play)
+    assert "Scalability†" not in markdown(document(found))
+    full = {
+        key: replace(outcome, all_delivered=outcome.delivered == 30)
+        for key, outcome in found.outcomes.items()
+    }
+    told = markdown(document(judge(found.plan, full)))
+    assert "| swarm-dt: Scalability† | 1/P |" in told
+    assert "so P is capped there, and the law bends too early" in told

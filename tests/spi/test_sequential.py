@@ -54,3 +54,8 @@ def test_looks_must_rise(looks: tuple[int, ...]) -> None:
 def test_alpha_out_of_range() -> None:
     with pytest.raises(IndicatorError, match="alpha = 5"):
         spi.look_alphas((10,), alpha=5)
+
+
+def test_an_unknown_spending_is_refused() -> None:
+    with pytest.raises(IndicatorError, match="spending = 'pocock': should be one of obrien"):
+        spi.look_alphas([10, 20], spending="pocock")  # type: ignore[arg-type]

@@ -17,15 +17,25 @@ from swarm_logistics_env.studies.store import FILE_NAME, Store
 
 
 def papers_tables() -> str:
-    """The paper's Tables I to III, one run a row; each table has its own P_o."""
-    rows = ["kind,name,value,n_robots,delivered"]
-    rows += [f"size,n_robots,{n},,{p}" for n, p in presets.PAPER_SIZES.items()]
-    rows += [f"fault,none,0,25,{presets.PAPER_NO_FAULT}"]
+    """The paper's Tables I to III, one run a row; every parameter of III has its own P_o."""
+    parameters = {"warehouse_width": 10.0, "delivery_width": 2.0, "n_items": 60.0}
+    names = "warehouse_width", "delivery_width", "stock"  # "items" would be those delivered
+    rows = [["table", "robots", "fault", "faulty", *names, "delivered"]]
+
+    def add(table: str, robots: int, fault: str, m: int, p: float, **changed: float) -> None:
+        values = [table, robots, fault, m, *{**parameters, **changed}.values(), p]
+        rows.append([str(value) for value in values])
+
+    for n, p in presets.PAPER_SIZES.items():
+        add("I", n, "none", 0, p)
+    add("II", 25, "none", 0, presets.PAPER_NO_FAULT)
     for mode, performances in presets.PAPER_FAULTS.items():
-        rows += [f"fault,{mode},{m},25,{p}" for m, p in enumerate(performances, start=1)]
+        for m, p in enumerate(performances, start=1):
+            add("II", 25, mode, m, p)
     for name, row in presets.PAPER_PARAMETERS.items():
-        rows += [f"parameter,{name},{x},,{p}" for x, p in row.items()]
-    return "\n".join(rows) + "\n"
+        for x, p in row.items():
+            add(f"III {name}", 25, "none", 0, p, **{name: x})
+    return "".join(",".join(row) + "\n" for row in rows)
 
 
 def imported(tmp_path: Path, text: str) -> Study:
@@ -193,12 +203,12 @@ def test_the_report_states_the_set_up_and_no_simulators(tmp_path: Path) -> None:
     assert "code version" not in report
 
 
-MANY = """kind,name,value,delivered
-size,n_robots,5,9
-size,n_robots,5,11
-size,n_robots,5,10
-size,n_robots,10,18
-size,n_robots,10,22
+MANY = """robots,delivered
+5,9
+5,11
+5,10
+10,18
+10,22
 """
 
 
@@ -211,15 +221,8 @@ def test_unequally_many_runs_are_judged_unpaired(tmp_path: Path) -> None:
 
 
 def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
-    rows = ["5,7,10,1", "5,3,20,1", "10,3,40,1", "10,7,21,1"]
-    text = "\n".join(
-        ["kind,name,value,seed,delivered,policy"]
-        + [
-            f"size,n_robots,{value},{seed},{p},theirs"
-            for value, seed, p, _ in (row.split(",") for row in rows)
-        ]
-    )
-    study = imported(tmp_path, text)
+    rows = ["5,7,10,theirs", "5,3,20,theirs", "10,3,40,theirs", "10,7,21,theirs"]
+    study = imported(tmp_path, "\n".join(["robots,seed,delivered,policy", *rows]))
     (test,) = rows_of(study.findings().indicators)
     assert test.policy == "theirs"
     assert test.estimate is not None
@@ -234,19 +237,19 @@ def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
     assert "2 paired seeds (3, 7)" in (tmp_path / "out" / "report.md").read_text()
 
 
-HEAD = "kind,name,value,n_robots,delivered\n"
+HEAD = "robots,fault,faulty,width,delivered\n"
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "is empty"),
-        (HEAD + "size,n_robots,5,,-3\n", "line 2, column 'delivered': '-3'"),
-        (HEAD + "size,n_robots,five,,9\n", "line 2, column 'value': 'five'"),
-        (HEAD + "size,n_robots,5,,9\n", "line 2: stands alone"),
-        (HEAD + "fault,FM1,1,25,9\n", "no row without one (fault none)"),
-        (HEAD + "fault,none,0,25,9\nfault,FM1,1,20,9\n", "line 3: has the fault 'FM1', but no row"),
-        (HEAD + "parameter,width,0,,9\nparameter,width,2,,9\n", "line 2: width = 0 is x_o"),
+        (HEAD + "5,,,,-3\n", "line 2, column 'delivered': '-3'"),
+        (HEAD + "five,,,,9\n", "line 2, column 'robots': 'five'"),
+        (HEAD + "5,,,,9\n", "line 2: stands alone"),
+        (HEAD + "25,FM1,1,,9\n", "no row without one (fault none)"),
+        (HEAD + "25,none,0,,9\n20,FM1,1,,9\n", "line 3: has the fault 'FM1', but no row"),
+        (HEAD + "5,,,0,9\n5,,,2,9\n", "line 2: width = 0 is x_o"),
         (
             "robots,weight,slope,delivered\n4,1,0,9\n4,2,3,9\n",
             "or one parameter alone; columns taken for parameters: 'weight', 'slope'",

@@ -103,6 +103,17 @@ def test_policy_parameters_make_another_condition() -> None:
         ({"parameters": [{"name": "n_items", "values": [60.5, 70]}]}, "60.5"),
         ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
         ({"policies": [3]}, "an object with act"),
+        ({"faults": {"modes": ["FM1"]}}, "list of tables: [[faults]] in a TOML file"),
+        ({"parameters": {"name": "x"}}, "list of tables: [[parameters]] in a TOML file"),
+        ({"faults": [{"modes": ["FM1"]}], "reference": "papr"}, "did you mean 'paper'?"),
+        (
+            {
+                "faults": [
+                    {"modes": ["FM1"], "title": "one", "duration": lasts} for lasts in (5.0, 9.0)
+                ]
+            },
+            "title = 'one' heads 'FM1, m = 1' under two different conditions",
+        ),
         ({}, "compares nothing"),
     ],
 )
@@ -111,6 +122,12 @@ def test_bad_specification_is_refused_in_words(fields: dict[str, Any], words: st
         Study(**fields).plan()
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_two_factors_ask_alike_is_asked_once() -> None:
+    faults = [{"modes": ["FM1"]}, {"modes": ["FM1", "FM2"]}]
+    comparisons = Study(faults=faults).plan().comparisons
+    assert len(comparisons) == len(set(comparisons)) == 2 * 2 * 3
 
 
 def test_unknown_policy_is_refused_before_any_run() -> None:

@@ -1,4 +1,4 @@
-"""None"""
+"""Shards and the studies merged of them: each run once, and nothing but parts of one study."""
 
 from __future__ import annotations
 
@@ -53,32 +53,6 @@ def rows(directory: Path) -> list[dict[str, Any]]:
         return list(store.rows())
 
 
-def test_seeds_and_policies_of_two_machines_become_one_study(tmp_path: Path) -> None:
-    one = played(tmp_path / "one")
-    other = played(tmp_path / "other", seeds=3, policies=["swarm-dt", "random-walk"])
-    assert merge([one, other], tmp_path / "both") == 12
-    assert rows(tmp_path / "both") == rows(other)
-    merged = Study.stored(tmp_path / "both")
-    assert merged.specification.seeds == 3
-    assert merged.specification.policies == ("swarm-dt", "random-walk")
-    # Two seeds were declared where the first runs were looked at.
-    assert merged.findings().exploratory
-    assert not [path for path in (tmp_path / "both").iterdir() if path.name != FILE_NAME]
-
-
-def test_seeds_of_three_machines_are_joined_whatever_their_order(tmp_path: Path) -> None:
-    parts = {first: played(tmp_path / str(first), first_seed=first) for first in (1000, 1002, 1004)}
-    with pytest.raises(StudyError, match="from 1004 on, the studies before it end with seed 1001"):
-        merge([parts[1004], parts[1000]], tmp_path / "gap")
-    merge([parts[1004], parts[1000], parts[1002]], tmp_path / "whole")
-    merged = Study.stored(tmp_path / "whole")
-    assert merged.plan().seeds == range(1000, 1006)
-    results = merged.findings()
-    assert results.performance["problem"].isna().all()
-    # Each machine declared its own seeds, nobody the whole.
-    assert results.exploratory
-
-
 def test_shards_of_one_declared_study_stay_as_declared(tmp_path: Path) -> None:
     parts = [played(tmp_path / name, first_seed=1000) for name in ("one", "other")]
     merge(parts, tmp_path / "both")
@@ -106,13 +80,14 @@ def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
     one, other = played(tmp_path / "one"), played(tmp_path / "other")
     assert merge([one, other], tmp_path / "both") == 4
     assert rows(tmp_path / "both") == rows(one)
+    assert not [path for path in (tmp_path / "both").iterdir() if path.name != FILE_NAME]
 
 
 @pytest.mark.parametrize(
     ("fields", "statement", "words"),
     [
         ({}, "UPDATE runs SET ended_at = 1.5", "has another result"),
-        ({}, "UPDATE notes SET value = 'old' WHERE name = 'code'", "never mixes two versions"),
+        ({}, "UPDATE notes SET value = 'old' WHERE name = 'code'", "differ in code version"),
         ({}, "DELETE FROM notes WHERE name = 'identities'", "does not note its identities"),
         (
             {},
@@ -123,11 +98,13 @@ def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
         (
             {},
             """UPDATE notes SET value = '{"policy swarm-dt": "x"}' WHERE name = 'identities'""",
-            "its code differs",
+            "differ in the code of their policies",
         ),
         ({"sizes": [{"values": [2, 4]}]}, "SELECT 1", "differ in sizes"),
-        ({"looks": [2, 4]}, "SELECT 1", "different looks"),
-        ({"margin": 0.3}, "SELECT 1", "different margin"),
+        ({"seeds": 3}, "SELECT 1", "differ in seeds, what they declared: should be shards"),
+        ({"policies": ["random-walk"]}, "SELECT 1", "differ in policies"),
+        ({"looks": [2, 4]}, "SELECT 1", "differ in looks"),
+        ({"margin": 0.3}, "SELECT 1", "differ in margin"),
     ],
 )
 def test_what_is_not_one_study_is_not_merged(

@@ -1,4 +1,4 @@
-"""None"""
+"""The store of a study: what is finished stays, whatever else is killed, refused or damaged."""
 
 from __future__ import annotations
 

@@ -235,6 +235,9 @@ def test_seeds_may_start_anywhere_and_others_than_the_declared_ones_are_explorat
     overlapping = Study(out=tmp_path, **fields, first_seed=999)
     assert overlapping.run().kept == 3  # those of seed 1000
     assert overlapping.findings().exploratory
+    part = Study(out=tmp_path, **{**fields, "seeds": 1}, first_seed=1000)
+    assert part.run().played == 0
+    assert part.findings().exploratory  # else one could choose the part that says most
     again = Study(out=tmp_path, **fields, first_seed=1000)
     assert again.run().played == 0
     assert not again.findings().exploratory

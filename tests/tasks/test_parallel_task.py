@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.study_commands import study_of
@@ -20,7 +21,7 @@ from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.runs import Run
 from swarm_logistics_env.tasks import ParallelTask, SumOfInfos
 from tests.tasks.killing import run_killed_and_resumed
-from tests.tasks.lane import ACTIONS, FAILURES, LANE, OBSERVATIONS, STAY, Lane, Walker
+from tests.tasks.lane import ACTIONS, FAILURES, LANE, OBSERVATIONS, STAY, WALK, Lane, Walker
 
 STUDY = """
 task = "tests.tasks.lane:LANE"
@@ -119,6 +120,13 @@ def test_worker_processes_give_the_same_rows(file: Path) -> None:
     assert kept[0] == kept[1]
 
 
+class Ahead(Walker):
+    """Walks on, whatever it sees."""
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        return np.full(len(observations), WALK)
+
+
 def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Path) -> None:
     task = ParallelTask(
         Lane,
@@ -151,6 +159,35 @@ def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Pa
     assert blind.verdict == "unaffected"
     assert frozen.verdict != "unaffected"
     assert any(p % 1 for p in np.concatenate(list(results.performance["by_seed"])))
+
+
+class Hidden(Lane):
+    """Tells nothing of what happens, neither by observations nor by rewards."""
+
+    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+        _, rewards, *others, infos = super().step(actions)
+        infos = {agent: {**infos[agent], "done": rewards[agent]} for agent in infos}
+        return self._observations(), dict.fromkeys(rewards, 0.0), *others, infos
+
+    def _observations(self) -> dict[str, NDArray[np.float32]]:
+        return {agent: np.zeros(2, np.float32) for agent in self.agents}
+
+
+def test_runs_that_differ_in_p_alone_are_not_the_same_runs() -> None:
+    task = ParallelTask(
+        Hidden,
+        name="hidden",
+        n_robots=3,
+        steps=40,
+        performance=SumOfInfos("done"),
+        failures={"silent": STAY},
+        policies={"ahead": Ahead},
+    )
+    study = Study(task=task, seeds=3, policies=["ahead"], faults=[FAULT])
+    study.run()
+    (test,) = rows_of(study.findings().indicators)
+    assert test.problem is None
+    assert test.verdict in ("supported", "refuted", "inconclusive")
 
 
 def test_a_killed_study_goes_on_where_it_was(file: Path, tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.metadata import merge
 from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_of
 
@@ -97,16 +96,13 @@ def test_file_may_not_name_code_by_way_of_parameters(tmp_path: Path) -> None:
     assert Study.from_file(path, trust_code=True).plan().conditions
 
 
-def test_specification_survives_json_and_merging_has_each_policy_once(tmp_path: Path) -> None:
+def test_specification_survives_json_and_its_store(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(FILE)
-    parts = [tmp_path / "one", tmp_path / "two"]
-    for part, chosen in zip(parts, (slice(0, 2), slice(1, 3))):
-        whole = Study.from_file(path).specification
-        assert Specification.from_json(whole.to_json()) == whole
-        Study.from_file(path, out=part, policies=whole.policies[chosen]).run()
-    merge(parts, tmp_path / "both")
-    assert [c.policy for c in Study.stored(tmp_path / "both").plan().comparisons] == LABELS
+    study = Study.from_file(path, out=tmp_path)
+    assert Specification.from_json(study.specification.to_json()) == study.specification
+    study.run()
+    assert [c.policy for c in Study.stored(tmp_path).plan().comparisons] == LABELS
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,10 @@ def test_a_task_that_was_an_object_is_handed_over_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("task", "words"),
     [
-        ("warehous", "no task 'warehous'; did you mean 'warehouse'?"),
+        (
+            "warehous",
+            "no task 'warehous' (a name or 'package.module:OBJECT'); did you mean 'warehouse'?",
+        ),
         ("nowhere:TASK", "task 'nowhere:TASK' cannot be imported: No module named 'nowhere'"),
         ("json:nothing", "has no attribute 'nothing'"),
         ("json:dumps", "is no task: should have the attributes of tasks.Task"),

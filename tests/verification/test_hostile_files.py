@@ -50,14 +50,14 @@ policy = "random-walk"
 fall = 0.1
 """
 TABLE = """\
-kind,name,value,n_robots,seed,delivered
-fault,none,0,25,0,40
-fault,removed,1,25,0,38
-fault,FM1,1,25,0,30
-size,n_robots,5,,0,9
-size,n_robots,10,,0,18
-parameter,delivery_width,2,,0,20
-parameter,delivery_width,1,,0,10
+table,fault,faulty,robots,delivery_width,seed,delivered
+II,none,0,25,2,0,40
+II,removed,1,25,2,0,38
+II,FM1,1,25,2,0,30
+I,none,0,5,2,0,9
+I,none,0,10,2,0,18
+III,none,0,25,2,0,20
+III,none,0,25,1,0,10
 """
 WIDE = """\
 Versuch;Roboter;Fehler;Defekt;Geliefert;Breite

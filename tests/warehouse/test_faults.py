@@ -369,6 +369,14 @@ def test_an_intermittent_fault_comes_and_goes_at_times_of_each_robots_own() -> N
     assert (held(fault, seed=6)[:, 1] != failed[:, 1]).any()
 
 
+def test_a_part_of_a_mode_comes_and_goes_with_the_whole_of_it() -> None:
+    whole, part = (
+        held(Fault(mode, (1,), onset=2.0, intermittent=(1.0, 0.5)))
+        for mode in ("dead", "dead[send]")
+    )
+    np.testing.assert_array_equal(part, whole)
+
+
 def test_an_intermittent_fault_ends_for_good_after_its_duration() -> None:
     failed = held(Fault("FM1", (0,), onset=1.0, duration=10.0, intermittent=(0.5, 0.5)))
     assert failed[:109].any()

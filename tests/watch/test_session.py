@@ -28,10 +28,10 @@ def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
     finish(session)
     with_faults = run_episode(scenario, swarm_dt(), 2, faults)
     without = run_episode(scenario, swarm_dt(), 2)
-    run, twin = session.curves
-    assert list(run.times) == with_faults.delivery_times.tolist()
-    assert list(twin.times) == without.delivery_times.tolist()
-    assert list(run.times) != list(twin.times)
+    run, twin = (play.world.state.delivery_times for play in (session.run, session.beside))
+    assert run == with_faults.delivery_times.tolist()
+    assert twin == without.delivery_times.tolist()
+    assert run != twin
 
 
 def test_without_faults_run_and_twin_are_the_same() -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from swarm_logistics_env.cli.app import app
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.report.resilience_sections import attribution_section
 from swarm_logistics_env.studies import Study
 
 FIELDS = {
@@ -36,3 +39,11 @@ def test_what_blame_finds_for_a_study_stands_in_its_report(tmp_path: Path) -> No
     changed = CliRunner().invoke(app, [*blamed, "--study", str(tmp_path), "--set", "n_items=9"])
     assert changed.exit_code != 0
     assert "--study has a scenario" in f"{changed.output}{changed.exception}"
+
+
+def test_a_table_of_another_version_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "attribution.csv"
+    for text in ("", "policy,fault\nswarm-dt,FM4\n", "\x00"):
+        path.write_text(text)
+        with pytest.raises(StudyError, match=r"attribution\.csv is no table of this version"):
+            attribution_section(path)
