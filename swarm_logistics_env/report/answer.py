@@ -198,10 +198,10 @@ def _contrast(tests: pd.DataFrame) -> str | None:
 def _unanswered(results: StudyResults) -> str:
     """Return how many questions are open, and the seeds that would decide them."""
     tests = results.indicators
-    blocked = int(tests["conclusion"].isna().sum())
-    reason = next(iter(tests["problem"].dropna()), "")
-    said = [f"{blocked} blocked, {'the first ' if blocked > 1 else ''}because {reason}"]
-    said = said if blocked else []
+    said = []
+    if blocked := int(tests["conclusion"].isna().sum()):
+        reason = next(iter(tests["problem"].dropna()), "")
+        said.append(f"{blocked} blocked, {'the first ' if blocked > 1 else ''}because {reason}")
     left = tests[tests["conclusion"] == "inconclusive"]
     if left.empty:
         return f"Open: {'; '.join(said) or 'nothing'}."
