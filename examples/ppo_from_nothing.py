@@ -12,6 +12,7 @@ from torch.distributions import Normal
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.wrappers import MotionFrame
 
 REWARDS = {
@@ -22,7 +23,7 @@ WORLDS, STEPS, EPOCHS, BATCH, DISCOUNT, TRACE, CLIP = 12, 128, 4, 480, 0.99, 0.9
 
 
 def network(n_outputs):
-    hidden = [nn.Linear(88, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
+    hidden = [nn.Linear(len(INPUTS), 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
     return nn.Sequential(*hidden, nn.Linear(64, n_outputs))
 
 

@@ -14,6 +14,7 @@ from torchrl.modules import ProbabilisticActor, TanhNormal
 from torchrl.objectives import ClipPPOLoss, ValueEstimators
 
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
+from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.wrappers import MotionFrame
 
 REWARDS = {
@@ -24,7 +25,7 @@ N_ROBOTS, STEPS, EPOCHS, BATCH = 10, 2000, 4, 125
 
 
 def network(n_outputs):
-    hidden = [nn.Linear(88, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
+    hidden = [nn.Linear(len(INPUTS), 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh()]
     return nn.Sequential(*hidden, nn.Linear(64, n_outputs))
 
 

@@ -202,6 +202,19 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
     return paid
 
 
+def in_the_way(world: Warehouse, before: Before) -> Earned:
+    """Seconds times metres from the end wall of the delivery area, of robots that cannot lift.
+
+    Weigh it negatively: there such a robot is out of the way of those that search and carry.
+    Privileged: a robot only finds out by holding on to items in vain.
+    """
+    state = world.state
+    if state.lifts.all():
+        return None
+    away = world.scenario.warehouse_width - state.robot_position[:, 0]
+    return np.where(state.lifts, 0.0, away * world.scenario.control_period)
+
+
 REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "delivery": delivery,
     "own_delivery": own_delivery,
@@ -212,6 +225,7 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "carried_way": carried_way,
     "contact": contact,
     "blocked_request": blocked_request,
+    "in_the_way": in_the_way,
 }
 POTENTIALS = frozenset({"carrying", "carried_way"})
 _AT_DELIVERIES = {"delivery", "own_delivery"}

@@ -42,11 +42,14 @@ def _names() -> tuple[str, ...]:
         "home_along", "home_aside", "home_certainty", "failed", "stuck",
         "whim_along", "whim_aside",
         "kept_home_along", "kept_home_aside", "kept_home_distance", "cannot_deliver",
+        "cannot_lift", "cannot_lift_home_along", "cannot_lift_home_aside",
+        "cannot_lift_home_distance", "cannot_lift_inside",
     )  # fmt: skip
 
 
 INPUTS = _names()
-N_FIRST_INPUTS = INPUTS.index("kept_home_along")  # networks of the first version read no more
+# New inputs are added at the end, so a network reads the first so many of them.
+INPUT_COUNTS = (INPUTS.index("kept_home_along"), INPUTS.index("cannot_lift"), len(INPUTS))
 LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 
 
@@ -193,6 +196,13 @@ def read_rows(
         read[at], read[at + 1] = sure * (cos * x + sin * y), sure * (cos * y - sin * x)
         read[at + 2] = sure * min(max(own[known.AWAY], -FARTHEST), FARTHEST) / FARTHEST
         read[at + 3] = own[known.CANNOT_DELIVER]
+        # The way home once more, for a robot that cannot lift: the weights of these inputs can be
+        # learned alone, and a robot that can lift decides as before (`Training.learn_inputs`).
+        cannot_lift = 1.0 if own[known.CANNOT_LIFT] > 0.0 else 0.0
+        read[at + 4] = cannot_lift
+        read[at + 5], read[at + 6] = cannot_lift * read[at], cannot_lift * read[at + 1]
+        read[at + 7] = cannot_lift * read[at + 2]
+        read[at + 8] = cannot_lift * sensed[row.IN_DELIVERY_AREA]
 
 
 @kernel

@@ -29,9 +29,13 @@ TURNED, DRIFT = 13, 14  # of that direction since the first sighting [rad], and 
 KEPT_X, KEPT_Y = 15, 16  # as HOME, from WALL on and fading in KEPT_TIME
 AWAY = 17  # from the border of the delivery area as far as it reckons, negative inside [m]
 CANNOT_DELIVER = 18  # 1: it has carried the requested item inside the area, and nothing happened
-N_COLUMNS = 19
+IN_VAIN = 19  # times that it held on to items in vain since it lifted one
+CANNOT_LIFT = 20  # [s] for which it goes on to take its gripper for broken
+N_COLUMNS = 21
 
 FAILURE_TIME = 60.0  # [s]
+RETRY_TIME = 120.0  # [s], after which a gripper is tried again: it may have been repaired
+SURELY_IN_VAIN = 3.0  # times; what a robot put down it may lift after a delivery, a step too late
 HOME_TIME = 10.0  # [s], in which a remembered direction fades: by then a gyro may have drifted
 KEPT_TIME = 60.0  # [s], in which a direction fades that is held against the walls
 STUCK_TIME = 1.5  # [s]
@@ -62,12 +66,24 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
         delivers = sensed[row.CARRYING_REQUESTED] > 0.5
 
         known[FAILED] *= 1.0 - period / FAILURE_TIME
-        if known[HELD] > 0.5 and sensed[row.CARRYING] < 0.5:
+        known[CANNOT_LIFT] = max(0.0, known[CANNOT_LIFT] - period)
+        if sensed[row.CARRYING] > 0.5:
+            known[IN_VAIN], known[CANNOT_LIFT] = 0.0, 0.0
+        elif known[HELD] > 0.5:
+            is_in_vain = False
             for place in range(row.N_ITEMS_IN_VIEW):
                 item = row.ITEMS + row.ITEM_WIDTH * place
                 away = math.sqrt(sensed[item + 1] ** 2 + sensed[item + 2] ** 2)
-                if sensed[item] > 0.5 and sensed[item + 3] > 0.5 and away < SURELY_IN_REACH:
+                if sensed[item] < 0.5 or away >= SURELY_IN_REACH:
+                    continue
+                if sensed[item + 3] > 0.5:
                     known[FAILED] = 1.0
+                # It lifts no item again that it just put down, unless that is requested.
+                is_in_vain |= sensed[item + 3] > 0.5 or sensed[item + 4] < 0.5
+            if is_in_vain and known[HELD] < 1.5:
+                known[IN_VAIN] += 1.0
+            if known[IN_VAIN] >= SURELY_IN_VAIN:
+                known[IN_VAIN], known[CANNOT_LIFT] = 0.0, RETRY_TIME
         if is_inside and delivers:
             known[FAILED] = 1.0
             known[CANNOT_DELIVER] = 1.0

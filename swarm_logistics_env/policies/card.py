@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.motion.frame import INPUTS, N_FIRST_INPUTS, OUTPUTS
+from swarm_logistics_env.motion.frame import INPUT_COUNTS, INPUTS, OUTPUTS
 from swarm_logistics_env.records import Record
 
 Width = Annotated[int, Field(ge=1, le=4096)]
@@ -29,7 +29,8 @@ class Network(_Part):
     """The inputs, layers and outputs of a trained policy.
 
     Args:
-        inputs: the names of its inputs in order, see `motion.INPUTS`.
+        inputs: the names of its inputs in order, see `motion.INPUTS`; or their number, for the
+            first of them.
         outputs: the names of its outputs in order, see `motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
@@ -48,6 +49,11 @@ class Network(_Part):
     activation: Literal["tanh", "relu"] = "tanh"
     exploration: NonNegativeFloat = 0.0
 
+    @field_validator("inputs", mode="before")
+    @classmethod
+    def _named(cls, inputs: Any) -> Any:
+        return INPUTS[:inputs] if isinstance(inputs, int) and inputs in INPUT_COUNTS else inputs
+
     @field_validator("inputs", "outputs")
     @classmethod
     def _known(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
@@ -55,8 +61,7 @@ class Network(_Part):
         for place, (name, wanted) in enumerate(zip(names, right)):
             if name != wanted:
                 raise ValueError(f"column {place} is {name!r}: should be {wanted!r}")
-        # Inputs that came later stand behind those that older networks read.
-        allowed = (N_FIRST_INPUTS, len(right)) if right is INPUTS else (len(right),)
+        allowed = INPUT_COUNTS if right is INPUTS else (len(right),)
         if len(names) not in allowed:
             raise ValueError(f"has {len(names)} columns: should have {len(right)}")
         return names

@@ -17,8 +17,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import create_mlp
 
 from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.motion.frame import INPUTS
-from swarm_logistics_env.train.network_view import NetworkView
+from swarm_logistics_env.train.network_view import KNOWN, NetworkView
 from swarm_logistics_env.train.training import Training
 
 CHECKPOINT = "checkpoint.pt"
@@ -63,6 +62,10 @@ def make_learner(
     with torch.no_grad():
         learner.policy.log_std.copy_(torch.tensor(ppo.deviations).log())
         learner.policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
+    if training.learn_inputs:
+        is_learned = torch.tensor([name in training.learn_inputs for name in network.inputs])
+        weight = linears(learner.policy)[0].weight
+        weight.register_hook(lambda gradient: gradient * is_learned.to(gradient))
     return learner
 
 
@@ -186,7 +189,7 @@ def restore(learner: PPO, state: dict[str, Any]) -> None:
 
 
 class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the environment of the type check
-    """PPO's two networks: the actor reads the first `len(INPUTS)` columns, the critic all."""
+    """PPO's two networks: the critic reads more columns than the actor, see `NetworkView`."""
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch, self.activation_fn)
@@ -197,8 +200,9 @@ class _TwoReaders(torch.nn.Module):
         self, n_columns: int, widths: dict[str, list[int]], activation: type[torch.nn.Module]
     ) -> None:
         super().__init__()
+        self.n_inputs = n_columns - len(KNOWN)
         self.policy_net = torch.nn.Sequential(
-            *create_mlp(len(INPUTS), -1, widths["pi"], activation)
+            *create_mlp(self.n_inputs, -1, widths["pi"], activation)
         )
         # Cheaper than tanh, and as good for values.
         self.value_net = torch.nn.Sequential(
@@ -210,7 +214,7 @@ class _TwoReaders(torch.nn.Module):
         return self.forward_actor(columns), self.forward_critic(columns)
 
     def forward_actor(self, columns: torch.Tensor) -> Any:
-        return self.policy_net(columns[:, : len(INPUTS)])
+        return self.policy_net(columns[:, : self.n_inputs])
 
     def forward_critic(self, columns: torch.Tensor) -> Any:
         return self.value_net(columns)

@@ -18,7 +18,8 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
+from swarm_logistics_env.motion.frame import OUTPUTS, MotionFrame
+from swarm_logistics_env.policies.card import Network
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key, row_keys
@@ -110,21 +111,22 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     Args:
         worlds: every robot is a row.
         scenario: of the worlds.
-        listens: whether the network reads the lowest timer heard.
+        network: what it reads.
 
     Attributes:
         frame: of each robot's motion, with its memory.
         observations: the latest rows (num_envs, D).
     """
 
-    def __init__(self, worlds: SwarmVecEnv, scenario: Scenario, listens: bool = True) -> None:
-        self.frame = MotionFrame(scenario, listens)
+    def __init__(self, worlds: SwarmVecEnv, scenario: Scenario, network: Network) -> None:
+        self.frame = MotionFrame(scenario, network.listens)
+        self._n_inputs = len(network.inputs)
         self.observations = np.zeros((worlds.num_envs, 0), np.float32)
         self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)
         self._begun, self._seed = 0, 0
         super().__init__(
             worlds,
-            Box(-np.inf, np.inf, (len(INPUTS) + len(KNOWN),), np.float32),
+            Box(-np.inf, np.inf, (self._n_inputs + len(KNOWN),), np.float32),
             Box(-1.0, 1.0, (len(OUTPUTS),), np.float32),
         )
 
@@ -161,14 +163,14 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         if over.size:
             last = np.stack([infos[row]["terminal_observation"] for row in over.tolist()])
             # The value network knows of one step before: the next episode has begun already.
-            ends = np.hstack([self.frame.peek(last, over), self._known[over]])
+            ends = np.hstack([self.frame.peek(last, over)[:, : self._n_inputs], self._known[over]])
             for row, read in zip(over.tolist(), ends):
                 infos[row]["terminal_observation"] = read
             self.frame.begin_rows(over, self._keys()[over])
         return self._read(), rewards, dones, infos
 
     def _read(self) -> NDArray[np.float32]:
-        inputs = self.frame.read(self.observations)
+        inputs = self.frame.read(self.observations)[:, : self._n_inputs]
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
             read_known(world.warehouse, self.frame.turned[rows], self._known[rows])
         return np.hstack([inputs, self._known])

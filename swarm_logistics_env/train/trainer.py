@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
@@ -65,6 +68,8 @@ def train(
     # Everything that may be refused comes first, before anything is written.
     device, begun = device_of(device), _new_view(training)
     first = None if training.start is None else _start(training.start, training.network)
+    # A robot that reads 0 in the inputs learned decides as before only with the same noise.
+    kept = {"deviations": first["deviations"]} if first and training.learn_inputs else {}
     enter(out, training, command)
     # Small networks gain little from more threads and lose much if cores are shared; the sums would
     # depend on the number of threads as well.
@@ -79,12 +84,12 @@ def train(
     if state is not None:
         restore(learner, state)
     elif first is not None:
-        take_tensors(learner.policy, first.tensors)
+        take_tensors(learner.policy, first)
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
         log.references = log.references or reference_means(training)
         with _live_table(training, learner.num_timesteps, log) as table:
-            callback = TrainingCallback(training, view, log, out, table)
+            callback = TrainingCallback(training, view, log, out, table, kept)
             learner.learn(
                 training.agent_steps - learner.num_timesteps, callback, reset_num_timesteps=False
             )
@@ -92,7 +97,8 @@ def train(
     view.close()
     asked = training.evaluation
     log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
-    tensors, card = tensors_of(learner.policy), _card(training, learner.num_timesteps, log, command)
+    tensors = {**tensors_of(learner.policy), **kept}
+    card = _card(training, learner.num_timesteps, log, command)
     path = out / f"{training.name}.safetensors"
     # The file is written before the scores are measured, which takes minutes.
     write_policy(path, card, tensors)
@@ -103,7 +109,7 @@ def train(
 
 
 def _new_view(training: Training) -> NetworkView:
-    return NetworkView(make_worlds(training), training.scenario, training.network.listens)
+    return NetworkView(make_worlds(training), training.scenario, training.network)
 
 
 def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
@@ -119,26 +125,37 @@ def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
     )
 
 
-def _start(name: str, network: Network) -> LearnedPolicy:
+def _start(name: str, network: Network) -> Mapping[str, NDArray[np.float32]]:
     policy = load(name)
     if not isinstance(policy, LearnedPolicy):
         raise TrainingError(f"start = {name!r}: should be a trained policy")
-    # What it hears and how it explores may differ; its tensors have to fit.
+    # What it hears and how it explores may differ, and inputs may be new, with weights of zero; its
+    # tensors have to fit.
+    tensors = dict(policy.tensors)
+    n_new = len(network.inputs) - len(policy.card.network.inputs)
+    if n_new > 0:
+        tensors["layers.0.weight"] = np.pad(tensors["layers.0.weight"], ((0, 0), (0, n_new)))
     try:
-        check_tensors(network, policy.tensors)
+        check_tensors(network, tensors)
     except PolicyError as error:
         raise TrainingError(f"start = {name!r}: {error}") from error
-    return policy
+    return tensors
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
     """Evaluates and writes checkpoints between updates."""
 
     def __init__(
-        self, training: Training, view: NetworkView, log: TrainingLog, out: Path, table: LiveTable
+        self,
+        training: Training,
+        view: NetworkView,
+        log: TrainingLog,
+        out: Path,
+        table: LiveTable,
+        kept: Mapping[str, NDArray[np.float32]],
     ) -> None:
         super().__init__()
-        self._training, self._view, self._log = training, view, log
+        self._training, self._view, self._log, self._kept = training, view, log, kept
         self._out, self._table = out, table
         self._start, self._saved_at = time.monotonic(), -math.inf
         self._before = log.seconds
@@ -155,9 +172,11 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self._log.updating += self._cpu_seconds()
         is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
         policy = self.model.policy
+        is_all_free = is_free and not self._training.learn_inputs
         for layer in linears(policy):
-            layer.requires_grad_(is_free)
-        policy.log_std.requires_grad_(is_free)
+            layer.requires_grad_(is_all_free)
+        policy.log_std.requires_grad_(is_all_free)
+        linears(policy)[0].weight.requires_grad_(is_free)
         floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
         with torch.no_grad():
             policy.log_std.clamp_(min=math.log(floor))
@@ -191,7 +210,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def _evaluate(self) -> None:
         training, log = self._training, self._log
-        tensors = tensors_of(self.model.policy)
+        tensors = {**tensors_of(self.model.policy), **self._kept}
         card = _card(training, self.num_timesteps, log)
         means = evaluate(
             LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads

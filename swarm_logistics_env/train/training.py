@@ -36,6 +36,8 @@ class Training(Part):
         about: a sentence about the policy, for its card.
         scenario: the conditions; a table of fields makes one.
         start: name or path of a trained policy that this one goes on from; none: from nothing.
+        learn_inputs: inputs whose weights alone are learned; none: everything. All else stays as in
+            `start`, so that whoever reads 0 in these inputs decides as before, bit by bit.
         worlds: kinds of worlds that run side by side. A training from nothing begins to learn in
             easy ones, which therefore stand beside the hard ones.
         threads: how many threads step the worlds, and how many processes measure the scores; no
@@ -59,6 +61,7 @@ class Training(Part):
     about: str = ""
     scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
     start: str | None = None
+    learn_inputs: tuple[str, ...] = ()
     worlds: Annotated[
         tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
     ] = (WorldKind(count=6),)
@@ -104,6 +107,11 @@ class Training(Part):
                     f"conditions.robots = {most}: should be at most the smallest swarm, "
                     f"{world.n_robots} robots"
                 )
+        unknown = sorted(set(self.learn_inputs) - set(self.network.inputs))
+        if unknown:
+            raise ValueError(f"learn_inputs = {unknown}: should be of network.inputs")
+        if self.learn_inputs and self.start is None:
+            raise ValueError("learn_inputs: should be left out, as there is no `start`")
         rows = self.rows * self.ppo.n_steps
         if rows % self.ppo.n_minibatches:
             raise ValueError(

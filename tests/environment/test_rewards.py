@@ -246,6 +246,17 @@ def test_a_robot_that_cannot_deliver_is_charged_while_it_holds_the_requested_ite
     assert terms.pay(world) == pytest.approx(np.where(np.arange(4) == faulty, -0.1, 0.0))
 
 
+def test_a_robot_that_cannot_lift_is_charged_for_its_distance_from_the_end_wall() -> None:
+    world = Warehouse(Scenario(n_robots=4, n_items=6))
+    world.reset(0)
+    assert not started(world, in_the_way=-1.0).pay(world).any(), "all can lift"
+    world.reset(0, [Fault("FM2", 1)])
+    faulty = ~world.state.lifts
+    world.state.robot_position[:, 0] = world.scenario.warehouse_width - 3.0
+    paid = started(world, in_the_way=-1.0).pay(world)
+    assert paid == pytest.approx(np.where(faulty, -0.3, 0.0))
+
+
 def test_terms_are_weighed_and_added(world: Warehouse) -> None:
     give(world, 1, 2)
     terms = started(world, delivery=0.5, own_delivery=2.0, contact=-10.0)

@@ -63,18 +63,3 @@ def test_the_way_home_is_kept_though_the_body_turns_unnoticed(noise: float) -> N
     assert np.median(np.abs(memory[has, known.AWAY] - away)) < 0.6
     drifts = memory[has, known.DRIFT] + state.robot_heading_drift[has]
     assert np.median(np.abs(drifts)) < 0.01
-
-
-def test_a_robot_that_carried_the_requested_item_inside_knows_that_it_cannot_deliver() -> None:
-    memory = np.zeros((1, known.N_COLUMNS))
-    sensed = scan(0.0, 1.0)[None]
-    sensed[0, row.CARRYING_REQUESTED] = 1.0
-    known.remember(sensed, 0.1, memory)
-    assert memory[0, known.CANNOT_DELIVER] == 0.0
-    sensed[0, row.IN_DELIVERY_AREA] = 1.0
-    known.remember(sensed, 0.1, memory)
-    sensed[0] = 0.0
-    for _ in range(1000):
-        known.remember(sensed, 0.1, memory)
-    assert memory[0, known.CANNOT_DELIVER] == 1.0
-    assert memory[0, known.FAILED] < 0.5

@@ -24,7 +24,7 @@ from swarm_logistics_env.train import Training, run_record, trainer
 from swarm_logistics_env.train.learner import make_learner, tensors_of
 from swarm_logistics_env.train.network_view import KNOWN
 from swarm_logistics_env.train.run_record import simulation
-from swarm_logistics_env.train.settings import Indicators, Scores
+from swarm_logistics_env.train.settings import Conditions, Indicators, Scores
 from swarm_logistics_env.train.trainer import train
 
 
@@ -198,6 +198,34 @@ def test_a_training_goes_on_from_a_trained_policy(small: Any, tmp_path: Path) ->
     layers = [name for name in load_file(first) if name.startswith("layers")]
     assert all((load_file(first)[name] == load_file(again)[name]).all() for name in layers)
     assert policies.read_card(again).training["start"] == str(first)
+
+
+def test_inputs_that_are_learned_alone_leave_every_other_decision_as_it_was(
+    small: Any, tmp_path: Path
+) -> None:
+    older = small().network.replace(inputs=88)
+    first = train(small(network=older), tmp_path / "first")
+    training = small(
+        start=str(first),
+        learn_inputs=("cannot_lift",),
+        network=older.replace(inputs=INPUTS),
+        conditions=(Conditions(modes=("FM2",), robots=(2,)),),
+    )
+    path = train(training, tmp_path / "again")
+    before, after = load_file(first), load_file(path)
+    width = before["layers.0.weight"].shape[1]
+    new = after["layers.0.weight"][:, width:]
+    assert (after["layers.0.weight"][:, :width] == before["layers.0.weight"]).all()
+    assert all((after[n] == before[n]).all() for n in before if n != "layers.0.weight")
+    assert new[:, 0].any(), "cannot_lift"
+    assert not new[:, 1:].any()
+
+
+def test_inputs_cannot_be_learned_alone_that_are_unknown_or_from_nothing(small: Any) -> None:
+    with pytest.raises(TrainingError, match=r"learn_inputs = .*'wings'.* should be of"):
+        small(learn_inputs=("wings",), start="ppo-delivery")
+    with pytest.raises(TrainingError, match="learn_inputs: should be left out"):
+        small(learn_inputs=("cannot_lift",))
 
 
 def test_deviations_keep_above_their_floor(small: Any, tmp_path: Path) -> None:

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Fault, Scenario, policies
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.episode import Play
+from swarm_logistics_env.motion import memory as known
+
+
+def sensed(*, item_at: float | None = None, recently_held: bool = False) -> NDArray[np.float32]:
+    """A row (1, D) with one item ahead [m], or none."""
+    rows = np.zeros((1, row.N_COLUMNS), np.float32)
+    if item_at is not None:
+        rows[0, row.ITEMS : row.ITEMS + row.ITEM_WIDTH] = [1, item_at, 0, 0, recently_held]
+    return rows
+
+
+def go_on(memory: NDArray[np.float64], rows: NDArray[np.float32], seconds: float) -> None:
+    for _ in range(round(seconds / 0.1)):
+        known.remember(rows, 0.1, memory)
+
+
+@pytest.fixture
+def memory() -> NDArray[np.float64]:
+    return np.zeros((1, known.N_COLUMNS))
+
+
+def hold(memory: NDArray[np.float64], rows: NDArray[np.float32], times: int) -> None:
+    """Hold on to what is in view, and learn what came of it."""
+    for _ in range(times):
+        known.note_commands(rows, np.array([[0.0, 0.0, 0.0, 1.0]]), memory)
+        known.remember(rows, 0.1, memory)
+
+
+def test_a_robot_that_carried_the_requested_item_inside_knows_that_it_cannot_deliver(
+    memory: NDArray[np.float64],
+) -> None:
+    rows = sensed()
+    rows[0, row.CARRYING_REQUESTED] = 1.0
+    known.remember(rows, 0.1, memory)
+    assert memory[0, known.CANNOT_DELIVER] == 0.0
+    rows[0, row.IN_DELIVERY_AREA] = 1.0
+    known.remember(rows, 0.1, memory)
+    go_on(memory, sensed(), 100.0)
+    assert memory[0, known.CANNOT_DELIVER] == 1.0
+    assert memory[0, known.FAILED] < 0.5
+
+
+def test_a_robot_that_holds_on_in_vain_takes_its_gripper_for_broken_and_tries_again_later(
+    memory: NDArray[np.float64],
+) -> None:
+    hold(memory, sensed(item_at=0.1), 2)
+    assert memory[0, known.CANNOT_LIFT] == 0.0
+    hold(memory, sensed(item_at=0.1), 1)
+    memory[0, known.HELD] = 0.0
+    go_on(memory, sensed(), 119.0)
+    assert memory[0, known.CANNOT_LIFT] > 0.0
+    go_on(memory, sensed(), 2.0)
+    assert memory[0, known.CANNOT_LIFT] == 0.0
+
+
+def test_a_lift_shows_that_the_gripper_works(memory: NDArray[np.float64]) -> None:
+    hold(memory, sensed(item_at=0.1), 3)
+    laden = sensed()
+    laden[0, row.CARRYING] = 1.0
+    known.remember(laden, 0.1, memory)
+    assert memory[0, known.CANNOT_LIFT] == 0.0
+    hold(memory, sensed(item_at=0.1), 2)
+    assert memory[0, known.CANNOT_LIFT] == 0.0, "what it held in vain before the lift is forgotten"
+
+
+@pytest.mark.parametrize(
+    "rows", [sensed(), sensed(item_at=0.3), sensed(item_at=0.1, recently_held=True)]
+)
+def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(
+    memory: NDArray[np.float64], rows: NDArray[np.float32]
+) -> None:
+    hold(memory, rows, 20)
+    assert memory[0, known.CANNOT_LIFT] == 0.0
+
+
+def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> None:
+    policy = policies.load("ppo-robust")
+    play = Play(Scenario(restock=True, duration=120.0), policy, 60_001, [Fault("FM2", 3)])
+    while not play.is_over:
+        play.step()
+        takes_for_broken = policy._frame.memory[:, known.CANNOT_LIFT] > 0.0
+        assert not np.any(takes_for_broken & play.world.state.lifts)
+    assert (takes_for_broken == ~play.world.state.lifts).all()
