@@ -52,7 +52,11 @@ class Network(_Part):
     @field_validator("inputs", mode="before")
     @classmethod
     def _named(cls, inputs: Any) -> Any:
-        return INPUTS[:inputs] if isinstance(inputs, int) and inputs in INPUT_COUNTS else inputs
+        if not isinstance(inputs, int):
+            return inputs
+        if inputs not in INPUT_COUNTS:
+            raise ValueError(f"{inputs}: should be one of {', '.join(map(str, INPUT_COUNTS))}")
+        return INPUTS[:inputs]
 
     @field_validator("inputs", "outputs")
     @classmethod

@@ -64,7 +64,7 @@ def make_learner(
         learner.policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
     if training.learn_inputs:
         is_learned = torch.tensor([name in training.learn_inputs for name in network.inputs])
-        weight = linears(learner.policy)[0].weight
+        weight: Any = linears(learner.policy)[0].weight
         weight.register_hook(lambda gradient: gradient * is_learned.to(gradient))
     return learner
 

@@ -36,8 +36,8 @@ class Training(Part):
         about: a sentence about the policy, for its card.
         scenario: the conditions; a table of fields makes one.
         start: name or path of a trained policy that this one goes on from; none: from nothing.
-        learn_inputs: inputs whose weights alone are learned; none: everything. All else stays as in
-            `start`, so that whoever reads 0 in these inputs decides as before, bit by bit.
+        learn_inputs: inputs whose weights alone are learned; none: everything is learned. All else
+            stays as in `start`, so that a robot that reads 0 in them decides as before, bit by bit.
         worlds: kinds of worlds that run side by side. A training from nothing begins to learn in
             easy ones, which therefore stand beside the hard ones.
         threads: how many threads step the worlds, and how many processes measure the scores; no

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -83,7 +85,7 @@ def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(
 
 
 def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> None:
-    policy = policies.load("ppo-robust")
+    policy: Any = policies.load("ppo-robust")
     play = Play(Scenario(restock=True, duration=120.0), policy, 60_001, [Fault("FM2", 3)])
     while not play.is_over:
         play.step()

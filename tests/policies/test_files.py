@@ -110,6 +110,11 @@ def test_columns_that_are_not_read_any_more_are_refused(
     refused(file, "has 92 columns: should have 93")
 
 
+def test_a_number_of_inputs_that_no_network_had_is_refused(card: PolicyCard) -> None:
+    with pytest.raises(PolicyError, match="85: should be one of 84, 88, 93"):
+        card.network.replace(inputs=85)
+
+
 @pytest.mark.parametrize("count", [84, 88])
 def test_a_network_of_the_first_inputs_is_played(
     card: PolicyCard, tensors: Tensors, count: int
