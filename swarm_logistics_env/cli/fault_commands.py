@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import PresetOption, ScenarioOption, SetOption, faults_of, scenario_of
+from .options import PresetOption, ScenarioOption, SetOption, fault_option, faults_of, scenario_of
 from .study_commands import ProcessesOption
 
 if TYPE_CHECKING:
@@ -66,12 +66,12 @@ def attack_command(
 def blame_command(
     policy: PolicyArgument,
     fault: Annotated[
-        str, typer.Option(help="MODE[:ROBOTS]@ONSET, with an onset later than 0, e.g. FM4:2@100.")
+        str,
+        typer.Option(
+            help="MODE[:ROBOTS[:ROLE]]@ONSET[+DURATION], the onset later than 0, e.g. FM4:2@100. "
+            "Robots in the role at the onset fail first; by the seed if not given."
+        ),
     ],
-    role: Annotated[
-        str | None,
-        typer.Option(help="Robots that do this at the onset fail first; by the seed if not given."),
-    ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Number of episodes.")] = 20,
     first_seed: Annotated[int, typer.Option(min=0, help="Smallest seed.")] = 0,
     preset: PresetOption = "paper",
@@ -100,7 +100,7 @@ def blame_command(
 
     from .terminal_tables import show
 
-    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}{f'-{role}' if role else ''}"
+    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
     place = out or (study or Path("results")) / name
     scenario = scenario_of(preset, file, changes)
     asked = Study.stored(study) if study else None
@@ -112,7 +112,6 @@ def blame_command(
             task = asked.specification.played.name
             raise SetupError(f"--study {study}: plays {task!r}, should be one of the warehouse")
     (chosen,) = faults_of([fault], scenario)
-    chosen = chosen.replace(role=role)
     done = 0
     with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
 
@@ -176,7 +175,8 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         ("found by", "fault", "R [95 %]", "runs"),
         rows,
         f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
-        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.",
+        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met. "
+        f"`run` and `watch` play it with {fault_option(worst.fault)}.",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
         *([capped] if result.is_capped else ()),

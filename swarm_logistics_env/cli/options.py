@@ -27,13 +27,14 @@ ScenarioOption = Annotated[
         help="TOML or JSON file of fields to change, as `scenario --json` writes it.",
     ),
 ]
+FAULT_FORM = "MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]]"
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
 ]
 FaultOption = Annotated[
     list[str] | None,
-    typer.Option("--fault", help="MODE[:ROBOTS][@ONSET], e.g. FM1:2@200; may be repeated."),
+    typer.Option("--fault", help=f"{FAULT_FORM}, e.g. FM1:2@200; may be repeated."),
 ]
 PolicyOption = Annotated[
     str,
@@ -46,7 +47,11 @@ TrustPolicyOption = Annotated[
     bool, typer.Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
 ]
 
-_FAULT = re.compile(r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+))?(@(?P<onset>\d+\.?\d*|\.\d+))?")
+_NUMBER = r"\d+\.?\d*|\.\d+"
+_FAULT = re.compile(
+    r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+)(:(?P<role>\w+))?)?"
+    rf"(@(?P<onset>{_NUMBER})(\+(?P<duration>{_NUMBER}))?)?"
+)
 
 
 def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
@@ -71,7 +76,7 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
 
 
 def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
-    """Return the faults that `--fault MODE[:ROBOTS][@ONSET]` describes.
+    """Return the faults that `--fault MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]]` describes.
 
     Raises:
         FaultError: a text does not read so, there is no such fault, or the episode ends before.
@@ -82,11 +87,26 @@ def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
     for text in texts or []:
         match = _FAULT.fullmatch(text)
         if match is None:
-            raise FaultError(f"--fault {text}: should be MODE[:ROBOTS][@ONSET], e.g. FM1:2@200")
+            raise FaultError(f"--fault {text}: should be {FAULT_FORM}, e.g. FM1:2@200")
         onset = float(match["onset"] or 0)
         if onset >= scenario.duration:
             raise FaultError(
                 f"--fault {text}: should begin before the episode ends at {scenario.duration:g} s"
             )
-        faults.append(Fault(match["mode"], int(match["robots"] or 1), onset=onset))
+        faults.append(
+            Fault(
+                match["mode"],
+                int(match["robots"] or 1),
+                onset=onset,
+                duration=float(match["duration"]) if match["duration"] else None,
+                role=match["role"],
+            )
+        )
     return faults
+
+
+def fault_option(fault: Fault) -> str:
+    """Return the `--fault` that describes the fault."""
+    role = f":{fault.role}" if fault.role else ""
+    until = f"+{fault.duration:g}" if fault.duration else ""
+    return f"--fault {fault.mode}:{fault.robots}{role}@{fault.onset:g}{until}"
