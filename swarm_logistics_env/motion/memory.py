@@ -35,7 +35,7 @@ N_COLUMNS = 21
 
 FAILURE_TIME = 60.0  # [s]
 RETRY_TIME = 120.0  # [s], after which a gripper is tried again: it may have been repaired
-SURELY_IN_VAIN = 3.0  # times; what a robot put down it may lift after a delivery, a step too late
+SURELY_IN_VAIN = 3.0  # times; fewer may be chance: a delivery frees what it just put down
 HOME_TIME = 10.0  # [s], in which a remembered direction fades: by then a gyro may have drifted
 KEPT_TIME = 60.0  # [s], in which a direction fades that is held against the walls
 STUCK_TIME = 1.5  # [s]
