@@ -47,6 +47,8 @@ class Conditions(Part):
 
     Args:
         weight: the frequency of this kind, relative to the others.
+        final_weight: the frequency at the end of the training; it changes evenly from `weight` on,
+            for episodes that are too hard at first, or too easy at last. None: it stays.
         modes: failure modes, one of them drawn for each episode; "removed" is the reference P_S.
         robots: numbers m of faulty robots, one of them drawn.
         onset: (earliest, latest) time at which they fail [s], drawn evenly.
@@ -54,10 +56,16 @@ class Conditions(Part):
     """
 
     weight: PositiveFloat = 1.0
+    final_weight: NonNegativeFloat | None = None
     modes: Modes = ()
     robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
     onset: tuple[NonNegativeFloat, NonNegativeFloat] = (0.0, 0.0)
     scenario: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
+
+    def weight_at(self, done: float) -> float:
+        """Return the weight once a share `done` of the training is over."""
+        last = self.weight if self.final_weight is None else self.final_weight
+        return self.weight + done * (last - self.weight)
 
     @field_validator("onset")
     @classmethod

@@ -38,7 +38,7 @@ from swarm_logistics_env.train.live_table import LiveTable
 from swarm_logistics_env.train.network_view import NetworkView
 from swarm_logistics_env.train.run_record import enter, simulation, versions
 from swarm_logistics_env.train.training import Training
-from swarm_logistics_env.train.training_worlds import make_worlds
+from swarm_logistics_env.train.training_worlds import follow_progress, make_worlds
 
 CHECKPOINT_EVERY = 20.0  # seconds
 
@@ -177,7 +177,9 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             layer.requires_grad_(is_all_free)
         policy.log_std.requires_grad_(is_all_free)
         linears(policy)[0].weight.requires_grad_(is_free)
-        floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
+        done = min(1.0, self.num_timesteps / self._training.agent_steps)
+        follow_progress(self._view.venv, done)
+        floor = self._training.ppo.floor(done)
         with torch.no_grad():
             policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve

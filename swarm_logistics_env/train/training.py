@@ -101,6 +101,8 @@ class Training(Part):
             self.scenario.replace(n_robots=size)
         for world in self.worlds:
             mixed = world.conditions or self.conditions
+            if mixed and not sum(kind.weight_at(1.0) for kind in mixed):
+                raise ValueError("conditions.final_weight: should be above 0 for one kind at least")
             most = max((max(kind.robots) for kind in mixed if kind.modes), default=0)
             if most > world.n_robots:
                 raise ValueError(

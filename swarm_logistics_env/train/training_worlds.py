@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarm_logistics_env.adapters import SwarmVecEnv
+from swarm_logistics_env.adapters.worlds import layers_of
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reset_options import faults_among, scenario_fields
 from swarm_logistics_env.errors import StudyError, TrainingError
@@ -82,13 +83,17 @@ class EpisodeMix(Wrapper):
     def __init__(self, env: SwarmLogisticsEnv | Wrapper, kinds: Sequence[Conditions]) -> None:
         super().__init__(env)
         self._kinds = tuple(kinds)
-        weights = np.array([kind.weight for kind in kinds])
-        self._shares = weights / weights.sum() if len(weights) else weights
+        self.follow(0.0)
         own = self.unwrapped.scenario
         for kind in kinds:
             for name, values in kind.scenario.items():
                 for value in values:
                     self.env.declare_spaces(own.replace(**{name: value}))
+
+    def follow(self, done: float) -> None:
+        """Mix what begins from now on as it is due after a share `done` of the training."""
+        weights = np.array([kind.weight_at(done) for kind in self._kinds])
+        self._shares = weights / weights.sum()
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's conditions among them."""
@@ -105,6 +110,14 @@ class EpisodeMix(Wrapper):
             robots = kind.robots[int(rng.integers(len(kind.robots)))]
             faults = (*faults, Fault(mode, robots, onset=float(rng.uniform(*kind.onset))))
         return {**options, "scenario": {**drawn, **scenario_fields(options)}, "faults": faults}
+
+
+def follow_progress(worlds: SwarmVecEnv, done: float) -> None:
+    """Mix the episodes of all worlds as it is due after a share `done` of the training."""
+    for world in worlds.worlds:
+        for layer in layers_of(world):
+            if isinstance(layer, EpisodeMix):
+                layer.follow(done)
 
 
 def performances_of_study(directory: str | Path, own: Scenario) -> dict[Condition, float]:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,12 @@ from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.settings import Conditions
-from swarm_logistics_env.train.training_worlds import EpisodeMix, performances_of_study
+from swarm_logistics_env.train.training_worlds import (
+    EpisodeMix,
+    follow_progress,
+    make_worlds,
+    performances_of_study,
+)
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.wrappers import Condition
 
@@ -86,6 +92,29 @@ def test_episodes_are_drawn_by_weight_and_seed() -> None:
     other = mixed(*kinds)
     other.reset_arrays(7)
     assert other.warehouse.faults == first
+
+
+def test_weights_follow_the_progress_of_the_training(small: Any) -> None:
+    easy = Conditions(weight=1.0, final_weight=0.0)
+    hard = Conditions(weight=0.01, final_weight=1.0, modes=("FM4",), robots=(1,))
+    worlds = make_worlds(small(conditions=(easy, hard)))
+    hit = []
+    for done in (0.0, 0.5, 1.0):
+        follow_progress(worlds, done)
+        met = 0
+        for seed in range(100):
+            worlds.worlds[1].reset_arrays(seed)
+            met += bool(worlds.worlds[1].unwrapped.warehouse.faults)
+        hit.append(met)
+    worlds.close()
+    assert hit[0] <= 5
+    assert 35 <= hit[1] <= 65
+    assert hit[2] == 100
+
+
+def test_a_training_without_episodes_at_its_end_is_refused(small: Any) -> None:
+    with pytest.raises(TrainingError, match=r"conditions\.final_weight: should be above 0"):
+        small(conditions=(Conditions(final_weight=0.0),))
 
 
 def test_scenarios_are_drawn_and_options_come_first() -> None:
