@@ -221,6 +221,35 @@ def test_inputs_that_are_learned_alone_leave_every_other_decision_as_it_was(
     assert not new[:, 1:].any()
 
 
+def test_a_training_of_some_inputs_goes_on_to_the_same_bits(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = train(small(network=small().network.replace(inputs=88)), tmp_path / "first")
+    training = small(
+        start=str(first),
+        learn_inputs=("cannot_lift",),
+        conditions=(
+            Conditions(modes=("FM2",), robots=(2,), final_weight=0.5),
+            Conditions(weight=0.1, final_weight=1.0),
+        ),
+    )
+    whole = train(training, tmp_path / "whole")
+    save, saved = trainer.save_checkpoint, []
+
+    def save_and_stop(*given: Any) -> None:
+        save(*given)
+        saved.append(given)
+        if len(saved) == 3:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as changed:
+        changed.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+        changed.setattr(trainer, "save_checkpoint", save_and_stop)
+        with pytest.raises(KeyboardInterrupt):
+            train(training, tmp_path / "cut")
+    assert same(train(training, tmp_path / "cut"), whole)
+
+
 def test_inputs_cannot_be_learned_alone_that_are_unknown_or_from_nothing(small: Any) -> None:
     with pytest.raises(TrainingError, match=r"learn_inputs = .*'wings'.* should be of"):
         small(learn_inputs=("wings",), start="ppo-delivery")
