@@ -49,7 +49,7 @@ def suggest(name: str, known: Iterable[str]) -> str:
     """Return the end of an error message about an unknown `name`.
 
     "; did you mean 'x'?" where one of `known` is close to it; "; did you mean 'x' or 'y'?" where
-    several are equally close, or one to six of them contain it, whatever its case; else the list
+    several are equally close, or one to eight of them contain it, whatever its case; else the list
     of what is known.
     """
     names = sorted(known)
@@ -57,7 +57,7 @@ def suggest(name: str, known: Iterable[str]) -> str:
     meant = sorted(near for near in likeness if likeness[near] == max(likeness.values()))
     if not meant and name:
         meant = [known for known in names if name.casefold() in known.casefold()]
-    if 1 <= len(meant) <= 6:
+    if 1 <= len(meant) <= 8:
         *others, last = map(repr, meant)
         return f"; did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
     return f"; known: {', '.join(names)}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import PresetOption, ScenarioOption, SetOption, fault_option, faults_of, scenario_of
+from .options import PresetOption, ScenarioOption, SetOption, faults_of, scenario_of
 from .study_commands import ProcessesOption
 
 if TYPE_CHECKING:
@@ -152,6 +153,7 @@ def _stopped(place: Path) -> None:
 
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
+    from swarm_logistics_env.fault_text import text_of
     from swarm_logistics_env.report.wording import bracketed
 
     from .terminal_tables import show_table
@@ -166,6 +168,8 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         for found in result.found
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)
+    text = text_of(worst.fault)
+    played = f" `run` and `watch` play it with --fault {shlex.quote(text)}." if text else ""
     capped = (
         "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
         "shown. --set restock=true has no cap."
@@ -175,8 +179,7 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         ("found by", "fault", "R [95 %]", "runs"),
         rows,
         f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
-        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met. "
-        f"`run` and `watch` play it with {fault_option(worst.fault)}.",
+        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.{played}",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
         *([capped] if result.is_capped else ()),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,14 +26,17 @@ ScenarioOption = Annotated[
         help="TOML or JSON file of fields to change, as `scenario --json` writes it.",
     ),
 ]
-FAULT_FORM = "MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]]"
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
 ]
 FaultOption = Annotated[
     list[str] | None,
-    typer.Option("--fault", help=f"{FAULT_FORM}, e.g. FM1:2@200; may be repeated."),
+    typer.Option(
+        "--fault",
+        metavar="FAULT",
+        help="MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200; may be repeated.",
+    ),
 ]
 PolicyOption = Annotated[
     str,
@@ -46,12 +48,6 @@ SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[
     bool, typer.Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
 ]
-
-_NUMBER = r"\d+\.?\d*|\.\d+"
-_FAULT = re.compile(
-    r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+)(:(?P<role>\w+))?)?"
-    rf"(@(?P<onset>{_NUMBER})(\+(?P<duration>{_NUMBER}))?)?"
-)
 
 
 def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
@@ -76,37 +72,17 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
 
 
 def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
-    """Return the faults that `--fault MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]]` describes.
+    """Return the faults that `--fault` describes, see `fault_text`.
 
     Raises:
         FaultError: a text does not read so, there is no such fault, or the episode ends before.
     """
-    from swarm_logistics_env.warehouse.faults import Fault
+    from swarm_logistics_env.fault_text import fault_of
 
-    faults = []
-    for text in texts or []:
-        match = _FAULT.fullmatch(text)
-        if match is None:
-            raise FaultError(f"--fault {text}: should be {FAULT_FORM}, e.g. FM1:2@200")
-        onset = float(match["onset"] or 0)
-        if onset >= scenario.duration:
+    faults = [fault_of(text) for text in texts or []]
+    for fault, text in zip(faults, texts or []):
+        if fault.onset >= scenario.duration:
             raise FaultError(
                 f"--fault {text}: should begin before the episode ends at {scenario.duration:g} s"
             )
-        faults.append(
-            Fault(
-                match["mode"],
-                int(match["robots"] or 1),
-                onset=onset,
-                duration=float(match["duration"]) if match["duration"] else None,
-                role=match["role"],
-            )
-        )
     return faults
-
-
-def fault_option(fault: Fault) -> str:
-    """Return the `--fault` that describes the fault."""
-    role = f":{fault.role}" if fault.role else ""
-    until = f"+{fault.duration:g}" if fault.duration else ""
-    return f"--fault {fault.mode}:{fault.robots}{role}@{fault.onset:g}{until}"

@@ -203,10 +203,10 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
 
 
 def in_the_way(world: Warehouse, before: Before) -> Earned:
-    """Seconds times metres from the end wall of the delivery area, of robots that cannot lift.
+    """Seconds times metres to the wall behind the delivery area, of each robot that cannot lift.
 
-    Weigh it negatively: there such a robot is out of the way of those that search and carry.
-    Privileged: a robot only finds out by holding on to items in vain.
+    Weigh it negatively: at that wall it is out of the way of those that search and carry. Dead
+    robots count as well. Privileged: a robot only finds out by holding on to items in vain.
     """
     state = world.state
     if state.lifts.all():

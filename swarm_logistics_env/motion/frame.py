@@ -197,7 +197,7 @@ def read_rows(
         read[at + 2] = sure * min(max(own[known.AWAY], -FARTHEST), FARTHEST) / FARTHEST
         read[at + 3] = own[known.CANNOT_DELIVER]
         # The way home once more, for a robot that cannot lift: the weights of these inputs can be
-        # learned alone, and a robot that can lift decides as before (`Training.learn_inputs`).
+        # learned alone, and robots that read zeros decide as before (`Training.learn_inputs`).
         cannot_lift = 1.0 if own[known.CANNOT_LIFT] > 0.0 else 0.0
         read[at + 4] = cannot_lift
         read[at + 5], read[at + 6] = cannot_lift * read[at], cannot_lift * read[at + 1]

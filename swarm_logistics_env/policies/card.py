@@ -67,7 +67,8 @@ class Network(_Part):
                 raise ValueError(f"column {place} is {name!r}: should be {wanted!r}")
         allowed = INPUT_COUNTS if right is INPUTS else (len(right),)
         if len(names) not in allowed:
-            raise ValueError(f"has {len(names)} columns: should have {len(right)}")
+            counts = " or ".join(map(str, allowed))
+            raise ValueError(f"has {len(names)} columns: should have {counts}")
         return names
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import SwarmLogisticsError
+from swarm_logistics_env.fault_text import text_of
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
 from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
@@ -89,10 +90,10 @@ def watch_command(arm: Arm) -> str | None:
             text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
             words += ["--set", f"{name}={text}"]
     for fault in condition.faults:
-        if fault != type(fault)(fault.mode, fault.robots, fault.onset):
-            return None  # no option says how long it lasts, and the like
-        start = f"@{fault.onset:g}" if fault.onset else ""
-        words += ["--fault", f"{fault.mode}:{fault.robots}{start}"]
+        described = text_of(fault)
+        if described is None:
+            return None
+        words += ["--fault", described]
     return shlex.join(words)
 
 

@@ -46,7 +46,7 @@ class Conditions(Part):
     """Episodes of one kind, among those that a training mixes.
 
     Args:
-        weight: the frequency of this kind, relative to the others.
+        weight: the frequency of this kind, relative to the others; above 0 without `final_weight`.
         final_weight: the frequency at the end of the training; it changes evenly from `weight` on,
             for episodes that are too hard at first, or too easy at last. None: it stays.
         modes: failure modes, one of them drawn for each episode; "removed" is the reference P_S.
@@ -55,12 +55,18 @@ class Conditions(Part):
         scenario: fields of the scenario with the values that are drawn from.
     """
 
-    weight: PositiveFloat = 1.0
+    weight: NonNegativeFloat = 1.0
     final_weight: NonNegativeFloat | None = None
     modes: Modes = ()
     robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
     onset: tuple[NonNegativeFloat, NonNegativeFloat] = (0.0, 0.0)
     scenario: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _played(self) -> Self:
+        if not self.weight and not self.final_weight:
+            raise ValueError("weight: should be above 0, or `final_weight` should")
+        return self
 
     def weight_at(self, done: float) -> float:
         """Return the weight once a share `done` of the training is over."""

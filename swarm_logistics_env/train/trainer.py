@@ -17,7 +17,7 @@ from stable_baselines3.common.logger import configure
 
 from swarm_logistics_env.errors import PolicyError, TrainingError
 from swarm_logistics_env.policies import load
-from swarm_logistics_env.policies.card import Network, PolicyCard
+from swarm_logistics_env.policies.card import PolicyCard
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
 from swarm_logistics_env.scenario import Scenario
@@ -67,7 +67,7 @@ def train(
     out = Path(out)
     # Everything that may be refused comes first, before anything is written.
     device, begun = device_of(device), _new_view(training)
-    first = None if training.start is None else _start(training.start, training.network)
+    first = None if training.start is None else _start(training, training.start)
     # A robot that reads 0 in the inputs learned decides as before only with the same noise.
     kept = {"deviations": first["deviations"]} if first and training.learn_inputs else {}
     enter(out, training, command)
@@ -125,16 +125,26 @@ def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
     )
 
 
-def _start(name: str, network: Network) -> Mapping[str, NDArray[np.float32]]:
-    policy = load(name)
+def _start(training: Training, name: str) -> Mapping[str, NDArray[np.float32]]:
+    policy, network = load(name), training.network
     if not isinstance(policy, LearnedPolicy):
         raise TrainingError(f"start = {name!r}: should be a trained policy")
-    # What it hears and how it explores may differ, and inputs may be new, with weights of zero; its
-    # tensors have to fit.
+    begun = policy.card.network
+    n_new = len(network.inputs) - len(begun.inputs)
+    if n_new < 0:
+        raise TrainingError(
+            f"network.inputs = {len(network.inputs)}: should be at least {len(begun.inputs)}, as "
+            f"many as start = {name!r} reads"
+        )
+    if training.learn_inputs and network != begun.replace(inputs=network.inputs):
+        raise TrainingError(
+            f"network: should be that of start = {name!r} but for `inputs`, as learn_inputs leaves "
+            "all else as it is there"
+        )
+    # What it hears and how it explores may differ otherwise; its tensors have to fit. The weights
+    # of new inputs are zeros.
     tensors = dict(policy.tensors)
-    n_new = len(network.inputs) - len(policy.card.network.inputs)
-    if n_new > 0:
-        tensors["layers.0.weight"] = np.pad(tensors["layers.0.weight"], ((0, 0), (0, n_new)))
+    tensors["layers.0.weight"] = np.pad(tensors["layers.0.weight"], ((0, 0), (0, n_new)))
     try:
         check_tensors(network, tensors)
     except PolicyError as error:

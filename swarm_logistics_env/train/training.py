@@ -101,17 +101,23 @@ class Training(Part):
             self.scenario.replace(n_robots=size)
         for world in self.worlds:
             mixed = world.conditions or self.conditions
-            if mixed and not sum(kind.weight_at(1.0) for kind in mixed):
-                raise ValueError("conditions.final_weight: should be above 0 for one kind at least")
+            for done, name in ((0.0, "weight"), (1.0, "final_weight")):
+                if mixed and not sum(kind.weight_at(done) for kind in mixed):
+                    raise ValueError(
+                        f"conditions.{name}: should be above 0 for one kind at least of those that "
+                        f"worlds of {world.n_robots} robots mix"
+                    )
             most = max((max(kind.robots) for kind in mixed if kind.modes), default=0)
             if most > world.n_robots:
                 raise ValueError(
                     f"conditions.robots = {most}: should be at most the smallest swarm, "
                     f"{world.n_robots} robots"
                 )
-        unknown = sorted(set(self.learn_inputs) - set(self.network.inputs))
-        if unknown:
-            raise ValueError(f"learn_inputs = {unknown}: should be of network.inputs")
+        for name in self.learn_inputs:
+            if name not in self.network.inputs:
+                raise ValueError(
+                    f"learn_inputs: no input {name!r}{suggest(name, self.network.inputs)}"
+                )
         if self.learn_inputs and self.start is None:
             raise ValueError("learn_inputs: should be left out, as there is no `start`")
         rows = self.rows * self.ppo.n_steps

@@ -253,3 +253,20 @@ def test_a_robot_that_moves_is_not_caged() -> None:
     for _ in range(200):
         frame.read(rows)
         assert frame.command(np.array([[1.0, 0.0, 1.0]]))[0, 3] == 1.0
+
+
+def test_a_robot_that_cannot_lift_reads_the_way_home_once_more_and_others_read_zeros() -> None:
+    frame = MotionFrame(Scenario())
+    frame.begin(np.arange(2, dtype=np.uint64))
+    frame.memory[:, known.KEPT_X] = 2.0
+    frame.memory[:, known.AWAY] = 4.0
+    frame.memory[0, known.CANNOT_LIFT] = 60.0
+    rows = np.zeros((2, row.N_COLUMNS), np.float32)
+    rows[:, row.IN_DELIVERY_AREA] = 1.0
+    unable, able = frame.read(rows)
+    new = INPUTS.index("cannot_lift")
+    home = INPUTS.index("kept_home_along")
+    assert unable[new] == unable[new + 4] == 1.0
+    assert (unable[new + 1 : new + 4] == unable[home : home + 3]).all()
+    assert np.abs(unable[new + 1 : new + 3]).max() > 0.5
+    assert not able[new:].any()

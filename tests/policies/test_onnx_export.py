@@ -129,6 +129,8 @@ def test_the_page_tells_the_numbers_of_the_code() -> None:
         f"{memory.SURELY_IN_REACH:g} m",
         f"{memory.STANDS:g} m/s",
         f"{memory.MOVES:g} m/s",
+        f"{memory.RETRY_TIME:g} s",
+        f"{memory.SURELY_IN_VAIN:g} times",
         f"{len(INPUTS)} inputs",
         f"{memory.N_COLUMNS} numbers",
     ):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.loading import WEIGHTS
 from swarm_logistics_env.train.training import load_training, preset_names
 from swarm_logistics_env.warehouse import Fault
@@ -55,6 +56,19 @@ def test_the_preset_is_what_the_card_says(name: str) -> None:
     card = policies.read_card(WEIGHTS / f"{name}.safetensors")
     preset = load_training(card.command.split()[-1])
     assert preset.model_dump(mode="json", exclude_defaults=True) == card.training
+
+
+def test_robust_differs_from_its_second_stage_in_the_inputs_that_it_learned_alone() -> None:
+    before, after = policies.load("ppo-robust-second"), policies.load("ppo-robust")
+    assert isinstance(before, LearnedPolicy)
+    assert isinstance(after, LearnedPolicy)
+    learned = after.card.training["learn_inputs"]
+    assert [name for name in after.card.network.inputs if name in learned] == learned
+    assert after.card.network.inputs[: -len(learned)] == before.card.network.inputs
+    for name, weights in before.tensors.items():
+        kept = after.tensors[name]
+        kept = kept[:, : -len(learned)] if name == "layers.0.weight" else kept
+        assert (kept == weights).all()
 
 
 def test_a_fast_drift_costs_delivery_little() -> None:

@@ -103,14 +103,20 @@ def test_command_of_a_run_plays_the_stored_one(
 def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word() -> None:
     scenario = {"speed_mix": [1.0, 0.5], "restock": True}
     mid_run = {"modes": ["FM4"], "robots": [1], "onsets": [100.0]}
-    plan = Study(scenario=scenario, faults=[mid_run, {**mid_run, "duration": 50.0}]).plan()
+    breaks = {"modes": ["FM1"], "robots": [1], "intermittent": [5.0, 5.0]}
+    faults = [mid_run, {**mid_run, "duration": 50.0}, breaks]
+    plan = Study(scenario=scenario, faults=faults).plan()
     commands = {str(arm.condition.faults): watch_command(arm) for _, _, arm in plan.cells}
-    lasting = [command for faults, command in commands.items() if "duration=50" in faults]
-    assert lasting == [None]
-    (for_good,) = (c for faults, c in commands.items() if "FM4" in faults and c is not None)
+    (lasting,) = (c for faults, c in commands.items() if "duration=50" in faults)
+    assert lasting is not None
+    assert lasting.endswith("--fault FM4:1@100+50")
+    (for_good,) = (
+        c for faults, c in commands.items() if "FM4" in faults and c not in (None, lasting)
+    )
     assert shlex.split(for_good)[4:] == [
         *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100")
     ]
+    assert [c for faults, c in commands.items() if "intermittent=(" in faults] == [None]
     assert {watch_command(null) for null in plan.nulls.values()} == {None}
 
 

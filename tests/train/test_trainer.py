@@ -19,9 +19,10 @@ from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS
+from swarm_logistics_env.policies.loading import WEIGHTS
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
-from swarm_logistics_env.train.learner import make_learner, tensors_of
+from swarm_logistics_env.train.learner import make_learner, save_checkpoint, tensors_of
 from swarm_logistics_env.train.network_view import KNOWN
 from swarm_logistics_env.train.run_record import simulation
 from swarm_logistics_env.train.settings import Conditions, Indicators, Scores
@@ -234,10 +235,10 @@ def test_a_training_of_some_inputs_goes_on_to_the_same_bits(
         ),
     )
     whole = train(training, tmp_path / "whole")
-    save, saved = trainer.save_checkpoint, []
+    saved: list[Any] = []
 
     def save_and_stop(*given: Any) -> None:
-        save(*given)
+        save_checkpoint(*given)
         saved.append(given)
         if len(saved) == 3:
             raise KeyboardInterrupt
@@ -251,10 +252,33 @@ def test_a_training_of_some_inputs_goes_on_to_the_same_bits(
 
 
 def test_inputs_cannot_be_learned_alone_that_are_unknown_or_from_nothing(small: Any) -> None:
-    with pytest.raises(TrainingError, match=r"learn_inputs = .*'wings'.* should be of"):
-        small(learn_inputs=("wings",), start="ppo-delivery")
+    with pytest.raises(TrainingError, match="no input 'cannot_lft'; did you mean 'cannot_lift'"):
+        small(learn_inputs=("cannot_lft",), start="ppo-delivery")
     with pytest.raises(TrainingError, match="learn_inputs: should be left out"):
         small(learn_inputs=("cannot_lift",))
+
+
+@pytest.mark.parametrize("fields", [{"activation": "relu"}, {"listens": False}, {"exploration": 2}])
+def test_where_inputs_are_learned_alone_the_network_is_that_of_the_start(
+    small: Any, tmp_path: Path, fields: dict[str, Any]
+) -> None:
+    network = policies.read_card(WEIGHTS / "ppo-robust.safetensors").network.replace(**fields)
+    training = small(start="ppo-robust", learn_inputs=("cannot_lift",), network=network)
+    with pytest.raises(TrainingError, match="network: should be that of start = 'ppo-robust'"):
+        train(training, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_start_may_read_fewer_inputs_but_not_more(small: Any, tmp_path: Path) -> None:
+    older = small().network.replace(inputs=84)
+    first = train(small(network=older), tmp_path / "first")
+    frozen = small().ppo.replace(value_warmup=100)
+    again = load_file(train(small(start=str(first), ppo=frozen), tmp_path / "again"))
+    before = load_file(first)["layers.0.weight"]
+    assert (again["layers.0.weight"][:, :84] == before).all()
+    assert not again["layers.0.weight"][:, 84:].any()
+    with pytest.raises(TrainingError, match=r"network\.inputs = 84: should be at least 93"):
+        train(small(start="ppo-robust", network=older), tmp_path / "fewer")
 
 
 def test_deviations_keep_above_their_floor(small: Any, tmp_path: Path) -> None:

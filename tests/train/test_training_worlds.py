@@ -96,7 +96,7 @@ def test_episodes_are_drawn_by_weight_and_seed() -> None:
 
 def test_weights_follow_the_progress_of_the_training(small: Any) -> None:
     easy = Conditions(weight=1.0, final_weight=0.0)
-    hard = Conditions(weight=0.01, final_weight=1.0, modes=("FM4",), robots=(1,))
+    hard = Conditions(weight=0.0, final_weight=1.0, modes=("FM4",), robots=(1,))
     worlds = make_worlds(small(conditions=(easy, hard)))
     hit = []
     for done in (0.0, 0.5, 1.0):
@@ -107,14 +107,18 @@ def test_weights_follow_the_progress_of_the_training(small: Any) -> None:
             met += bool(worlds.worlds[1].unwrapped.warehouse.faults)
         hit.append(met)
     worlds.close()
-    assert hit[0] <= 5
+    assert hit[0] == 0
     assert 35 <= hit[1] <= 65
     assert hit[2] == 100
 
 
 def test_a_training_without_episodes_at_its_end_is_refused(small: Any) -> None:
-    with pytest.raises(TrainingError, match=r"conditions\.final_weight: should be above 0"):
+    with pytest.raises(TrainingError, match=r"conditions\.final_weight: .* worlds of 3 robots"):
         small(conditions=(Conditions(final_weight=0.0),))
+    with pytest.raises(TrainingError, match=r"conditions\.weight: should be above 0 for one kind"):
+        small(conditions=(Conditions(weight=0.0, final_weight=1.0),))
+    with pytest.raises(TrainingError, match="weight: should be above 0, or `final_weight` should"):
+        Conditions(weight=0.0)
 
 
 def test_scenarios_are_drawn_and_options_come_first() -> None:
