@@ -31,6 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "scenario": {"errors", "records", "streams"},
     "observations": FOUNDATION,
     "warehouse": FOUNDATION | {"observations"},
+    "fault_text": {"errors", "warehouse"},
     "rendering": FOUNDATION | {"warehouse"},
     "environment": WORLD | {"rendering"},
     "swarm_logistics_v0": WORLD | {"environment"},
@@ -43,7 +44,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
     "studies": {"errors", "records", "streams", "spi", "tasks"},
-    "report": {"errors", "spi", "tasks", "studies"},
+    "report": {"errors", "fault_text", "spi", "tasks", "studies"},
     "fault_analysis": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS
     | ENVIRONMENT
