@@ -55,7 +55,7 @@ class Network(_Part):
         if not isinstance(inputs, int):
             return inputs
         if inputs not in INPUT_COUNTS:
-            raise ValueError(f"{inputs}: should be one of {', '.join(map(str, INPUT_COUNTS))}")
+            raise ValueError(f"should be one of {', '.join(map(str, INPUT_COUNTS))}")
         return INPUTS[:inputs]
 
     @field_validator("inputs", "outputs")
