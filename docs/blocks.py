@@ -25,6 +25,7 @@ from typing import Any
 from swarm_logistics_env.cli import app
 
 DOCS = Path(__file__).parent
+EXAMPLES = DOCS.resolve().parent / "examples"
 LANGUAGES = {"python", "toml", "console", "text", "sh", ""}
 
 _BLOCK = re.compile(r"^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -59,13 +60,14 @@ def blocks(text: str) -> list[Block]:
 
 
 def recorded(text: str) -> str:
-    """Run a page's blocks in an empty folder; return it with the outputs that came."""
+    """Run a page's blocks in a folder with `examples` alone; return it with what they printed."""
     pieces: list[str] = []
     done = 0
     printed: str | None = None
     before = 0
     names: dict[str, Any] = {"__name__": "page"}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
+        Path("examples").symlink_to(EXAMPLES, target_is_directory=True)
         for block in blocks(text):
             if block.language == "text":
                 if (

@@ -12,6 +12,7 @@ import swarm_logistics_env
 from tests.tasks import lane
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
+ROOT = Path(__file__).parents[2]
 SCRIPT = """
 from swarm_logistics_env.studies import Study
 
@@ -36,5 +37,5 @@ def test_a_task_needs_two_files(tmp_path: Path) -> None:
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
         check=True,
     )
-    page = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     assert "Files: `tasks/NAME_task.py`, `tasks/task_choice.py`" in page

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, motion
-from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError
 from swarm_logistics_env.motion.frame import INPUTS
@@ -76,18 +75,25 @@ def test_who_does_not_listen_reads_no_timer() -> None:
     assert not rows[:, motion.frame.LEAD].any()
 
 
-def test_it_stacks_with_the_other_wrappers_and_in_a_vector_environment() -> None:
-    def make(world: int = 0) -> FixedAgents:
-        return FixedAgents(MotionFrame(SwarmSize(FaultInjection(small(), "FM1", 1), [2, 4])))
+def stacked(world: int = 0) -> FixedAgents:
+    return FixedAgents(MotionFrame(SwarmSize(FaultInjection(small(), "FM1", 1), [2, 4])))
 
-    fixed = make()
+
+def test_it_stacks_with_the_other_wrappers() -> None:
+    fixed = stacked()
     observations, _ = fixed.reset(seed=0)
     while fixed.agents:
         spaces = fixed.observation_spaces
         assert all(spaces[agent].contains(observations[agent]) for agent in fixed.agents)
         actions = {agent: fixed.action_space(agent).sample() for agent in fixed.agents}
         observations, *_ = fixed.step(actions)
-    env = SwarmVecEnv(make_env=make, n_worlds=3, seed=0)
+
+
+def test_it_stacks_in_a_vector_environment() -> None:
+    pytest.importorskip("stable_baselines3")
+    from swarm_logistics_env.adapters import SwarmVecEnv
+
+    env = SwarmVecEnv(make_env=stacked, n_worlds=3, seed=0)
     assert env.reset().shape == (12, len(INPUTS))
     for _ in range(25):  # beyond the end of an episode
         rows, *_ = env.step(np.full((12, 3), 0.3))
