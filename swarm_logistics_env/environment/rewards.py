@@ -203,9 +203,9 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
 
 
 def in_the_way(world: Warehouse, before: Before) -> Earned:
-    """Seconds times metres to the wall behind the delivery area, of each robot that cannot lift.
+    """Seconds times metres to the delivery area's wall, if it cannot lift; weigh it negatively.
 
-    Weigh it negatively: at that wall it is out of the way of those that search and carry. Dead
+    At the wall behind the delivery area it is out of the way of those that search and carry. Dead
     robots count as well. Privileged: a robot only finds out by holding on to items in vain.
     """
     state = world.state

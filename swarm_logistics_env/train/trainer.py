@@ -67,7 +67,7 @@ def train(
     out = Path(out)
     # Everything that may be refused comes first, before anything is written.
     device, begun = device_of(device), _new_view(training)
-    first = None if training.start is None else _start(training, training.start)
+    first = None if training.start is None else _tensors_of_start(training, training.start)
     # A robot that reads 0 in the inputs learned decides as before only with the same noise.
     kept = {"deviations": first["deviations"]} if first and training.learn_inputs else {}
     enter(out, training, command)
@@ -125,7 +125,7 @@ def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
     )
 
 
-def _start(training: Training, name: str) -> Mapping[str, NDArray[np.float32]]:
+def _tensors_of_start(training: Training, name: str) -> Mapping[str, NDArray[np.float32]]:
     policy, network = load(name), training.network
     if not isinstance(policy, LearnedPolicy):
         raise TrainingError(f"start = {name!r}: should be a trained policy")
@@ -186,6 +186,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         for layer in linears(policy):
             layer.requires_grad_(is_all_free)
         policy.log_std.requires_grad_(is_all_free)
+        # The first layer's weights hold those of `learn_inputs`; `make_learner` keeps the others.
         linears(policy)[0].weight.requires_grad_(is_free)
         done = min(1.0, self.num_timesteps / self._training.agent_steps)
         follow_progress(self._view.venv, done)

@@ -11,30 +11,16 @@ pytest.importorskip("stable_baselines3")
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.train import trainer
-from swarm_logistics_env.train.learner import save_checkpoint
 from swarm_logistics_env.train.reward_search import RewardSearch, search_rewards, weighted, weights
 from swarm_logistics_env.train.settings import Indicators
 
 
 def test_a_search_that_was_killed_goes_on_within_its_trial(
-    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    small: Any, tmp_path: Path, stopped_after: Any
 ) -> None:
     asked = RewardSearch(training=small(agent_steps=320), trials=2)
     whole = search_rewards(asked, tmp_path / "whole")
-    saved: list[Any] = []
-
-    def dies(*given: Any) -> None:
-        save_checkpoint(*given)
-        saved.append(given)
-        if len(saved) == 2:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as changed:
-        changed.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
-        changed.setattr(trainer, "save_checkpoint", dies)
-        with pytest.raises(KeyboardInterrupt):
-            search_rewards(asked, tmp_path / "cut")
+    stopped_after(2, lambda: search_rewards(asked, tmp_path / "cut"))
     cut = search_rewards(asked, tmp_path / "cut")
     assert [(t.parameters, t.values) for t in cut] == [(t.parameters, t.values) for t in whole]
     assert set(cut[0].parameters.values()) == {1.0}

@@ -22,7 +22,7 @@ from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.policies.loading import WEIGHTS
 from swarm_logistics_env.tasks.code_version import code_version
 from swarm_logistics_env.train import Training, run_record, trainer
-from swarm_logistics_env.train.learner import make_learner, save_checkpoint, tensors_of
+from swarm_logistics_env.train.learner import make_learner, tensors_of
 from swarm_logistics_env.train.network_view import KNOWN
 from swarm_logistics_env.train.run_record import simulation
 from swarm_logistics_env.train.settings import Conditions, Indicators, Scores
@@ -223,7 +223,7 @@ def test_inputs_that_are_learned_alone_leave_every_other_decision_as_it_was(
 
 
 def test_a_training_of_some_inputs_goes_on_to_the_same_bits(
-    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    small: Any, tmp_path: Path, stopped_after: Any
 ) -> None:
     first = train(small(network=small().network.replace(inputs=88)), tmp_path / "first")
     training = small(
@@ -235,19 +235,7 @@ def test_a_training_of_some_inputs_goes_on_to_the_same_bits(
         ),
     )
     whole = train(training, tmp_path / "whole")
-    saved: list[Any] = []
-
-    def save_and_stop(*given: Any) -> None:
-        save_checkpoint(*given)
-        saved.append(given)
-        if len(saved) == 3:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as changed:
-        changed.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
-        changed.setattr(trainer, "save_checkpoint", save_and_stop)
-        with pytest.raises(KeyboardInterrupt):
-            train(training, tmp_path / "cut")
+    stopped_after(3, lambda: train(training, tmp_path / "cut"))
     assert same(train(training, tmp_path / "cut"), whole)
 
 
