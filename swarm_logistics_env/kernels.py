@@ -12,6 +12,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import config, types
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -58,6 +59,7 @@ def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
     name = function.__qualname__
     function.__qualname__ = f"{name}-{_SOURCES}"
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": is_inlined}
+    options["no_cfunc_wrapper"] = True  # nobody calls a kernel from C
     try:
         compiled = numba.njit(function, cache=True, **options)
     except RuntimeError:
@@ -65,7 +67,15 @@ def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
         _warn_of_no_cache()
         compiled = numba.njit(function, **options)
     function.__qualname__ = name
+    if not config.DISABLE_JIT:
+        compiled.get_call_template = functools.partial(_call_template, compiled)
     return cast("Callable[P, R]", compiled)
+
+
+def _call_template(compiled: Any, args: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    # A number that stands in the code is no type of its own, or each would be compiled for.
+    plain = tuple(types.unliteral(kind) for kind in args)
+    return type(compiled).get_call_template(compiled, plain, named)
 
 
 @functools.cache

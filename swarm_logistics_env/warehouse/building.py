@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import kernel
 
 from . import engine as whom
 from .engine import collide_with
@@ -37,7 +37,7 @@ def build(address: int) -> None:
     whom.read(engine, engine.bodies)
 
 
-@inlined_kernel
+@kernel
 def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles: Numbers) -> None:
     """Make walls and obstacles."""
     call, space = engine.functions, engine.space[0]
@@ -58,7 +58,7 @@ def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles:
         made_at(call.add_shape, (space, shape))
 
 
-@inlined_kernel
+@kernel
 def build_robots(engine: Engine, parameters: Parameters, robots: Robots) -> None:
     """Make the robots' bodies, which no contact turns, and their shapes."""
     call, space, n = engine.functions, engine.space[0], len(robots.item)
@@ -79,7 +79,7 @@ def build_robots(engine: Engine, parameters: Parameters, robots: Robots) -> None
         made_at(call.add_shape, (space, shape))
 
 
-@inlined_kernel
+@kernel
 def build_items(engine: Engine, static: int, parameters: Parameters, items: Items) -> None:
     """Make the items' shapes, on the static body and moved by their offset.
 
@@ -94,7 +94,7 @@ def build_items(engine: Engine, static: int, parameters: Parameters, items: Item
         engine.item_shapes[item] = shape
 
 
-@inlined_kernel
+@kernel
 def new_circle(engine: Engine, body: int, radius: float, x: float, y: float) -> int:
     """Return the address of a new disc around (x, y) from its body."""
     return made_at(engine.functions.new_circle, (body, radius, (x, y)))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.kernels import kernel
 
 from .native import call_at, store_at
 from .structs import Batch, Engine, Integers, Numbers, Parameters
@@ -31,7 +31,7 @@ LIFTED, PUT_DOWN, DELIVERED_IT, CAME_BACK = 0, 1, 2, 3
 _FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 16, 80, 2
 
 
-@inlined_kernel
+@kernel
 def advance(engine: Engine, parameters: Parameters, n_touching: int) -> None:
     """Take the substeps of a control step, and read where the bodies are then and how fast.
 
@@ -49,7 +49,7 @@ def advance(engine: Engine, parameters: Parameters, n_touching: int) -> None:
     read(engine, engine.bodies)
 
 
-@inlined_kernel
+@kernel
 def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
     """Give every robot the force that changes its velocity as wanted, by `greatest` [m/s] at most.
 
@@ -67,7 +67,7 @@ def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
     call_at(call.each_body, (engine.space[0], call.write_body, engine.forces.address))
 
 
-@inlined_kernel
+@kernel
 def read(engine: Engine, batch: Batch) -> None:
     """Fill a batch with what it holds of the bodies."""
     store_at(batch.count_address, 0)
@@ -75,7 +75,7 @@ def read(engine: Engine, batch: Batch) -> None:
     call_at(call.each_body, (engine.space[0], call.read_body, batch.address))
 
 
-@inlined_kernel
+@kernel
 def follow(engine: Engine, events: Integers, n_events: int, item_position: Numbers) -> None:
     """Let bodies collide as they must after these events (kind, robot, item)."""
     for event in range(n_events):
@@ -89,14 +89,14 @@ def follow(engine: Engine, events: Integers, n_events: int, item_position: Numbe
             move(engine, engine.item_shapes[item], item_position[item, 0], item_position[item, 1])
 
 
-@inlined_kernel
+@kernel
 def move(engine: Engine, item_shape: int, x: float, y: float) -> None:
     """Move an item to (x, y) [m]; who collides with it stays as it is."""
     call_at(engine.functions.set_offset, (item_shape, (x, y)))
     call_at(engine.functions.reindex, (engine.space[0], item_shape))
 
 
-@inlined_kernel
+@kernel
 def collide_with(engine: Engine, shape: int, whom: int) -> None:
     """Give a shape a filter, of no group."""
     call_at(engine.functions.set_filter, (shape, (0, whom)))

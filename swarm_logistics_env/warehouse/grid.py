@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.kernels import inlined_kernel, kernel
 
 from .structs import Flags, Grid, Nearby, Numbers
 
@@ -81,7 +81,7 @@ def look_through(
     return n_found
 
 
-@inlined_kernel
+@kernel
 def fill(grid: Grid, position: Numbers, included: Flags) -> None:
     """Sort the included points of `position` (n, 2) into the grid's cells."""
     start, cell = grid.start, grid.cell

@@ -8,14 +8,14 @@ have left it.
 
 from __future__ import annotations
 
-from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.kernels import kernel
 
 from .engine import FREE_ITEM, LIFTED, NO_ONE, collide_with
 from .grid import look_around
 from .structs import NOBODY, STORED, World
 
 
-@inlined_kernel
+@kernel
 def mask_below_lifters(world: World, n_events: int) -> None:
     """Mask what stands below robots that lifted, by the events of this step."""
     events, items, grid, nearby = world.claims.events, world.items, world.item_grid, world.nearby
@@ -31,7 +31,7 @@ def mask_below_lifters(world: World, n_events: int) -> None:
                 collide_with(world.engine, world.engine.item_shapes[item], NO_ONE)
 
 
-@inlined_kernel
+@kernel
 def unmask_left(world: World) -> None:
     """Make those masked items solid that no laden robot stands above any more.
 
@@ -53,7 +53,7 @@ def unmask_left(world: World) -> None:
             collide_with(world.engine, world.engine.item_shapes[item], FREE_ITEM)
 
 
-@inlined_kernel
+@kernel
 def reach_of(world: World) -> float:
     """Return the distance [m] between centres up to which a robot stands above an item."""
     return world.parameters.robot_radius + world.parameters.item_radius

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import kernel
 
 from .structs import NOBODY, Capabilities, Numbers, Parameters, Robots
 
@@ -21,7 +21,7 @@ def first_not_finite(commands: Numbers) -> int:
     return NOBODY
 
 
-@inlined_kernel
+@kernel
 def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> int:
     """Return the place, row by row, of the first command that is not finite; NOBODY if all are.
 
@@ -36,7 +36,7 @@ def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> in
     return NOBODY
 
 
-@inlined_kernel
+@kernel
 def drive(
     commands: Numbers,
     robots: Robots,

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.kernels import inlined_kernel, kernel
 
 from .engine import CAME_BACK, DELIVERED_IT, LIFTED, PUT_DOWN
 from .grid import look_around
@@ -30,7 +28,7 @@ def note_event(events: Integers, n_events: int, kind: int, robot: int, item: int
     return n_events + 1
 
 
-@inlined_kernel
+@kernel
 def carry_along(world: World) -> None:
     """Bring carried items to where their carriers are and note who is in the delivery area."""
     robots, items = world.robots, world.items
@@ -43,7 +41,7 @@ def carry_along(world: World) -> None:
             items.position[item, 1] = robots.position[robot, 1]
 
 
-@inlined_kernel
+@kernel
 def open_grippers(world: World, commands: Numbers) -> int:
     """Put down what robots let go of, covered; returns the number of events written.
 
@@ -87,7 +85,7 @@ def is_remembered(memory: Integers, robot: int, item: int) -> bool:
     return found
 
 
-@inlined_kernel
+@kernel
 def wanted_item(world: World, robot: int) -> tuple[int, float]:
     """Return the item that `robot` would lift now, or NOBODY, and the square of its distance.
 
@@ -108,7 +106,7 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
     return best, best_square
 
 
-@inlined_kernel
+@kernel
 def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
     """Lift what empty robots hold on to; returns the number of events so far.
 
@@ -142,7 +140,7 @@ def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
             return n_events
 
 
-@inlined_kernel
+@kernel
 def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
     """Deliver the requested item if its carrier can, then the next one, and so on.
 
@@ -159,7 +157,9 @@ def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
         if robot == NOBODY or not robots.in_delivery[robot] or not world.able.delivers[robot]:
             break
         robots.item[robot] = NOBODY
-        robots.memory[:, :] = NOBODY
+        for other in range(len(robots.memory)):
+            for place in range(robots.memory.shape[1]):
+                robots.memory[other, place] = NOBODY
         items.status[item] = DELIVERED
         items.carrier[item] = NOBODY
         world.claims.delivered_by[n_delivered] = robot
@@ -177,14 +177,15 @@ def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
     return n_events, n_delivered, is_room
 
 
-@inlined_kernel
+@kernel
 def ask_for_next(world: World) -> None:
     """Ask for the next item in the order of requests that has not left for good."""
     items, progress = world.items, world.progress
     progress.requested[0] = NOBODY
-    if np.all(items.status == DELIVERED):
-        return
-    while progress.requested[0] == NOBODY:
+    n_left = 0
+    for item in range(len(items.status)):
+        n_left += int(items.status[item] != DELIVERED)
+    while n_left > 0 and progress.requested[0] == NOBODY:
         progress.n_asked[0] += 1
         cycle, place = divmod(progress.n_asked[0], len(items.order))
         if place == 0:

@@ -6,19 +6,27 @@ Each array handed to a kernel costs as much time as a robot's timers; a control 
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
 from numba.core import types
-from numba.extending import intrinsic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import (
+    infer_getattr,
+    intrinsic,
+    lower_getattr_generic,
+    models,
+    register_model,
+)
 from numba.np import arrayobj
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound=tuple[Any, ...])
 
-_WORD = ir.IntType(64)
+_WORD, _BYTES = ir.IntType(64), 8
 
 
 def hints(structure: type) -> dict[str, Any]:
@@ -76,39 +84,81 @@ def _append_words(value: tuple[Any, ...], words: list[int]) -> None:
             _append_words(part, words)
 
 
+class StructureAt(types.Type):  # type: ignore[misc]  # numba ships no types
+    """The type that compiled code has of a structure: the address of its words.
+
+    So a kernel hands a structure on as one word, and reads of it what it uses.
+    """
+
+    def __init__(self, structure: type) -> None:
+        self.structure = structure
+        super().__init__(f"{structure.__module__}.{structure.__qualname__} at an address")
+
+
+@register_model(StructureAt)
+class _Address(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: StructureAt) -> None:
+        super().__init__(manager, kind, _WORD)
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):  # type: ignore[misc]
+    key = StructureAt
+
+    def generic_resolve(self, kind: StructureAt, name: str) -> types.Type | None:
+        found = _places(kind.structure).get(name)
+        return None if found is None else found[0]
+
+
 @cast("Callable[..., Callable[[type[S], int], S]]", intrinsic)
 def unpacked_at(typing_context: Any, structure: Any, address: types.Type) -> Any:
     """Return the structure whose words `packed` has put at `address`."""
-    found = _compiled_type(structure.instance_class)
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        words = builder.inttoptr(values[1], _WORD.as_pointer())
-        places = iter(range(10_000))
-
-        def word() -> Any:
-            return builder.load(builder.gep(words, [ir.Constant(_WORD, next(places))]))
-
-        return _loaded(context, builder, found, word)
-
-    return found(structure, types.int64), generate
+    found = StructureAt(structure.instance_class)
+    return found(structure, types.int64), lambda context, builder, signature, values: values[1]
 
 
-def _compiled_type(structure: type) -> Any:
+@lower_getattr_generic(StructureAt)
+def _field(context: Any, builder: Any, kind: StructureAt, address: Any, name: str) -> Any:
+    found, before = _places(kind.structure)[name]
+    if isinstance(found, StructureAt):
+        return builder.add(address, ir.Constant(_WORD, _BYTES * before))
+    words = builder.inttoptr(address, _WORD.as_pointer())
+    places = itertools.count(before)
+
+    def word() -> Any:
+        loaded = builder.load(builder.gep(words, [ir.Constant(_WORD, next(places))]))
+        # No kernel changes the words, so LLVM need not read them again after stores elsewhere.
+        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return loaded
+
+    return _loaded(context, builder, found, word)
+
+
+@functools.cache
+def _places(structure: type) -> dict[str, tuple[Any, int]]:
+    """Return of each field its type in compiled code, and how many words stand before it."""
+    places, before = {}, 0
+    for name, kind in field_kinds(structure).items():
+        places[name] = (_compiled_type(kind), before)
+        before += _n_words(kind)
+    return places
+
+
+def _n_words(kind: Any) -> int:
+    if isinstance(kind, tuple):
+        return 1 + len(kind[1])
+    return 1 if kind in (float, int, bool) else sum(map(_n_words, field_kinds(kind).values()))
+
+
+def _compiled_type(kind: Any) -> Any:
+    if isinstance(kind, tuple):
+        dtype = types.boolean if kind[0] == np.bool_ else getattr(types, kind[0].name)
+        return types.Array(dtype, len(kind[1]), "C")
     scalars = {float: types.float64, int: types.int64, bool: types.boolean}
-    parts: list[Any] = []
-    for kind in field_kinds(structure).values():
-        if isinstance(kind, tuple):
-            dtype = types.boolean if kind[0] == np.bool_ else getattr(types, kind[0].name)
-            parts.append(types.Array(dtype, len(kind[1]), "C"))
-        else:
-            parts.append(scalars.get(kind) or _compiled_type(kind))
-    return cast("Any", types).NamedTuple(parts, structure)
+    return scalars.get(kind) or StructureAt(kind)
 
 
 def _loaded(context: Any, builder: Any, kind: Any, word: Callable[[], Any]) -> Any:
-    if isinstance(kind, types.NamedTuple):
-        parts = [_loaded(context, builder, part, word) for part in kind.types]
-        return context.make_tuple(builder, kind, parts)
     if kind == types.float64:
         return builder.bitcast(word(), ir.DoubleType())
     if kind == types.boolean:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from swarm_logistics_env.kernels import inlined_kernel, pair_key, uniform
+from swarm_logistics_env.kernels import inlined_kernel, kernel, pair_key, uniform
 
 from .kinematics import MESSAGE
 from .structs import NOBODY, Numbers, World
@@ -23,7 +23,7 @@ def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: 
     return uniform(pair_key(key, other), N_PURPOSES * step + purpose) < probability
 
 
-@inlined_kernel
+@kernel
 def send_messages(world: World, commands: Numbers) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
     robots, able, step = world.robots, world.able, world.progress.step[0]
@@ -41,7 +41,7 @@ def send_messages(world: World, commands: Numbers) -> None:
             message[robot, place] = given
 
 
-@inlined_kernel
+@kernel
 def run_timers(world: World) -> None:
     """Advance every robot's timer and what it tells (NaN: silent) [s].
 
@@ -74,7 +74,7 @@ def run_timers(world: World) -> None:
         robots.told[robot] = 0.0 if is_present and not able.honest[robot] else told
 
 
-@inlined_kernel
+@kernel
 def listen(me: int, world: World, n_found: int) -> None:
     """Note in `nearby.is_heard` which of the robots found nearby `me` hears."""
     robots, able, nearby = world.robots, world.able, world.nearby
@@ -88,7 +88,7 @@ def listen(me: int, world: World, n_found: int) -> None:
         nearby.is_heard[index] = is_heard
 
 
-@inlined_kernel
+@kernel
 def lowest_timer_heard(world: World, n_found: int) -> tuple[int, float]:
     """Return who tells the lowest timer of those nearby that are heard, or NOBODY, and it [s].
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.kernels import inlined_kernel, kernel
 
 from .structs import Grid, Nearby, Sensed, World
 
@@ -38,7 +38,7 @@ def in_frame(pose: Pose, x: float, y: float) -> tuple[float, float]:
     return dx * pose.cosine + dy * pose.sine, dy * pose.cosine - dx * pose.sine
 
 
-@inlined_kernel
+@kernel
 def scan_disc(forward: float, left: float, square: float, radius: float, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a disc.
 
@@ -86,7 +86,7 @@ def nearest_beam(forward: float, left: float) -> int:
     return beam % _N_BEAMS
 
 
-@inlined_kernel
+@kernel
 def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall of the arena."""
     reach = scan[0]
@@ -105,7 +105,7 @@ def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
             scan[beam] = found if found < scan[beam] else scan[beam]
 
 
-@inlined_kernel
+@kernel
 def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""
     parameters, obstacles = world.parameters, world.obstacles
@@ -119,7 +119,7 @@ def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
             scan_disc(forward, left, square, radius, scan)
 
 
-@inlined_kernel
+@kernel
 def scan_discs(
     pose: Pose, reach: float, radius: float, grid: Grid, nearby: Nearby, n_found: int, scan: Sensed
 ) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import inlined_kernel
+from swarm_logistics_env.kernels import kernel
 
 from . import contact, rangers
 from .cameras import choose_neighbours, see_items, tell_of_neighbours
@@ -24,7 +24,7 @@ _ROBOTS, _WALLS, _ITEMS, _LOWEST = (
 )  # fmt: skip
 
 
-@inlined_kernel
+@kernel
 def sense(world: World, rows: Sensed) -> int:
     """Fill the observation rows (N, D), who touches what, and what was heard.
 
@@ -55,7 +55,7 @@ def sense(world: World, rows: Sensed) -> int:
     return n_anchored
 
 
-@inlined_kernel
+@kernel
 def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     """Sense robots: by touch, in the beams, heard on the radio, in view.
 
@@ -89,7 +89,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     return is_anchored
 
 
-@inlined_kernel
+@kernel
 def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     """Sense free items: in the beams, in view, and by touch when laden."""
     parameters, grid, nearby = world.parameters, world.item_grid, world.nearby

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import gaussian, inlined_kernel, uniform
+from swarm_logistics_env.kernels import gaussian, kernel, uniform
 
 from .structs import Parameters, Sensed, World
 
@@ -19,7 +19,7 @@ _N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
 _DROPPED, _PLACES, _DRAWS = _N_BEAMS, 2 * _N_BEAMS, 2 * _N_BEAMS + 2 * _N_THINGS
 
 
-@inlined_kernel
+@kernel
 def disturb(world: World, rows: Sensed) -> None:
     """Add the scenario's noise to rows (N, D) and drop beams, in place.
 
@@ -39,7 +39,7 @@ def disturb(world: World, rows: Sensed) -> None:
                 disturb_places(key, first + _PLACES, parameters, rows[robot])
 
 
-@inlined_kernel
+@kernel
 def disturb_beams(
     key: np.uint64, first: int, reach: float, parameters: Parameters, out: Sensed
 ) -> None:
@@ -56,7 +56,7 @@ def disturb_beams(
             out[beam] = min(max(noisy, 0.0), reach)
 
 
-@inlined_kernel
+@kernel
 def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sensed) -> None:
     """Add noise to the places of what is there in a row, from number `first` of the stream."""
     far = max(parameters.view_range, parameters.radio_range)
@@ -72,7 +72,7 @@ def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sens
                 out[column + 1 + axis] = min(max(out[column + 1 + axis] + error, -limit), limit)
 
 
-@inlined_kernel
+@kernel
 def fail_rangers(world: World, rows: Sensed) -> None:
     """Make of the beams in rows (N, D) what rangers that have failed report, in place."""
     robots, able = world.robots, world.able
@@ -87,12 +87,14 @@ def fail_rangers(world: World, rows: Sensed) -> None:
         if able.rangers_refresh[robot]:
             frozen[0] = math.nan
         elif math.isnan(frozen[0]):
-            frozen[:] = beams
+            for beam in range(_N_BEAMS):
+                frozen[beam] = beams[beam]
         else:
-            beams[:] = frozen.astype(np.float32)
+            for beam in range(_N_BEAMS):
+                beams[beam] = frozen[beam]
 
 
-@inlined_kernel
+@kernel
 def add_bias(beams: Sensed, bias: float, reach: float) -> None:
     """Lengthen the beams that meet something by `bias` [m], at most to `reach` [m]."""
     for beam in range(len(beams)):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import kernel
 
 from .engine import advance, follow
 from .grid import fill
@@ -25,7 +23,9 @@ def perceive(address: int, rows: Sensed) -> None:
     robots, items, progress = world.robots, world.items, world.progress
     run_timers(world)
     fill(world.robot_grid, robots.position, robots.present)
-    fill(world.item_grid, items.position, items.status == STORED)
+    for item in range(len(items.status)):
+        world.nearby.is_free[item] = items.status[item] == STORED
+    fill(world.item_grid, items.position, world.nearby.is_free)
     n_anchored = sense(world, rows)
     disturb(world, rows)
     fail_rangers(world, rows)
@@ -36,46 +36,21 @@ def perceive(address: int, rows: Sensed) -> None:
 def step(address: int, rows: Sensed) -> bool:
     """Take a control step in the world at `address` and fill the observation rows (N, D).
 
-    Returns whether there is something to tell, see `take_step`; a command that is refused is, and
-    the world is as it was.
-    """
-    world = unpacked_at(World, address)
-    refused = refused_command(world.commands.now, world.robots, world.able)
-    world.outcome.refused[0] = refused
-    return refused != NOBODY or take_step(address, rows)
-
-
-@kernel
-def take_step(address: int, rows: Sensed) -> bool:
-    """Take a control step by commands that are finite.
-
     Returns whether there is something to tell: a delivery, faults that begin or end, no room for
-    an item, a full log, the end of the time or of the requests, or a change before the step.
+    an item, a full log, the end of the time or of the requests, a change before the step, or a
+    command that is refused, which leaves the world as it was.
     """
     world = unpacked_at(World, address)
-    begin(world)
-    n_delivered, is_room = handle_items(world, world.commands.now)
-    return finish(address, world, rows, n_delivered, is_room)
-
-
-@inlined_kernel
-def begin(world: World) -> None:
-    """Take the part of a step before anybody handles items: time, motion and messages."""
-    commands, progress = world.commands, world.progress
+    commands, progress, outcome = world.commands, world.progress, world.outcome
+    outcome.refused[0] = refused_command(commands.now, world.robots, world.able)
+    if outcome.refused[0] != NOBODY:
+        return True
     log_command(commands)
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * world.parameters.control_period
     move(world, commands.now)
     send_messages(world, commands.now)
-
-
-@inlined_kernel
-def finish(address: int, world: World, rows: Sensed, n_delivered: int, is_room: bool) -> bool:
-    """Take the part of a step after items were handled: let the robots sense, note what is to tell.
-
-    Returns whether there is something, see `take_step`.
-    """
-    commands, progress, outcome = world.commands, world.progress, world.outcome
+    n_delivered, is_room = handle_items(world, commands.now)
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:
         perceive(address, rows)
@@ -89,7 +64,7 @@ def finish(address: int, world: World, rows: Sensed, n_delivered: int, is_room: 
     return n_delivered > 0 or is_paused or not is_room or is_over or is_full or is_changed
 
 
-@inlined_kernel
+@kernel
 def log_command(commands: Commands) -> None:
     """Append the commands of this step to those that a pickle replays."""
     first = commands.n_logged[0] * len(commands.now)
@@ -101,13 +76,16 @@ def log_command(commands: Commands) -> None:
     commands.n_logged[0] += 1
 
 
-@inlined_kernel
+@kernel
 def move(world: World, commands: Numbers) -> None:
     """Turn and move the robots as commanded and as far as bodies let them."""
     robots, engine, parameters = world.robots, world.engine, world.parameters
     drive(commands, robots, world.able, parameters, engine.wanted_velocity)
     unmask_left(world)
-    advance(engine, parameters, int(np.count_nonzero(robots.contact)))
+    n_touching = 0
+    for robot in range(len(robots.contact)):
+        n_touching += int(robots.contact[robot])
+    advance(engine, parameters, n_touching)
     bodies = engine.bodies.numbers
     for robot in range(len(robots.item)):
         is_there = 1.0 if robots.present[robot] else 0.0
@@ -116,7 +94,7 @@ def move(world: World, commands: Numbers) -> None:
             robots.velocity[robot, axis] = bodies[robot, 2 + axis] * is_there
 
 
-@inlined_kernel
+@kernel
 def handle_items(world: World, commands: Numbers) -> tuple[int, bool]:
     """Carry along, let go, lift and deliver; returns how many, and whether there was room."""
     carry_along(world)

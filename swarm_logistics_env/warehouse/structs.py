@@ -147,6 +147,7 @@ class Nearby(NamedTuple):
     chosen_square: Annotated[Numbers, "nearby"]  # [m^2]
     chosen_heard: Annotated[Flags, "nearby"]  # of robots, whether it is heard
     nearest: Annotated[Integers, "nearby"]  # indices into `chosen` of the nearest, nearest first
+    is_free: Annotated[Flags, "nearby"]  # of items, by their numbers
     scanned: Annotated[Integers, "nearby"]  # indices into `place` of what the rangers may meet
     forward: Annotated[Numbers, "nearby"]  # [m] of what is scanned, in the robot's frame
     left: Annotated[Numbers, "nearby"]  # [m]

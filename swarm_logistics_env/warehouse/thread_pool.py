@@ -184,7 +184,9 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
         job = job_at(queue, place)
         world, first = unpacked_at(World, load(job + _WORD * WORLD)), load(job + _WORD * FIRST_ROW)
         now = world.commands.now
-        now[:, :] = commands[first : first + len(now)]
+        for robot in range(len(now)):
+            for column in range(now.shape[1]):
+                now[robot, column] = commands[first + robot, column]
         refused = refused_command(now, world.robots, world.able)
         world.outcome.refused[0] = NOBODY
         if refused != NOBODY:
@@ -218,7 +220,7 @@ def run_next_job(queue: int) -> bool:
     n_columns = load(queue + _WORD * ROW_COLUMNS)
     own = load(queue + _WORD * ROWS) + 4 * first * n_columns
     rows = carray(pointer_at(own), (n_robots, n_columns), np.float32)
-    is_eventful = stepping.take_step(address, rows)
+    is_eventful = stepping.step(address, rows)
     exchange(job + _WORD * IS_EVENTFUL, int(is_eventful))
     exchange(job + _WORD * IS_DONE, 1)
     return True

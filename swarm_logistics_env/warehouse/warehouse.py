@@ -40,7 +40,7 @@ class Warehouse:
         faults: what affects whom in this episode.
         n_removed: how many robots were taken out of the arena so far.
         is_eventful: whether something happened in the last step that observations do not tell, as
-            a delivery, see `stepping.take_step`.
+            a delivery, see `stepping.step`.
 
     Example:
         >>> world = Warehouse(Scenario(n_robots=3))
