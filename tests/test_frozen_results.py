@@ -51,7 +51,7 @@ def conditions(study: Study) -> Iterator[tuple[str, dict[int, str]]]:
         words = {
             "policy": condition.policy.label,
             "scenario": {k: v for k, v in fields.items() if v != default[k]},
-            "faults": [f.model_dump(mode="json", exclude_defaults=True) for f in condition.faults],
+            "faults": [f.model_dump(mode="json") for f in condition.faults],
             "behaviour": condition.behaviour,
         }
         yield json.dumps(words), {s: condition.run(plan.code, s).key for s in plan.seeds}

@@ -6,82 +6,13 @@ from collections import Counter
 from collections.abc import Iterator
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.scaling import ScalingFit
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.fault_measures import ModeBudget, anchoring_loads, fault_budgets
 from swarm_logistics_env.studies.judged_comparisons import CONFIDENCE
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.size_series import SizeSeries, steps
 from swarm_logistics_env.studies.until_clear import SPENDING
 
 from . import wording
-from .drawing import LAWS
 from .result_tables import Column, Section, table_section
-
-_LAWS_TEXT = (
-    "USL: P = gN / (1 + a(N-1) + bN(N-1)), N* = sqrt((1-a)/b). The other: "
-    "P = kN^p exp(-qN), N* = p/q. Fitted to mean P by least squares with the weights "
-    "given; the better law by AICc stands first. N* is the size of the largest P; it "
-    "moves with the weights, so it is quoted with its interval and its weights."
-)
-_CAPPED_TEXT = (
-    f"{wording.SATURATED}: at some size every item was delivered in a run, so P is capped there, "
-    "and the law bends too early."
-)
-_LAW_COLUMNS: list[Column] = [
-    ("P(N) of", lambda row: row[0]),
-    ("weights", lambda row: row[1].weighting),
-    ("law", lambda row: LAWS[row[1].law]),
-    (
-        "parameters",
-        lambda row: ", ".join(f"{name} = {x:.3g}" for name, x in row[1].parameters.items()),
-    ),
-    ("N* [95 %]", lambda row: _peak(row[1])),
-    ("AICc", lambda row: wording.number(row[1].aicc, 1)),
-]
-_STEPS_TEXT = (
-    "Marginal gain: P(N2) - (N2/N1) P(N1), in items; above 0 where S > 1. Karp-Flatt e: the share "
-    "of the work that is not shared; 0 where P grows as N does, 1 where it does not grow, below 0 "
-    "where it grows faster."
-)
-_STEP_COLUMNS: list[Column] = [
-    ("N", lambda step: f"{step.before} → {step.after}{wording.mark(step)}"),
-    ("P/N at the larger N [95 %]", lambda step: wording.bracketed(step.efficiency, 3)),
-    ("marginal gain [95 %]", lambda step: wording.bracketed(step.marginal_gain, 1)),
-    ("Karp-Flatt e [95 %]", lambda step: wording.bracketed(step.karp_flatt, 3)),
-]
-
-
-def size_sections(results: StudyResults, series: tuple[SizeSeries, ...]) -> Iterator[Section]:
-    """Yield the laws that fit P(N), and what the robots of each size are worth."""
-    if not series:
-        return
-    named = [(f"{one.policy or 'published runs'}: {one.table}", one) for one in series]
-    marks = [wording.SATURATED if one.cells["saturated"].any() else "" for one in series]
-    yield table_section(
-        "Scaling laws",
-        [
-            (who + mark, fit)
-            for (who, one), mark in zip(named, marks, strict=True)
-            for fit in one.fits
-        ],
-        _LAW_COLUMNS,
-        _LAWS_TEXT,
-        *([_CAPPED_TEXT] if any(marks) else ()),
-        *(f"{who}: no law is fitted: {one.problem}." for who, one in named if one.problem),
-    )
-    for who, one in named:
-        found = list(steps(results, one)) if one.policy else []
-        if found:
-            title = f"{who}, what robots are worth"
-            yield table_section(title, found, _STEP_COLUMNS, _STEPS_TEXT)
-
-
-def _peak(fit: ScalingFit) -> str:
-    if fit.peak is None:
-        return "none: the fitted law has no peak"
-    return wording.bracketed(Interval(fit.peak, fit.peak_low, fit.peak_high), 1)
-
 
 _BUDGET_COLUMNS: list[Column] = [
     ("policy", lambda one: one.compared.policy),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from swarm_logistics_env.cli import app
@@ -56,35 +55,6 @@ def test_judge_keeps_study_report_and_latex(lab: Path) -> None:
     assert "_" not in tables.replace("\\_", "")
 
 
-def trials(path: Path, seeds: range, scale: float) -> None:
-    """Trials of set-ups that differ in how much a fault does: the same ones at the same seeds."""
-    harm = np.random.default_rng(0).uniform(0.2, 1.0, 100)
-    noise = np.random.default_rng(round(10 * scale))
-    rows = ["robots,fault,faulty,seed,delivered"]
-    for seed in seeds:
-        whole = scale * (40 + noise.normal(0, 1))
-        rows.append(f"8,none,0,{seed},{whole:.3f}")
-        rows.append(f"8,wheel,2,{seed},{whole * harm[seed] + noise.normal(0, 1):.3f}")
-    path.write_text("\n".join(rows))
-
-
-def test_simulation_narrows_the_intervals_of_few_real_trials(
-    lab: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    trials(lab / "real.csv", range(12), 0.8)
-    trials(lab / "model.csv", range(100), 1.0)
-    assert app.run(["judge", "real.csv", "--simulated", "model.csv", "--out", "out"]) == 0
-    printed = capsys.readouterr().out
-    (row,) = (line for line in printed.splitlines() if line.startswith("| recorded | R > 0, wheel"))
-    assert float(row.split("|")[5]) < 0.5
-    assert "12 real trials of each condition, their set-ups simulated, and 88 further" in printed
-    assert row in Path("out/report.md").read_text()
-    # A study of them, kept before, does as well as the file.
-    assert app.run(["study", "import", "model.csv", "--out", "model"]) == 0
-    assert app.run(["judge", "real.csv", "--simulated", "model"]) == 0
-    assert row in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -93,31 +63,14 @@ def test_simulation_narrows_the_intervals_of_few_real_trials(
         (["lab.csv", "--column", "performance=Kiste"], "'Kiste': did you mean 'Kisten'?"),
         (["lab.csv"], "has no column 'performance'"),
         (["lab.cvs"], "cannot read lab.cvs"),
-        (["real.csv", "--setup", "nowhere.toml"], "--setup nowhere.toml: should be NAME=VALUE, or"),
-        (["real.csv", "--setup", "lab.csv"], "--setup lab.csv is not TOML"),
-        (["real.csv", "--simulated", "bare.csv"], "the simulated trials have no seeds"),
-        (["real.csv", "--simulated", "few.csv"], "seed 5 of the real trials was not simulated"),
-        (["real.csv", "--simulated", "other.csv"], "the simulated trials compare N 4 -> 8"),
+        (["lab.csv", "--setup", "nowhere.toml"], "--setup nowhere.toml: should be NAME=VALUE, or"),
+        (["lab.csv", "--setup", "lab.csv"], "--setup lab.csv is not TOML"),
     ],
 )
 def test_what_cannot_be_judged_ends_in_one_sentence(
     lab: Path, arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    trials(lab / "real.csv", range(12), 0.8)
-    trials(lab / "few.csv", range(5), 1.0)
-    (lab / "bare.csv").write_text("robots,p\n4,1\n8,2\n")
-    sizes = [f"{n},{seed},{n}" for n in (4, 8) for seed in range(20)]
-    (lab / "other.csv").write_text("\n".join(["robots,seed,p", *sizes]))
     assert app.run(["judge", *arguments]) == 2
     said = capsys.readouterr().err
     assert words in said
     assert len(said.splitlines()) == 1
-
-
-def test_too_few_real_trials_keep_their_own_interval_and_say_so(
-    lab: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    trials(lab / "real.csv", range(9), 0.8)
-    trials(lab / "model.csv", range(40), 1.0)
-    assert app.run(["judge", "real.csv", "--simulated", "model.csv"]) == 0
-    assert "R > 0, wheel, m = 2: 9 real runs: should be at least 10." in capsys.readouterr().out

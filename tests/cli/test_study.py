@@ -202,7 +202,7 @@ def imported(path: Path, faulty: tuple[int, ...], first: int = 0) -> str:
     rows = [f"none,0,25,{s},{40 + s}\nremoved,1,25,{s},{38 + s}\n" for s in seeds]
     rows += [f"FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
     path.with_suffix(".csv").write_text(TABLE + "".join(rows))
-    assert app.run(["study", "import", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
+    assert app.run(["judge", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
     return str(path)
 
 
