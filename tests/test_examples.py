@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from swarm_logistics_env import FAILURE_MODES
+from swarm_logistics_env import FAILURE_MODES, Scenario
 from swarm_logistics_env.studies import Study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -74,3 +74,9 @@ def test_study_file_can_be_planned(study: Path) -> None:
 def test_examples_are_short() -> None:
     for example in EXAMPLES.glob("*.py"):
         assert len(example.read_text("utf-8").splitlines()) < 100, example.name
+
+
+def test_the_search_for_constants_ends_with_a_change() -> None:
+    scenario = Scenario(n_robots=10, duration=100.0, restock=True)
+    change = main("tune_swarm_dt", rounds=2, seeds=2, confirm=2, scenario=scenario)
+    assert change.n_seeds == 2
