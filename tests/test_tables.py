@@ -176,7 +176,7 @@ def test_the_seeds_that_claims_take_stand_beside_the_fixed_plan(tables: Any) -> 
         "reference": "paper",
         "faults": [{"modes": ["FM2", "FM4"], "robots": [1]}],
     }
-    both = (Study(until_clear=True, looks=(20, 30), **asked), Study(**asked))
+    both = (Study(until_clear=True, **asked), Study(**asked))
     played = [study.run(made_up).played for study in both]
     text = script.spent(*(study.findings() for study in both))
     assert "| robust, FM4 | m = 1 | 20 | refuted | the same |" in text

@@ -64,6 +64,9 @@ def judge_command(
         float | None,
         typer.Option(help="Length of every trial in seconds, where no column says it."),
     ] = None,
+    decimal: Annotated[
+        str | None, typer.Option(metavar=".|,", help="Sign before decimals; . if not given.")
+    ] = None,
     setup: Annotated[
         list[str] | None,
         typer.Option(
@@ -91,7 +94,7 @@ def judge_command(
     if names_policy(asked):
         of_trials = {
             "--column": columns, "--ignore": ignore, "--duration": duration,
-            "--setup": setup,
+            "--decimal": decimal, "--setup": setup,
         }  # fmt: skip
         for option, given in of_trials.items():
             if given:
@@ -105,6 +108,7 @@ def judge_command(
             columns=dict(_pair("--column", text) for text in columns or []),
             ignore=ignore or (),
             duration=duration,
+            decimal=decimal or ".",
             setup=_stated(setup or []),
         )
         typer.echo(f"{count} runs in {asked}\n")
@@ -262,7 +266,7 @@ def _pilot(
         if policies:
             raise StudyError("--policy is for a pilot: a study that was run has its own policies")
         return Study.stored(asked, trust_code=trust_code).findings()
-    pilot = study_of(asked, None, seeds, policies, trust_code, looks=(), until_clear=False)
+    pilot = study_of(asked, None, seeds, policies, trust_code, until_clear=False)
     pilot.run(processes=processes or os.cpu_count() or 1)
     return pilot.findings()
 

@@ -1,4 +1,4 @@
-"""Sections on measures that the paper does not define, and on declared looks."""
+"""Sections on measures that the paper does not define, and on the looks until it is clear."""
 
 from __future__ import annotations
 
@@ -71,34 +71,9 @@ def _may_fail(one: ModeBudget) -> str:
 
 
 def look_sections(results: StudyResults) -> Iterator[Section]:
-    """Yield the declared looks, where there are any."""
-    if not results.looks:
-        return
+    """Yield the looks of a study that runs until it is clear."""
     if results.plan.specification.until_clear:
         yield _stops(results)
-        return
-    n_seeds, total = len(results.plan.seeds), len(results.looks)
-    columns: list[Column] = [
-        ("look", lambda look: f"{look[0]} of {total}"),
-        ("seeds", lambda look: str(look[1])),
-        ("p below", lambda look: "< 0.0001" if look[2] < 0.0001 else f"{look[2]:.4f}"),
-        ("level of intervals", lambda look: wording.percent(1 - look[2])),
-        ("when", lambda look: _when(look[1], n_seeds)),
-    ]
-    lines = [
-        (
-            "Declared before the first run. O'Brien-Fleming spending (Lan and DeMets) keeps the "
-            "error over all looks at 5 %: a verdict at a look needs p below its level, and its "
-            "interval has the level beside it."
-        )
-    ]
-    if results.exploratory:
-        lines.append(
-            f"No look was declared at {wording.seeds_text(results)}: every verdict is exploratory."
-        )
-    alphas = spi.look_alphas(results.looks, 1 - CONFIDENCE)
-    looks = zip(range(1, total + 1), results.looks, alphas)
-    yield table_section("Declared looks", looks, columns, *lines)
 
 
 def _stops(results: StudyResults) -> Section:
@@ -122,9 +97,3 @@ def _stops(results: StudyResults) -> Section:
         f"{stopped.total()} of {total} comparisons stopped. P and the further measures are over "
         f"the {len(results.plan.seeds)} seeds that all conditions share.",
     )
-
-
-def _when(look: int, n_seeds: int) -> str:
-    if look == n_seeds:
-        return "this report"
-    return "past" if look < n_seeds else "to come"

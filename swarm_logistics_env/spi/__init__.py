@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from swarm_logistics_env.removed import refuse
+
 from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
@@ -67,3 +71,8 @@ __all__ = [
     "seeds_for_power",
     "worst_decile",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        refuse(__name__, name)
