@@ -14,12 +14,9 @@ PEERS     := .venvs/peers
 
 TORCHRL   := .venvs/torchrl
 BENCHMARL := .venvs/benchmarl
-SKRL      := .venvs/skrl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
 TASKS     := .venvs/tasks
-AGILERL   := .venvs/agilerl
-MINARI    := .venvs/minari
 
 INSTALLED := .venvs/lowest .venvs/newest
 
@@ -35,8 +32,8 @@ help:
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"
-	@echo "make interop         TorchRL, BenchMARL, skrl, RLlib, AgileRL, SuperSuit, Minari and two plain loops on the environment; see interop/"
-	@echo "make tasks           studies of RWARE, simple_spread and VMAS, with their tests; checks the numbers of their pages"
+	@echo "make interop         TorchRL, BenchMARL, RLlib, SuperSuit and two plain loops on the environment; see interop/"
+	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
 	@echo "make format          sort imports and format"
@@ -87,8 +84,7 @@ interop:
 	$(PYTHON) -m interop
 
 tasks: $(TASKS)/installed
-	$(TASKS)/bin/python -m pytest tests/tasks
-	$(TASKS)/bin/python -m pytest $(patsubst %,"tests/test_docs.py::test_page_runs_and_prints_what_it_shows[%.md]",rware simple_spread dispersion)
+	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
 
 # study: autodoc reads the package. -W: a warning is an error.
 docs: $(DOCS)/installed
@@ -126,12 +122,9 @@ $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := torch torchrl mpe2
 $(BENCHMARL)/installed: OTHERS := torch benchmarl
-$(SKRL)/installed: OTHERS := torch skrl
 $(RLLIB)/installed: OTHERS := torch "ray[rllib]"
-$(TASKS)/installed: EXTRAS := study,tasks
-$(TASKS)/installed: OTHERS := hypothesis pytest
-$(AGILERL)/installed: OTHERS := torch agilerl peft
-$(MINARI)/installed: OTHERS := "minari[create,hdf5]" pillow
+# shimmy: the Gymnasium door of VMAS asks for it.
+$(TASKS)/installed: OTHERS := hypothesis pytest mpe2 rware shimmy vmas
 $(SUPERSUIT)/installed: EXTRAS := train
 $(SUPERSUIT)/installed: OTHERS := supersuit mpe2
 

@@ -22,17 +22,12 @@ FLOWS: Mapping[str, Sequence[Box]] = {
     "ecosystem": (
         ("swarm_logistics_v0", "one array a step"),
         ("its forms", "PettingZoo, Gymnasium, SB3"),
-        ("your trainer", "TorchRL, RLlib, skrl, ..."),
+        ("your trainer", "TorchRL, RLlib, ..."),
     ),
     "extending": (
         ("your class", "policy, wrapper, mode, ..."),
-        ("testing.check_...", "spaces, determinism"),
+        ("testing.check_...", "commands, spaces, seeds"),
         ("judge, study", "its score card, its report"),
-    ),
-    "foraging": (
-        ("the same robots", "bodies, sensors, faults"),
-        ("two tasks", "warehouse, foraging"),
-        ("one study", "what lies in the swarm"),
     ),
     "onnx": (
         ("policy.safetensors", "written by train"),

@@ -16,7 +16,6 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import Row, rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import FILE_NAME, Store
-from swarm_logistics_env.studies.until_clear import looks_up_to
 
 STUDIES = ROOT / "docs" / "studies.md"
 MOST = 50
@@ -26,8 +25,7 @@ def studies(out: Path) -> Iterator[Study]:
     """Yield the study that runs until it is clear, then the fixed plan, which has its runs too."""
     clear, fixed = out / "until-clear", out / "paper-fixed"
     seeds = {"seeds": MOST, "first_seed": FIRST_SEED}
-    looks = looks_up_to(MOST)
-    yield Study.preset("paper", out=clear, until_clear=True, looks=looks, **seeds)
+    yield Study.preset("paper", out=clear, until_clear=True, **seeds)
     fixed.mkdir(parents=True, exist_ok=True)
     with Store(fixed / FILE_NAME) as store:
         store.absorb(clear / FILE_NAME)

@@ -24,11 +24,8 @@ SCRIPTS = (
     ("torchrl", "discrete_loop"),
     ("benchmarl", "benchmarl_mappo"),
     ("benchmarl", "benchmarl_learning"),
-    ("skrl", "skrl_ippo"),
     ("supersuit", "supersuit_wrappers"),
     ("rllib", "rllib_ppo"),
-    ("agilerl", "agilerl_ippo"),
-    ("minari", "minari_dataset"),
 )
 
 Row = tuple[str, str, str]  # client with its version, what ran, result

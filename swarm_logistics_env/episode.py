@@ -49,7 +49,6 @@ class Play:
 
     Args:
         policy_seed: decides the policy's own randomness; `seed` does if it is None.
-        world_type: what is made of the scenario, the warehouse or another world with its methods.
 
     Attributes:
         world: the world; its scenario and faults may be changed between two steps.
@@ -68,9 +67,8 @@ class Play:
         seed: int,
         faults: Sequence[Fault] = (),
         policy_seed: int | None = None,
-        world_type: type[Warehouse] = Warehouse,
     ) -> None:
-        self.world = world_type(scenario)
+        self.world = Warehouse(scenario)
         self._policy, self.seed = policy, seed
         self._observations = self.world.reset(seed, faults)
         start(policy, scenario, seed if policy_seed is None else policy_seed)
@@ -108,7 +106,6 @@ def run_episode(
     seed: int,
     faults: Sequence[Fault] = (),
     policy_seed: int | None = None,
-    world_type: type[Warehouse] = Warehouse,
 ) -> Episode:
     """Play `policy` in `scenario` to the end.
 
@@ -119,7 +116,6 @@ def run_episode(
         faults: the faults that are scheduled in the episode.
         policy_seed: decides the policy's own randomness instead of `seed`; the same world with
             another behaviour.
-        world_type: what is made of the scenario, the warehouse or another world with its methods.
 
     Raises:
         FaultError: a fault names robots that are not there.
@@ -130,7 +126,7 @@ def run_episode(
         >>> run_episode(Scenario(duration=10.0), policies.load("swarm-dt"), seed=0).ended_at
         10.0
     """
-    play = Play(scenario, policy, seed, faults, policy_seed, world_type)
+    play = Play(scenario, policy, seed, faults, policy_seed)
     world = play.world
     digest = hashlib.blake2b(digest_size=16)
     while not play.is_over:

@@ -40,13 +40,6 @@ def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
     assert comparable(said) == comparable(text), f"stale: run `python docs/blocks.py {page}`"
 
 
-@pytest.mark.parametrize("name", sorted(path.name for path in (DOCS / "notebooks").glob("*.ipynb")))
-def test_notebook_runs_and_prints_what_it_shows(name: str) -> None:
-    text = (DOCS / "notebooks" / name).read_text(encoding="utf-8")
-    recorded = runpy.run_path(str(DOCS / "notebooks.py"))["recorded"](text)
-    assert recorded == text, "stale: run `python docs/notebooks.py`"
-
-
 def test_every_block_has_a_language_that_is_checked() -> None:
     for name, text in PAGES.items():
         for block in BLOCKS["blocks"](text):

@@ -40,7 +40,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "policies": WORLD | {"motion"},
     "adapters": ENVIRONMENT | {"motion", "policies", "wrappers"},
     "episode": WORLD | {"policies"},
-    "spi": set(),
+    "removed": set(),
+    "spi": {"removed"},
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
     "studies": {"errors", "records", "streams", "spi", "tasks"},
@@ -49,7 +50,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "train": RUNS
     | ENVIRONMENT
     | {"progress_bar", "wrappers", "adapters", "spi", "tasks", "studies"},
-    "testing": RUNS | ENVIRONMENT | {"wrappers", "adapters"},
+    "testing": RUNS | ENVIRONMENT | {"removed"},
 }
 # A Study offers its report, so it stands above both; the other modules of studies stand below.
 MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report", "progress_bar"}

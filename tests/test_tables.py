@@ -162,42 +162,6 @@ def test_no_table_is_typed_by_hand(page: str) -> None:
     assert not re.findall(r"\d \[-?\d", rest)
 
 
-def test_foraging_stands_beside_the_warehouse(
-    tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    script = importlib.import_module("play_foraging")
-    questions: dict[str, Any] = {
-        "seeds": 2,
-        "sizes": [{"values": [5, 10]}],
-        "faults": [{"modes": ["FM4"], "robots": [2]}],
-    }
-    scenario = {"duration": 40.0, "restock": True}
-    small = (
-        Study(out=tmp_path / "1", task="foraging", policies=["forager"], scenario=scenario,
-              **questions),
-        Study(out=tmp_path / "2", policies=["swarm-dt"], scenario=scenario, **questions),
-    )  # fmt: skip
-    monkeypatch.setattr(tables, "PROCESSES", 1)
-    text = script.side_by_side(script.play(small))
-    assert text.startswith("|  | foraging: `forager` | warehouse: `swarm-dt` |")
-    for study, column in zip(small, (2, 3), strict=True):
-        results = study.findings()
-        five = next(c for c in rows_of(results.performance) if c.cell == "N = 5")
-        (row,) = [line for line in text.splitlines() if line.startswith("| P, N = 5 |")]
-        assert row.split("|")[column].strip().startswith(wording.mean_p(five))
-        (robustness,) = [test for test in rows_of(results.indicators) if test.indicator == "R"]
-        (row,) = [line for line in text.splitlines() if line.startswith("| R, FM4, m = 2 |")]
-        assert wording.ratio(robustness) in row.split("|")[column]
-    # The real studies ask the same of both worlds, and their table stands on the page.
-    first, second = (study.specification for study in script.studies(tmp_path))
-    for part in ("seeds", "first_seed", "sizes", "faults", "parameters"):
-        assert getattr(first, part) == getattr(second, part)
-    assert (first.scenario.duration, first.scenario.restock) == (500.0, True)
-    assert second.scenario.restock
-    page = script.PAGE.read_text(encoding="utf-8")
-    assert script.rewritten(page, {"foraging": "x"}).count("| ---") < page.count("| ---")
-
-
 def test_the_seeds_that_claims_take_stand_beside_the_fixed_plan(tables: Any) -> None:
     def made_up(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
         """Counts around 40, and around 10 under FM4."""
@@ -212,7 +176,7 @@ def test_the_seeds_that_claims_take_stand_beside_the_fixed_plan(tables: Any) -> 
         "reference": "paper",
         "faults": [{"modes": ["FM2", "FM4"], "robots": [1]}],
     }
-    both = (Study(until_clear=True, looks=(20, 30), **asked), Study(**asked))
+    both = (Study(until_clear=True, **asked), Study(**asked))
     played = [study.run(made_up).played for study in both]
     text = script.spent(*(study.findings() for study in both))
     assert "| robust, FM4 | m = 1 | 20 | refuted | the same |" in text

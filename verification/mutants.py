@@ -72,7 +72,7 @@ MUTANTS = (
         "close_grippers",
         "robots.present[robot] and able.obeys[robot] and able.lifts[robot]",
         "robots.present[robot] and able.obeys[robot]",
-        (WAREHOUSE, INVARIANTS, "tests/testing"),
+        (WAREHOUSE, INVARIANTS),
     ),
     Mutant(
         "timers never expire",
@@ -112,7 +112,7 @@ MUTANTS = (
         "open_grippers",
         "robots.item[robot] = NOBODY",
         "pass",
-        (WAREHOUSE, INVARIANTS, "tests/testing"),
+        (WAREHOUSE, INVARIANTS),
     ),
     Mutant(
         "wrong robot removed in P_S",

@@ -16,7 +16,8 @@ from scipy.special import stdtr
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.ratio import paired_ratio
-from swarm_logistics_env.studies.until_clear import SPENDING, looks_up_to
+from swarm_logistics_env.studies.specification import looks_up_to
+from swarm_logistics_env.studies.until_clear import SPENDING
 
 STUDIES = 10_000
 P_O, P_F = 39.0, 34.0  # true means [items]

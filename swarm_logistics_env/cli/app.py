@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .application import Application
-from .fault_commands import attack_command, blame_command
+from .fault_commands import attack_command
 from .film_command import film_command
 from .judging import judge_command
 from .options import (
@@ -38,7 +38,6 @@ app.command("film")(film_command)
 app.command("watch")(watch_command)
 app.command("judge")(judge_command)
 app.command("attack")(attack_command)
-app.command("blame")(blame_command)
 
 
 def _print_version(wanted: bool) -> None:

@@ -1,15 +1,14 @@
-"""`swarm-logistics attack` and `blame`."""
+"""`swarm-logistics attack`."""
 
 from __future__ import annotations
 
 import shlex
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import PresetOption, ScenarioOption, SetOption, faults_of, scenario_of
+from .options import PresetOption, ScenarioOption, SetOption, scenario_of
 from .study_commands import ProcessesOption
 
 if TYPE_CHECKING:
@@ -62,87 +61,6 @@ def attack_command(
     except KeyboardInterrupt:
         _stopped(place)
     _show_attack(found, policy, robots, fresh)
-
-
-def blame_command(
-    policy: PolicyArgument,
-    fault: Annotated[
-        str,
-        typer.Option(
-            help="MODE[:ROBOTS[:ROLE]]@ONSET[+DURATION], the onset later than 0, e.g. FM4:2@100. "
-            "Robots in the role at the onset fail first; by the seed if not given."
-        ),
-    ],
-    seeds: Annotated[int, typer.Option(min=1, help="Number of episodes.")] = 20,
-    first_seed: Annotated[int, typer.Option(min=0, help="Smallest seed.")] = 0,
-    preset: PresetOption = "paper",
-    file: ScenarioOption = None,
-    changes: SetOption = None,
-    study: Annotated[
-        Path | None,
-        typer.Option(help="Directory of a study: its scenario is played, its report tells it."),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Directory; blame-POLICY-FAULT in --study or results.")
-    ] = None,
-    processes: ProcessesOption = None,
-) -> None:
-    """Tell which robots and which lost capabilities cost the deliveries that a fault costs."""
-    import os
-
-    from swarm_logistics_env.errors import SetupError
-    from swarm_logistics_env.fault_analysis.attribution_run import attribute_in, write_table
-    from swarm_logistics_env.progress_bar import ProgressBar
-    from swarm_logistics_env.report.drawing import images
-    from swarm_logistics_env.report.report_files import missing_packages
-    from swarm_logistics_env.report.resilience_sections import attribution_section
-    from swarm_logistics_env.scenario import Scenario
-    from swarm_logistics_env.studies import Study
-
-    from .terminal_tables import show
-
-    name = f"blame-{Path(policy).stem}-{fault.replace(':', '-')}"
-    place = out or (study or Path("results")) / name
-    scenario = scenario_of(preset, file, changes)
-    asked = Study.stored(study) if study else None
-    if asked:
-        if scenario != Scenario():
-            raise SetupError("--study has a scenario: should be without --set and the like")
-        scenario = asked.specification.scenario
-        if not isinstance(scenario, Scenario):
-            task = asked.specification.played.name
-            raise SetupError(f"--study {study}: plays {task!r}, should be one of the warehouse")
-    (chosen,) = faults_of([fault], scenario)
-    done = 0
-    with ProgressBar(f"blame {policy}", seeds, "seeds") as bar:
-
-        def count() -> None:
-            nonlocal done
-            done += 1
-            bar.reach(done)
-
-        try:
-            found = attribute_in(
-                place,
-                scenario,
-                policy,
-                chosen,
-                range(first_seed, first_seed + seeds),
-                processes or os.cpu_count() or 1,
-                count,
-            )
-        except KeyboardInterrupt:
-            _stopped(place)
-    written = [write_table(found, policy, _in_words(chosen), place)]
-    section = attribution_section(written[0])
-    show(replace(section, figures=()))
-    if not missing_packages():
-        (figure,) = section.figures
-        written.append(place / "attribution.png")
-        written[1].write_bytes(images(figure.draw, figure.height)[1])
-    typer.echo(f"Written: {', '.join(map(str, written))}")
-    if asked:
-        typer.echo(f"Report: {asked.report()[0]}")
 
 
 def _stopped(place: Path) -> None:

@@ -23,7 +23,7 @@ def names_policy(asked: str) -> bool:
 def judge_policy(
     asked: str, out: Path | None, processes: int | None, trust_code: bool, *, full: bool
 ) -> int:
-    """Play the study `scorecard` with a policy; print its score card and write it with the report.
+    """Play the study `scorecard` with a policy; print its score card and write the report.
 
     Every run is kept at once, so that the same command goes on after an interruption.
 
@@ -45,7 +45,6 @@ def judge_policy(
     from swarm_logistics_env.report.figures import slug
     from swarm_logistics_env.report.report_files import write_report
     from swarm_logistics_env.report.score_card import STUDY, card_section, score_card
-    from swarm_logistics_env.report.score_card_page import write_card
     from swarm_logistics_env.studies.engines import engine_named
 
     from .study_commands import in_one_line, run_study, show_report, study_of
@@ -58,13 +57,10 @@ def judge_policy(
     count = processes or os.cpu_count() or 1
     tally = run_study(study, engine_named("process" if count > 1 else "local", count, None))
     results = study.findings()
-    card = score_card(results)
-    show(card_section(card))
-    written = write_card(card, out)
+    show(card_section(score_card(results)))
     if full:
         show_report(results, document(results), out, full=True)
     else:
-        written += write_report(results, out)
-    typer.echo(f"Written: {', '.join(map(str, written))}")
+        typer.echo(f"Written: {', '.join(map(str, write_report(results, out)))}")
     typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}"))
     return tally.failed

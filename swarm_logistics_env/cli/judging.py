@@ -32,7 +32,6 @@ AtOption = Annotated[
 ]
 
 
-@study.command("import")
 def judge_command(
     asked: Annotated[
         str,
@@ -65,13 +64,8 @@ def judge_command(
         float | None,
         typer.Option(help="Length of every trial in seconds, where no column says it."),
     ] = None,
-    simulated: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE|DIR",
-            help="Simulated trials with the same seeds and further ones, or a study of them, that "
-            "narrow the intervals of at least ten real trials.",
-        ),
+    decimal: Annotated[
+        str | None, typer.Option(metavar=".|,", help="Sign before decimals; . if not given.")
     ] = None,
     setup: Annotated[
         list[str] | None,
@@ -92,46 +86,34 @@ def judge_command(
     """
     from tempfile import TemporaryDirectory
 
-    from swarm_logistics_env.report.document import document, with_simulation
+    from swarm_logistics_env.report.document import document
     from swarm_logistics_env.report.report_files import latex_tables, write_text
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.importing import import_results
 
-    from .terminal_tables import show
-
     if names_policy(asked):
         of_trials = {
             "--column": columns, "--ignore": ignore, "--duration": duration,
-            "--simulated": simulated, "--setup": setup,
+            "--decimal": decimal, "--setup": setup,
         }  # fmt: skip
         for option, given in of_trials.items():
             if given:
                 raise StudyError(f"{option} is for a file of trials, and {asked!r} is a policy")
         raise typer.Exit(1 if judge_policy(asked, out, processes, trust_code, full=full) else 0)
     with TemporaryDirectory() as elsewhere:
-
-        def results_of(trials: Path, directory: Path) -> StudyResults:
-            count = import_results(
-                trials,
-                directory,
-                columns=dict(_pair("--column", text) for text in columns or []),
-                ignore=ignore or (),
-                duration=duration,
-                setup=_stated(setup or []),
-            )
-            typer.echo(f"{count} runs in {trials}\n")
-            return Study.stored(directory).findings()
-
-        results = results_of(Path(asked), out or Path(elsewhere) / "study")
+        directory = out or Path(elsewhere) / "study"
+        count = import_results(
+            Path(asked),
+            directory,
+            columns=dict(_pair("--column", text) for text in columns or []),
+            ignore=ignore or (),
+            duration=duration,
+            decimal=decimal or ".",
+            setup=_stated(setup or []),
+        )
+        typer.echo(f"{count} runs in {asked}\n")
+        results = Study.stored(directory).findings()
         whole = document(results)
-        if simulated is not None:
-            if simulated.is_dir():
-                model = Study.stored(simulated).findings()
-            else:
-                model = results_of(simulated, Path(elsewhere) / "simulated")
-            whole = with_simulation(whole, results, model)
-            if not full:
-                show(whole.summary[-1])  # what was asked for
         show_report(results, whole, out, full=full)
     if out is not None:
         write_text(out / "tables.tex", latex_tables(whole.summary))
@@ -284,7 +266,7 @@ def _pilot(
         if policies:
             raise StudyError("--policy is for a pilot: a study that was run has its own policies")
         return Study.stored(asked, trust_code=trust_code).findings()
-    pilot = study_of(asked, None, seeds, policies, trust_code, looks=(), until_clear=False)
+    pilot = study_of(asked, None, seeds, policies, trust_code, until_clear=False)
     pilot.run(processes=processes or os.cpu_count() or 1)
     return pilot.findings()
 

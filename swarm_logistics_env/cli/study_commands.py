@@ -149,17 +149,18 @@ def run_command(
 
     from swarm_logistics_env.studies.engines import engine_named
     from swarm_logistics_env.studies.runs import Shard
-    from swarm_logistics_env.studies.until_clear import FIRST_LOOK, MOST_SEEDS, looks_up_to
+    from swarm_logistics_env.studies.specification import FIRST_LOOK
+    from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
     part = Shard.parse(shard) if shard else None
-    looks: dict[str, object] = {}
+    looks: dict[str, bool] = {}
     if until_clear:
         seeds = MOST_SEEDS if seeds is None else seeds
         if seeds <= FIRST_LOOK:
             raise StudyError(
                 f"--most {seeds}: should be more than {FIRST_LOOK} seeds, where the first look is"
             )
-        looks = {"looks": looks_up_to(seeds), "until_clear": True}
+        looks = {"until_clear": True}
     chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
     out = out or Path("results", chosen.specification.name)
     chosen.out = out / part.directory if part else out
@@ -201,7 +202,7 @@ def report_command(
 @study.command("export")
 def export_command(
     directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
-    to: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
+    to: Annotated[Path, typer.Option(help="File to write, .csv.")],
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""
     from swarm_logistics_env.studies.store import Store, export

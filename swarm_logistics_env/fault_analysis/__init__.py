@@ -1,1 +1,1 @@
-"""Who is to blame for a loss, and which fault costs most."""
+"""Which fault costs most."""

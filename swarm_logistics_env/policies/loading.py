@@ -21,26 +21,10 @@ from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
 from swarm_logistics_env.policies.sb3_policy import StableBaselinesPolicy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
-from swarm_logistics_env.policies.tuned import SUFFIX as TUNED
-from swarm_logistics_env.policies.tuned import read_tuned
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
-SUFFIXES = (SUFFIX, TUNED, SB3_SUFFIX)  # of policy files
+SUFFIXES = (SUFFIX, SB3_SUFFIX)  # of policy files
 WEIGHTS = Path(__file__).parent / "weights"
-
-
-def load_tuned(path: Path, **parameters: Any) -> Policy:
-    """Return the scripted policy in a file of `swarm-logistics train --tune`.
-
-    Raises:
-        PolicyError: it cannot be read, or names no scripted policy with such parameters.
-    """
-    found = read_tuned(path)
-    if found.policy not in SCRIPTED:
-        raise PolicyError(
-            f"{path}: no scripted policy {found.policy!r}{suggest(found.policy, SCRIPTED)}"
-        )
-    return SCRIPTED[found.policy](**{**found.parameters, **parameters})
 
 
 SCRIPTED: dict[str, Callable[..., Policy]] = {
@@ -54,13 +38,10 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
 
 NAMES: dict[str, Callable[..., Policy]] = {
     **SCRIPTED,
-    # These are trained or tuned; each file names the command that made it.
+    # These are trained; each file names the command that made it.
     **{
         path.stem: functools.partial(read_policy, path)
         for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))
-    },
-    **{
-        path.stem: functools.partial(load_tuned, path) for path in sorted(WEIGHTS.glob(f"*{TUNED}"))
     },
 }
 
@@ -121,8 +102,6 @@ def known_policies() -> Iterator[KnownPolicy]:
         about = (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")
         with_ = "".join(f" {field} = {value}." for field, value in given.items())
         yield KnownPolicy(name, "scripted", about + with_)
-    for path in sorted(WEIGHTS.glob(f"*{TUNED}")):
-        yield KnownPolicy(path.stem, "tuned", f"{read_tuned(path).policy}, parameters by a search.")
     for path in sorted(WEIGHTS.glob(f"*{SUFFIX}")):
         yield KnownPolicy(path.stem, "trained", read_card(path).about)
     for point in entry_points(group=ENTRY_POINTS):
@@ -161,12 +140,8 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
         return functools.partial(read_policy, path)
     if path.suffix == SB3_SUFFIX:
         return functools.partial(StableBaselinesPolicy, path, trust_code=trust_code)
-    if path.suffix == TUNED:
-        return functools.partial(load_tuned, path)
     if path.is_file() and path.suffix != ".py":
-        raise PolicyError(
-            f"{name} is no policy file: should end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
-        )
+        raise PolicyError(f"{name} is no policy file: should end in {' or '.join(SUFFIXES)}")
     return None
 
 

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.studies.few_real_runs import narrowed, replays
 from swarm_logistics_env.studies.performance_table import groups_of, rows_of
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.size_series import size_series
 
-from . import wording
 from .answer import Answer, answer
-from .figures import Figure, indicator_figures, scaling_figure
-from .further_measures import budget_sections, load_sections, look_sections, size_sections
+from .figures import Figure, indicator_figures, size_figures
+from .further_measures import budget_sections, load_sections, look_sections
 from .policies_compared import policy_sections
-from .resilience_sections import attribution_section, resilience_sections
-from .result_tables import Column, Section, table_section, tables, warnings
+from .resilience_sections import resilience_sections
+from .result_tables import Section, tables, warnings
 from .setup_sheet import glossary, methods, setup_sheet
 from .wording import sentence
 
@@ -101,11 +97,7 @@ def _chapters(
     result_tables: tuple[Section, ...],
     faults: tuple[Section, ...],
 ) -> Iterator[Chapter]:
-    series = size_series(results)
-    figures = [
-        *indicator_figures(results),
-        *(scaling_figure(results, one) for one in series if one.cells["n_seeds"].any()),
-    ]
+    figures = [*indicator_figures(results), *size_figures(results)]
     yield Chapter(
         "Figures",
         "The paper's indicators; raw P and the numbers stand in the tables below.",
@@ -135,7 +127,7 @@ def _chapters(
     yield Chapter(
         "Beyond the paper",
         "Measures that the paper does not define; none of them enters a verdict above.",
-        (*size_sections(results, series), *faults),
+        faults,
     )
     yield Chapter("Set-up", "", setup_sheet(results.plan))
     yield Chapter("Methods", "", (Section("", lines=(methods(results.plan),)),))
@@ -149,49 +141,3 @@ def _verdicts(results: StudyResults) -> Iterator[Section]:
             f"{policy}: {DEFINITIONS[indicator].heading}",
             sentences=tuple(sentence(results, test) for test in rows_of(tests)),
         )
-
-
-def with_simulation(whole: Document, real: StudyResults, simulated: StudyResults) -> Document:
-    """Return a report on real trials with a chapter on what simulation adds to them.
-
-    Raises:
-        StudyError: the simulated trials are not of the same set-ups and comparisons.
-    """
-    seeds, further = replays(real, simulated)
-    found = list(narrowed(real, simulated))
-    columns: list[Column] = [
-        ("policy", lambda one: one.policy),
-        ("what", lambda one: one.name),
-        ("real alone [95 %]", lambda one: wording.bracketed(one.alone, 3)),
-        ("with simulation [95 %]", lambda one: wording.bracketed(one.combined, 3)),
-        ("width, with over alone", lambda one: wording.number(one.width, 2)),
-        ("verdict with", lambda one: getattr(one.combined, "verdict", wording.NOTHING)),
-    ]
-    section = table_section(
-        "Real trials with simulation",
-        (one for one in found if one.combined is not None),
-        columns,
-        f"{len(seeds)} real trials of each condition, their set-ups simulated, and {len(further)} "
-        "further simulated ones. The real trials are corrected for how lucky their set-ups were in "
-        "simulation (control variate, Student's t at two degrees of freedom fewer). Nothing is "
-        "taken from simulation itself. Decide for one of the two intervals before you look; "
-        "verdicts unadjusted.",
-        *(f"{one.policy}, {one.name}: {one.problem}." for one in found if one.combined is None),
-    )
-    return replace(
-        whole,
-        chapters=(*whole.chapters, Chapter("With simulation", "", (section,))),
-        summary=(*whole.summary, section),
-    )
-
-
-def with_attributions(whole: Document, folder: Path) -> Document:
-    """Return a report with a chapter on what `blame` found, in folders of the study's own."""
-    found = tuple(attribution_section(path) for path in sorted(folder.glob("*/attribution.csv")))
-    if not found:
-        return whole
-    text = (
-        "Which robots and which lost capabilities cost the deliveries that a fault costs, from "
-        "copies of the world at the onset. None of it enters a verdict above."
-    )
-    return replace(whole, chapters=(*whole.chapters, Chapter("Who is to blame", text, found)))

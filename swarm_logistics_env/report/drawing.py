@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from swarm_logistics_env.spi.scaling import ScalingFit
 from swarm_logistics_env.studies.fault_measures import RepairCurve
 from swarm_logistics_env.studies.performance_table import groups_of
 
@@ -61,7 +60,6 @@ _STYLE: Any = {
 }
 _NO_METADATA = {"Creator": None, "Date": None, "Format": None, "Type": None}
 DOTS_PER_INCH = 200
-LAWS = {"usl": "USL", "power_exponential": "kN^p exp(-qN)"}
 
 
 def images(draw: Draw, height: float) -> tuple[str, bytes]:
@@ -183,47 +181,17 @@ def _bars(
             axes.plot(leaving, edges, arrow, color=colour, markersize=5, clip_on=False)
 
 
-def size_grid(sizes: Iterable[float]) -> list[float]:
-    """Return swarm sizes [robots] at which fitted laws are drawn."""
-    sizes = list(sizes)
-    return [float(n) for n in np.linspace(min(sizes), 1.1 * max(sizes), 60).round(6)]
-
-
-def scaling(canvas: Canvas, cells: pd.DataFrame, fits: Sequence[ScalingFit], label: str) -> None:
-    """Draw P(N), fitted laws, and N* with its interval at the foot."""
+def sizes(canvas: Canvas, cells: pd.DataFrame) -> None:
+    """Draw P against swarm size."""
     axes = canvas.subplots()
-    grid = size_grid(cells["value"])
-    right = grid[-1]
-    curves = {fit.law: fit.predict(grid) for fit in fits}
-    tops = cells["high"].fillna(cells["mean"])
-    highest = max([*tops, *(float(curve.max()) for curve in curves.values()), 1.0])
-    for fit in sorted(fits, key=lambda fit: list(LAWS).index(fit.law)):
-        place = list(LAWS).index(fit.law)
-        colour, marker = COLOURS[place + 1], MARKERS[place + 1]
-        axes.plot(grid, curves[fit.law], LINES[place], color=colour, label=LAWS[fit.law])
-        if fit.peak is None or fit.peak_low is None or fit.peak_high is None:
-            continue
-        height = -(0.06 + 0.07 * place) * highest
-        low, high = min(fit.peak_low, right), min(fit.peak_high, right)
-        axes.plot([low, high], [height, height], color=colour)
-        axes.plot(low, height, "|", color=colour, markersize=7)
-        end = ">" if fit.peak_high > right else "|"
-        axes.plot(high, height, end, color=colour, markersize=6, clip_on=end == "|")
-        if fit.peak <= right:
-            axes.plot(fit.peak, height, marker, color=colour, markersize=6)
+    right, highest = 1.1 * cells["value"].max(), 1.08 * cells["high"].fillna(cells["mean"]).max()
     _bars(axes, cells["value"], cells["low"], cells["high"], (0.0, math.inf), COLOURS[0])
-    (means,) = axes.plot(cells["value"], cells["mean"], MARKERS[0], color=COLOURS[0], zorder=3)
-    means.set(markersize=5, label=label)
+    axes.plot(cells["value"], cells["mean"], MARKERS[0], color=COLOURS[0], markersize=5, zorder=3)
     capped = cells[cells["saturated"]]
     for point in zip(capped["value"], capped["mean"]):
         axes.annotate("†", point, (5, 2), textcoords="offset points", fontsize=8)
-    if any(fit.peak is not None for fit in fits):
-        axes.axhline(0.0, color=INK, linewidth=0.5)
-        axes.annotate("N*", (0.0, -0.08 * highest), (4, -3), textcoords="offset points", fontsize=8)
-    axes.set(xlim=(0.0, right), ylim=(-0.2 * highest if fits else 0.0, 1.08 * highest))
-    axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= 1.08 * highest])
+    axes.set(xlim=(0.0, right), ylim=(0.0, max(highest, 1.0)))
     axes.set(xlabel="swarm size N [robots]", ylabel="performance P")
-    _legend(canvas, axes, lines=True)
 
 
 def rates(canvas: Canvas, panels: Mapping[str, pd.DataFrame], onset: float, y_label: str) -> None:
@@ -271,23 +239,6 @@ def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None
             if curve.censored:
                 axes.plot(seconds[-1], share[-1], "x", color=colour, markersize=6, clip_on=False)
         axes.set(xlim=(0.0, None), ylim=(0.0, 1.05))
-
-
-def losses(canvas: Canvas, table: pd.DataFrame) -> None:
-    """Draw the deliveries that a fault costs, a panel for each group of parts, on one scale."""
-    groups = list(groups_of(table, "group"))
-    heights = [len(here) for _, here in groups]
-    panels = canvas.subplots(len(groups), 1, sharex=True, squeeze=False, height_ratios=heights)
-    for axes, (group, here) in zip(panels[:, 0], groups):
-        places = range(len(here))
-        axes.barh(places, here["lost"], color=COLOURS[0], height=0.6)
-        axes.hlines(places, here["low"], here["high"], color=INK, linewidth=1.5)
-        axes.set_yticks(places, here["part"])
-        axes.invert_yaxis()
-        axes.axvline(0.0, color=INK, linewidth=0.8)
-        axes.grid(visible=False)
-        axes.set_title(group)
-    panels[-1, 0].set_xlabel("deliveries lost after the onset, per episode")
 
 
 def _over_time(

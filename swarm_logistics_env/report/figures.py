@@ -9,9 +9,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
-from swarm_logistics_env.studies.performance_table import groups_of, rows_of
+from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.size_series import SizeSeries
 
 from . import drawing
 from .drawing import Panel
@@ -150,37 +149,20 @@ def _interval_figure(
     )
 
 
-def scaling_figure(results: StudyResults, series: SizeSeries) -> Figure:
-    """Return P(N) with the laws fitted to it under weights 1/P, and N* with its interval."""
-    import pandas as pd
-
-    cells = series.cells.dropna(subset="mean")
-    fits = tuple(fit for fit in series.fits if fit.weighting == "1/P")
-    grid = drawing.size_grid(cells["value"])
-    means = cells[["value", "mean", "low", "high"]]
-    rows = [("mean P", *mean) for mean in rows_of(means)]
-    for fit in fits:
-        rows += [(fit.law, n, p, None, None) for n, p in zip(grid, fit.predict(grid).tolist())]
-        rows.append((f"N* of {fit.law}", fit.peak, None, fit.peak_low, fit.peak_high))
-    who = series.policy or "published runs"
-    laws = (
-        "lines: scaling laws fitted with weights 1/P; bars at the foot: N* of each with its 95 % "
-        "interval, an arrow where it goes on"
-        if fits
-        else f"no scaling law fits: {series.problem}"
-    )
-    seeds = (
-        f"mean of {seeds_text(results)}, bars: 95 % t-intervals"
-        if series.policy
-        else ("number of runs not given, so no intervals")
-    )
-    return Figure(
-        slug("P-N", series.policy or "published", series.table),
-        f"{who}, {series.table}: P against swarm size N ({seeds}); {laws}.{_saturation(cells)}",
-        pd.DataFrame(rows, columns=["what", "N", "P", "low", "high"]),
-        3.6,
-        partial(drawing.scaling, cells=cells, fits=fits, label="mean P" if series.policy else "P"),
-    )
+def size_figures(results: StudyResults) -> Iterator[Figure]:
+    """Yield P against swarm size N, a figure for every policy and table of sizes."""
+    p = results.performance
+    for (policy, table), cells in groups_of(p[p["kind"] == "size"], "policy", "table"):
+        known = cells.sort_values("value").dropna(subset="mean")
+        if not known.empty:
+            yield Figure(
+                slug("P-N", policy, table),
+                f"{policy}, {table}: P against swarm size N (mean of {seeds_text(results)}, bars: "
+                f"95 % t-intervals).{_saturation(known)}",
+                known[["value", "mean", "low", "high"]],
+                3.6,
+                partial(drawing.sizes, cells=known),
+            )
 
 
 def _saturation(rows: pd.DataFrame) -> str:

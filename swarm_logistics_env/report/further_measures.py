@@ -1,4 +1,4 @@
-"""Sections on measures that the paper does not define, and on declared looks."""
+"""Sections on measures that the paper does not define, and on the looks until it is clear."""
 
 from __future__ import annotations
 
@@ -6,82 +6,13 @@ from collections import Counter
 from collections.abc import Iterator
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.scaling import ScalingFit
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.fault_measures import ModeBudget, anchoring_loads, fault_budgets
 from swarm_logistics_env.studies.judged_comparisons import CONFIDENCE
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.size_series import SizeSeries, steps
 from swarm_logistics_env.studies.until_clear import SPENDING
 
 from . import wording
-from .drawing import LAWS
 from .result_tables import Column, Section, table_section
-
-_LAWS_TEXT = (
-    "USL: P = gN / (1 + a(N-1) + bN(N-1)), N* = sqrt((1-a)/b). The other: "
-    "P = kN^p exp(-qN), N* = p/q. Fitted to mean P by least squares with the weights "
-    "given; the better law by AICc stands first. N* is the size of the largest P; it "
-    "moves with the weights, so it is quoted with its interval and its weights."
-)
-_CAPPED_TEXT = (
-    f"{wording.SATURATED}: at some size every item was delivered in a run, so P is capped there, "
-    "and the law bends too early."
-)
-_LAW_COLUMNS: list[Column] = [
-    ("P(N) of", lambda row: row[0]),
-    ("weights", lambda row: row[1].weighting),
-    ("law", lambda row: LAWS[row[1].law]),
-    (
-        "parameters",
-        lambda row: ", ".join(f"{name} = {x:.3g}" for name, x in row[1].parameters.items()),
-    ),
-    ("N* [95 %]", lambda row: _peak(row[1])),
-    ("AICc", lambda row: wording.number(row[1].aicc, 1)),
-]
-_STEPS_TEXT = (
-    "Marginal gain: P(N2) - (N2/N1) P(N1), in items; above 0 where S > 1. Karp-Flatt e: the share "
-    "of the work that is not shared; 0 where P grows as N does, 1 where it does not grow, below 0 "
-    "where it grows faster."
-)
-_STEP_COLUMNS: list[Column] = [
-    ("N", lambda step: f"{step.before} → {step.after}{wording.mark(step)}"),
-    ("P/N at the larger N [95 %]", lambda step: wording.bracketed(step.efficiency, 3)),
-    ("marginal gain [95 %]", lambda step: wording.bracketed(step.marginal_gain, 1)),
-    ("Karp-Flatt e [95 %]", lambda step: wording.bracketed(step.karp_flatt, 3)),
-]
-
-
-def size_sections(results: StudyResults, series: tuple[SizeSeries, ...]) -> Iterator[Section]:
-    """Yield the laws that fit P(N), and what the robots of each size are worth."""
-    if not series:
-        return
-    named = [(f"{one.policy or 'published runs'}: {one.table}", one) for one in series]
-    marks = [wording.SATURATED if one.cells["saturated"].any() else "" for one in series]
-    yield table_section(
-        "Scaling laws",
-        [
-            (who + mark, fit)
-            for (who, one), mark in zip(named, marks, strict=True)
-            for fit in one.fits
-        ],
-        _LAW_COLUMNS,
-        _LAWS_TEXT,
-        *([_CAPPED_TEXT] if any(marks) else ()),
-        *(f"{who}: no law is fitted: {one.problem}." for who, one in named if one.problem),
-    )
-    for who, one in named:
-        found = list(steps(results, one)) if one.policy else []
-        if found:
-            title = f"{who}, what robots are worth"
-            yield table_section(title, found, _STEP_COLUMNS, _STEPS_TEXT)
-
-
-def _peak(fit: ScalingFit) -> str:
-    if fit.peak is None:
-        return "none: the fitted law has no peak"
-    return wording.bracketed(Interval(fit.peak, fit.peak_low, fit.peak_high), 1)
-
 
 _BUDGET_COLUMNS: list[Column] = [
     ("policy", lambda one: one.compared.policy),
@@ -140,34 +71,9 @@ def _may_fail(one: ModeBudget) -> str:
 
 
 def look_sections(results: StudyResults) -> Iterator[Section]:
-    """Yield the declared looks, where there are any."""
-    if not results.looks:
-        return
+    """Yield the looks of a study that runs until it is clear."""
     if results.plan.specification.until_clear:
         yield _stops(results)
-        return
-    n_seeds, total = len(results.plan.seeds), len(results.looks)
-    columns: list[Column] = [
-        ("look", lambda look: f"{look[0]} of {total}"),
-        ("seeds", lambda look: str(look[1])),
-        ("p below", lambda look: "< 0.0001" if look[2] < 0.0001 else f"{look[2]:.4f}"),
-        ("level of intervals", lambda look: wording.percent(1 - look[2])),
-        ("when", lambda look: _when(look[1], n_seeds)),
-    ]
-    lines = [
-        (
-            "Declared before the first run. O'Brien-Fleming spending (Lan and DeMets) keeps the "
-            "error over all looks at 5 %: a verdict at a look needs p below its level, and its "
-            "interval has the level beside it."
-        )
-    ]
-    if results.exploratory:
-        lines.append(
-            f"No look was declared at {wording.seeds_text(results)}: every verdict is exploratory."
-        )
-    alphas = spi.look_alphas(results.looks, 1 - CONFIDENCE)
-    looks = zip(range(1, total + 1), results.looks, alphas)
-    yield table_section("Declared looks", looks, columns, *lines)
 
 
 def _stops(results: StudyResults) -> Section:
@@ -191,9 +97,3 @@ def _stops(results: StudyResults) -> Section:
         f"{stopped.total()} of {total} comparisons stopped. P and the further measures are over "
         f"the {len(results.plan.seeds)} seeds that all conditions share.",
     )
-
-
-def _when(look: int, n_seeds: int) -> str:
-    if look == n_seeds:
-        return "this report"
-    return "past" if look < n_seeds else "to come"

@@ -19,7 +19,7 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
 
 from .answer import digest
-from .document import Document, document, with_attributions
+from .document import Document, document
 from .drawing import INK, PAPER, images
 from .page_data import page_data
 from .result_tables import Section
@@ -40,7 +40,7 @@ def write_report(
     Raises:
         StudyError: a file cannot be written.
     """
-    whole = with_attributions(whole or document(results), directory)
+    whole = whole or document(results)
     paths = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
     pictures, page = directory / "figures", directory / "report.html"
     try:

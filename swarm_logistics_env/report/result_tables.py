@@ -214,10 +214,10 @@ def warnings(results: StudyResults) -> Iterator[str]:
             "refute it."
         )
     if results.exploratory:
-        because = "they are over other seeds than the study declared before its first run"
-        if results.looks:
-            because = "the study is judged at a look that was not declared before its first run"
-        yield f"The verdicts are exploratory: {because}, so they err more often than their level."
+        yield (
+            "The verdicts are exploratory: they are over other seeds than the study declared "
+            "before its first run, so they err more often than their level."
+        )
     if results.late_margin:
         yield (
             "The verdicts on the margin of equivalence are exploratory: another margin was "

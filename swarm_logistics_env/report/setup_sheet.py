@@ -43,8 +43,8 @@ def _study(plan: Plan) -> Iterator[str]:
         f"condition. swarm-logistics-env {version('swarm-logistics-env')}, code version "
         f"{plan.code}."
     )
-    looks = plan.specification.looks
-    level = "at the levels of the declared looks." if looks else "2.5 % on each side."
+    clear = plan.specification.until_clear
+    level = "at the levels of the declared looks." if clear else "2.5 % on each side."
     yield (
         f"Performance P is {plan.specification.played.performance}. Intervals of P are "
         "t-intervals over seeds; those of indicators invert the test, paired by seed. A verdict is "

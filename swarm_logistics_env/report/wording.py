@@ -180,7 +180,7 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
         yield "Skewed: at so few seeds the verdict errs more often than its level."
     if results.plan.specification.until_clear:
         where = "Open after" if test.stopped_at is None else "Clear at"
-        yield f"{where} {test.n_seeds} of at most {results.plan.specification.looks[-1]} seeds."
+        yield f"{where} {test.n_seeds} of at most {results.looks[-1]} seeds."
     if results.exploratory:
         yield "Exploratory."
 

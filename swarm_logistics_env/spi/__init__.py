@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from .efficiency import karp_flatt
+from typing import TYPE_CHECKING
+
+from swarm_logistics_env.removed import refuse
+
 from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
@@ -16,11 +19,8 @@ from .power import (
     seeds_for_equivalence,
     seeds_for_power,
 )
-from .resilience import resilience_index
-from .scaling import ScalingFit, compare_scaling, fit_scaling
-from .self_repair import SelfRepair, repair_times, self_repair
+from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
 from .sequential import Spending, look_alphas
-from .simulation import Simulation, mean_with_simulation
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -30,7 +30,6 @@ from .summaries import (
     probability_of_improvement,
     worst_decile,
 )
-from .survival import SurvivalCurve, kaplan_meier
 from .trials import Trial, Trials, read_trials
 
 __all__ = [
@@ -40,9 +39,6 @@ __all__ = [
     "IndicatorError",
     "Interval",
     "Options",
-    "ScalingFit",
-    "SelfRepair",
-    "Simulation",
     "Spending",
     "SurvivalCurve",
     "Trial",
@@ -51,19 +47,15 @@ __all__ = [
     "adaptability",
     "adjust",
     "adjusted_p_values",
-    "compare_scaling",
     "equivalence",
     "fault_budget",
     "fault_tolerance",
-    "fit_scaling",
     "holm",
     "interquartile_mean",
     "kaplan_meier",
-    "karp_flatt",
     "look_alphas",
     "lower_decile_of_power",
     "mean_interval",
-    "mean_with_simulation",
     "minimum_detectable_effect",
     "no_plan_because",
     "pairing_correlation",
@@ -77,6 +69,10 @@ __all__ = [
     "scalability",
     "seeds_for_equivalence",
     "seeds_for_power",
-    "self_repair",
     "worst_decile",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        refuse(__name__, name)

@@ -21,7 +21,6 @@ from .inputs import (
     same_seeds,
 )
 from .ratio import RatioTest, paired_ratio
-from .simulation import Simulation, combined_ratio, simulated_samples
 from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
 from .verdict_signs import SIGNS
@@ -61,9 +60,8 @@ class Estimate:
             runs: the value is exact, and no evidence), "capped" (a capped P blocks the verdict on
             the side that it leans to: p = 1), "unbounded" (the mean denominator is not
             distinguishable from 0), "assumes_normal" (below ten paired seeds, or unpaired: the
-            verdict rests on normal differences), "with_simulation" (simulated runs narrow the
-            interval; the verdict rests on normal differences), "skewed" (D is so skewed that the
-            verdict errs more often than it promises at this n).
+            verdict rests on normal differences), "skewed" (D is so skewed that the verdict errs
+            more often than it promises at this n).
     """
 
     indicator: str
@@ -146,8 +144,6 @@ class Options(TypedDict, total=False):
             condition that is capped blocks "refuted".
         identical: Whether the runs compared are the same runs, seed by seed: the value is then
             exact.
-        simulation: Simulated runs of the same set-ups and of further ones, to narrow the interval;
-            for at least ten paired real runs.
     """
 
     threshold: float
@@ -155,7 +151,6 @@ class Options(TypedDict, total=False):
     paired: bool
     saturated: Collection[str]
     identical: bool
-    simulation: Simulation | None
 
 
 def judge(
@@ -168,7 +163,6 @@ def judge(
     paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
-    simulation: Simulation | None = None,
 ) -> Estimate:
     """Estimate one ratio of means and judge it against `threshold`; see `Options`.
 
@@ -181,8 +175,8 @@ def judge(
 
     Raises:
         IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
-            reference 0, threshold or confidence out of range, an unknown name in `saturated`,
-            `identical` with performances that differ, or a simulation that does not fit.
+            reference 0, threshold or confidence out of range, an unknown name in `saturated`, or
+            `identical` with performances that differ.
     """
     finite("threshold", threshold)
     between_0_and_1("confidence", confidence)
@@ -203,9 +197,9 @@ def judge(
     if identical:  # the same runs leave nothing to test
         value = untested.value
         return replace(untested, low=value, high=value, flags=("identical",))
-    if n_seeds == 1 and simulation is None:
+    if n_seeds == 1:
         return replace(untested, flags=("single_seed",))
-    test, flags = _tested(untested, weighted, offset, simulation)
+    test, flags = _tested(untested, weighted, offset)
     p_value, probability = float(test.p_value), float(test.probability)
     # The true P of one that is capped is larger, so that it may have brought about this verdict.
     capped = {"refuted" if weighted[name].in_num > 0.0 else "supported" for name in saturated}
@@ -217,7 +211,7 @@ def judge(
         flags.append("capped")
     if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
         p_value, probability = 1.0, 0.5
-    elif not paired or n_seeds < MIN_SEEDS or simulation is not None:
+    elif not paired or n_seeds < MIN_SEEDS:
         flags.append("assumes_normal")
     if test.unbounded:
         flags.append("unbounded")
@@ -238,7 +232,7 @@ def judge(
 
 
 def _tested(
-    asked: Estimate, weighted: Mapping[str, Term], offset: float, simulation: Simulation | None
+    asked: Estimate, weighted: Mapping[str, Term], offset: float
 ) -> tuple[RatioTest, list[str]]:
     """Return the test that the data allow, and what to say of it."""
     asking = {
@@ -247,19 +241,10 @@ def _tested(
         "confidence": asked.confidence,
     }
     if not asked.paired:
-        if simulation is not None:
-            raise IndicatorError("simulation needs paired = True: set-ups that were replayed")
         return unpaired_ratio(list(weighted.values()), **asking), []
     *_, reference = weighted.values()
     num = np.asarray(sum(term.in_num * term.sample for term in weighted.values()))
     den = reference.sample
-    if simulation is not None:
-        weights = {name: (term.in_num, term.in_den) for name, term in weighted.items()}
-        replayed, further = (
-            simulated_samples(name, samples, weights)
-            for name, samples in zip(Simulation._fields, simulation, strict=True)
-        )
-        return combined_ratio((num, den), replayed, further, **asking), ["with_simulation"]
     test = paired_ratio(num, den, **asking)
     # Without spread the skewness of D would be one of rounding errors.
     skewed = not test.degenerate and _skewed(num - (asked.threshold - offset) * den)

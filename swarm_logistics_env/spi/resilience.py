@@ -1,14 +1,17 @@
-"""Faults that begin during the run: what is delivered afterwards, against a reference."""
+"""Faults that begin during the run: what is delivered afterwards, and when it is as much again."""
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Collection, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .estimate import Estimate, judge
-from .inputs import Numbers, delivery_times, finite
+from .inputs import IndicatorError, Numbers, between_0_and_1, delivery_times, finite, numbers
 
 
 def resilience_index(
@@ -60,3 +63,111 @@ def resilience_index(
         saturated=saturated,
         identical=identical,
     )
+
+
+def repair_times(
+    faulty: Sequence[ArrayLike],
+    reference: Sequence[ArrayLike],
+    *,
+    onset: float,
+    end: float,
+    window: float = 100.0,
+) -> tuple[Numbers, NDArray[np.bool_]]:
+    """Time after which each seed's run delivers as much again as its reference, for `kaplan_meier`.
+
+    It ends with the first window, begun after the onset, in which the run delivers at least as much
+    as the reference. Deliveries scatter, so such a time says little without that of a pair of runs
+    without faults beside it.
+
+    Args:
+        faulty: Delivery times [s] of each seed's run with faults.
+        reference: Delivery times [s] of the same seeds' reference runs.
+        onset: When the faults begin [s].
+        end: When all runs end [s]; they must not run out of items before.
+        window: Length of the window [s], at most end - onset.
+
+    Returns:
+        Seconds from the onset to the start of that window, and whether there was one, shapes
+        (n_seeds,); where there was none, how long the run was followed, as censored.
+
+    Raises:
+        IndicatorError: No seeds, unequal numbers of seeds, a time negative or not finite, not
+            0 <= onset < end, or not 0 < window <= end - onset.
+    """
+    if not 0.0 <= onset < end < math.inf:
+        raise IndicatorError(f"onset = {onset}, end = {end}: should be 0 <= onset < end")
+    if not 0.0 < window <= end - onset:
+        raise IndicatorError(f"window = {window}: should be above 0, at most end - onset")
+    pair = delivery_times("faulty", faulty), delivery_times("reference", reference)
+    if len(pair[0]) != len(pair[1]):
+        raise IndicatorError(
+            f"unequal seed sets (faulty has {len(pair[0])}, reference has {len(pair[1])}): should "
+            "be the same seeds in the same order"
+        )
+    followed = end - onset - window
+    starts = np.linspace(0.0, followed, math.floor(followed) + 1)  # about 1 s apart
+
+    def counts(times: Numbers) -> Numbers:
+        before = np.searchsorted(times, onset + starts, side="right")
+        return np.asarray(np.searchsorted(times, onset + starts + window, side="right") - before)
+
+    enough = np.array([counts(run) >= counts(other) for run, other in zip(*pair)])
+    back = enough.any(axis=1)
+    return np.where(back, starts[enough.argmax(axis=1)], followed), back
+
+
+class SurvivalCurve(NamedTuple):
+    """Share of runs still without the event after each event time, shapes (k,)."""
+
+    seconds: Numbers
+    share: Numbers
+    low: Numbers
+    high: Numbers
+
+    def median(self) -> float | None:
+        """First time at which half the runs have had the event [s]; None where never reached."""
+        reached = np.flatnonzero(self.share <= 0.5)
+        return float(self.seconds[reached[0]]) if reached.size else None
+
+
+def kaplan_meier(
+    seconds: ArrayLike, happened: ArrayLike, confidence: float = 0.95
+) -> SurvivalCurve:
+    """Kaplan-Meier curve with Greenwood's interval on the log(-log) scale.
+
+    Args:
+        seconds: Time of the event, or until which the run was watched without it [s], shape (n,).
+        happened: Whether the event was seen, shape (n,); False: censored.
+        confidence: Of the pointwise interval, in (0, 1).
+
+    Returns:
+        One entry per distinct event time, rising; empty where every run is censored.
+
+    Raises:
+        IndicatorError: Empty or unequal arrays, a time negative or not finite, confidence not
+            in (0, 1).
+    """
+    from scipy.stats import CensoredData, ecdf
+
+    between_0_and_1("confidence", confidence)
+    time = numbers("seconds", seconds)
+    event = np.asarray(happened, dtype=bool)
+    if time.ndim != 1 or time.shape != event.shape or time.size == 0:
+        raise IndicatorError(
+            f"seconds has shape {time.shape}, happened {event.shape}: should be equal, one per run"
+        )
+    for value in time.tolist():
+        if not 0.0 <= value < np.inf:
+            raise IndicatorError(f"seconds holds {value}: should be finite and not negative")
+    if not event.any():
+        return SurvivalCurve(*np.empty((4, 0)))
+    curve = ecdf(CensoredData(uncensored=time[event], right=time[~event])).sf
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # share 0 has no limits, which is dealt with below
+        limits: Any = curve.confidence_interval(confidence, method="log-log")
+    times, share, low, high = np.array(
+        [curve.quantiles, curve.probabilities, limits.low.probabilities, limits.high.probabilities]
+    )[:, np.isin(curve.quantiles, time[event])]
+    # At share 0 the scale ends and no interval is defined: all that is known is [0, 1].
+    inside = (share > 0.0) & (share < 1.0)
+    return SurvivalCurve(times, share, np.where(inside, low, 0.0), np.where(inside, high, 1.0))

@@ -16,9 +16,9 @@ NO_FAULT = "none"
 REMOVED = "removed"
 REPEATED = "other behaviour"  # no fault, a second time: what chance alone makes of a pair
 _FAULTS = {
-    NO_FAULT: ("", "-", "0", "no", "no fault", "ok", "healthy", "kein", "keine", "keiner", "ohne"),
-    REMOVED: ("absent", "entfernt"),
-    REPEATED: ("none again", "keine nochmal"),
+    NO_FAULT: ("", "-", "0", "no", "no fault", "ok", "healthy"),
+    REMOVED: ("absent",),
+    REPEATED: ("none again",),
 }
 _FAULT_NAMES = {word: name for name, words in _FAULTS.items() for word in (name, *words)}
 
@@ -115,10 +115,11 @@ def read_trials(
     columns: Mapping[str, str] | None = None,
     ignore: Sequence[str] = (),
     duration: float | None = None,
+    decimal: str = ".",
 ) -> Trials:
     """Read one run a row, or one delivery a row (an event log), from a CSV file.
 
-    Delimiter (comma, semicolon, tab) and decimal sign are found out. The columns are `robots`,
+    The delimiter (comma, semicolon, tab) is found out. The columns are `robots`,
     `fault`, `faulty`, `onset`, `policy`, `seed`, `trial` and `performance`, or words of
     `trials_table.NAMES` for them, as far as they apply; any other column of numbers that vary is a
     parameter of that name. An event log has `time` instead of `performance`; a run without any
@@ -129,13 +130,14 @@ def read_trials(
         columns: what a column is to its name in the file, e.g. {"performance": "boxes"}.
         ignore: columns to leave out.
         duration: of every trial [s], where no column says it; faults in mid-run need it.
+        decimal: the sign before decimals, "." or ",".
 
     Raises:
         IndicatorError: the file cannot be read, or a line of it cannot be; names line, column and
             value.
     """
     path = Path(path)
-    table, content = read_table(path, dict(columns or {}), tuple(ignore))
+    table, content = read_table(path, dict(columns or {}), tuple(ignore), decimal)
     rows = _events(table, duration) if "time" in table.places else _runs(table, duration)
     if not rows:
         raise IndicatorError(f"{path} holds no trial: should have a row for each below the names")

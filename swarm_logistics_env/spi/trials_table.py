@@ -1,4 +1,4 @@
-"""A CSV file as people type it: its delimiter, decimal sign, and what each column is."""
+"""A CSV file as people type it: its delimiter, and what each column is."""
 
 from __future__ import annotations
 
@@ -15,25 +15,19 @@ from .inputs import IndicatorError
 
 # What a column is, and the words that name it in files; small letters, "_" for all that is none.
 NAMES: dict[str, tuple[str, ...]] = {
-    "performance": (
-        *("p", "delivered", "deliveries", "items", "score", "throughput"),
-        *("leistung", "geliefert", "lieferungen"),
-    ),
-    "n_robots": ("robots", "n", "swarm_size", "swarmsize", "roboter", "anzahl_roboter"),
-    "fault": ("failure", "mode", "failure_mode", "fault_mode", "fehler", "ausfall"),
-    "faulty": ("m", "failed", "n_faulty", "faulty_robots", "defekt", "ausgefallen"),
-    "onset": ("fault_onset", "fault_time", "fault_at", "fehlerbeginn"),
-    "policy": ("controller", "algorithm", "behaviour", "behavior", "regler", "steuerung"),
-    "seed": ("pair", "block", "paar"),
-    "trial": ("run", "id", "repetition", "versuch", "lauf", "nr"),
-    "time": ("t", "delivery_time", "delivered_at", "zeit", "zeitpunkt"),
-    "duration": ("length", "trial_length", "dauer"),
-    "table": ("tabelle",),
+    "performance": ("p", "delivered", "deliveries", "items", "score", "throughput"),
+    "n_robots": ("robots", "n", "swarm_size", "swarmsize"),
+    "fault": ("failure", "mode", "failure_mode", "fault_mode"),
+    "faulty": ("m", "failed", "n_faulty", "faulty_robots"),
+    "onset": ("fault_onset", "fault_time", "fault_at"),
+    "policy": ("controller", "algorithm", "behaviour", "behavior"),
+    "seed": ("pair", "block"),
+    "trial": ("run", "id", "repetition"),
+    "time": ("t", "delivery_time", "delivered_at"),
+    "duration": ("length", "trial_length"),
+    "table": (),
 }
 _MEANING = {word: column for column, words in NAMES.items() for word in (column, *words)}
-_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
@@ -47,6 +41,7 @@ class Table:
         places: number of each known column by what it is (a key of `NAMES`).
         others: numbers of the columns that may be parameters.
         rows, lines: the cells, and the line that each row ends in.
+        decimal: the sign before decimals.
     """
 
     path: Path
@@ -55,6 +50,7 @@ class Table:
     others: tuple[int, ...]
     rows: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...]
+    decimal: str = "."
 
     def need(self, column: str, otherwise: str = "") -> None:
         """Raise unless there is such a column."""
@@ -106,7 +102,9 @@ class Table:
         if value is None or value < least:
             bound = f", {least:g} or more" if math.isfinite(least) else ""
             hint = ""
-            if value is None and place in self.others:
+            if value is None and "," in self.rows[row][place]:
+                hint = " without a sign between thousands; --decimal , where decimals have a comma"
+            elif value is None and place in self.others:
                 hint = ", as every column that varies is a parameter; else --ignore " + repr(
                     self.header[place]
                 )
@@ -114,8 +112,8 @@ class Table:
         return value
 
     def _parsed(self, cell: str) -> float | None:
-        if self._decimal_comma:
-            cell = cell.replace(",", ".")
+        if self.decimal != ".":
+            cell = cell.replace(".", " ").replace(self.decimal, ".")
         value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
         return value if math.isfinite(value) else None
 
@@ -123,47 +121,22 @@ class Table:
     def _varying(self) -> tuple[int, ...]:
         return tuple(place for place in self.others if len({row[place] for row in self.rows}) > 1)
 
-    @cached_property
-    def _decimal_comma(self) -> bool:
-        """Whether decimals have a comma; a file with both signs could mean anything."""
-        first: dict[str, tuple[int, int]] = {}
-        only_thousands = True  # as far as can be seen
-        places = [*(p for name, p in self.places.items() if name not in _TEXTS), *self.others]
-        for row, cells in enumerate(self.rows):
-            for place in places:
-                for sign, form in ((",", _COMMA), (".", _POINT)):
-                    if form.fullmatch(cells[place]):
-                        first.setdefault(sign, (row, place))
-                        only_thousands &= _THOUSANDS.fullmatch(cells[place]) is not None
-        if len(first) == 2:
-            raise self._error(
-                *first["."],
-                f"should have a decimal comma, as line {self.lines[first[','][0]]} has "
-                f"({self.rows[first[','][0]][first[','][1]]!r}), or all a point; no sign between "
-                "thousands",
-            )
-        if first and only_thousands:
-            raise self._error(
-                *first[","],
-                "could be thousands or decimals: should have a point before decimals, and no sign "
-                "between thousands",
-            )
-        return "," in first
 
-
-_TEXTS = ("fault", "policy", "trial", "table")
-
-
-def read_table(path: Path, columns: dict[str, str], ignore: tuple[str, ...]) -> tuple[Table, bytes]:
+def read_table(
+    path: Path, columns: dict[str, str], ignore: tuple[str, ...], decimal: str
+) -> tuple[Table, bytes]:
     """Return the table in a file, and the file's bytes.
 
     Args:
         columns: what a column is (a key of `NAMES`) to its name in the file.
         ignore: names of columns to leave out.
+        decimal: the sign before decimals, "." or ",".
 
     Raises:
         IndicatorError: the file cannot be read or is no such table, or a column is not there.
     """
+    if decimal not in (".", ","):
+        raise IndicatorError(f"--decimal {decimal}: should be . or ,")
     try:
         content = path.read_bytes()
         text = content.decode("utf-8-sig")
@@ -199,7 +172,7 @@ def read_table(path: Path, columns: dict[str, str], ignore: tuple[str, ...]) -> 
     except csv.Error as error:
         raise IndicatorError(f"{path} is not a CSV file: {error}") from error
     places, others = _columns(path, header, columns, ignore)
-    return Table(path, header, places, others, tuple(rows), tuple(numbers)), content
+    return Table(path, header, places, others, tuple(rows), tuple(numbers), decimal), content
 
 
 def _columns(

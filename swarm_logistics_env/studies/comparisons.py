@@ -136,7 +136,7 @@ class Comparison:
             performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
             saturated: arms whose P is capped, every item delivered in a run.
             options: the further `spi.Options`; `identical` is about the original and the changed
-                arm, and `simulation` about the arms by `arguments`.
+                arm.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.

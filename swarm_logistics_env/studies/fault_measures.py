@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from swarm_logistics_env import spi, streams
+from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.spi.fault_budget import FaultBudget
-from swarm_logistics_env.spi.self_repair import SelfRepair
+from swarm_logistics_env.spi.resilience import SurvivalCurve
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.spi.survival import SurvivalCurve
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparisons import Comparison
@@ -32,7 +31,7 @@ Outcomes = tuple[Outcome, ...]
 
 
 class RepairCurve(NamedTuple):
-    """Kaplan and Meier's curve of the self-repair times of single runs.
+    """Kaplan and Meier's curve of the times after which single runs are back.
 
     Attributes:
         runs: which runs: "fault", or "no fault" for the null pair.
@@ -59,15 +58,13 @@ class Resilience:
         against_removed: deliveries after the onset over those with the robots removed: FT local
             in time, above 1; None: undefined.
         against_whole: over those of the whole swarm: R local in time, above 1 - m/N.
-        repair: self-repair time against the swarm with the robots removed; None: `problem` says
-            why.
-        single: the same run by run, of the fault and of its null pair; empty as `repair` is None.
+        single: times to come back to what the runs with the robots removed deliver, of the fault
+            and of its null pair; empty: `problem` says why.
     """
 
     compared: Comparison
     against_removed: Estimate | None
     against_whole: Estimate | None
-    repair: SelfRepair | None = None
     single: tuple[RepairCurve, ...] = ()
     problem: str | None = None
 
@@ -89,11 +86,11 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
             if removed is None:
                 raise StudyError("no runs with the robots removed are there to compare with")
             null = _null(results, comparison)
-            repair = _self_repair(comparison, (_times(faulty), _times(removed)), null)
+            single = _repair_curves(comparison, (_times(faulty), _times(removed)), null)
         except (StudyError, spi.IndicatorError) as error:
             yield Resilience(comparison, *indices, problem=str(error))
         else:
-            yield Resilience(comparison, *indices, *repair)
+            yield Resilience(comparison, *indices, single)
 
 
 def mid_run_faults(results: StudyResults) -> pd.DataFrame:
@@ -132,7 +129,7 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
     """Return the pair without fault.
 
     Raises:
-        StudyError: why there can be no self-repair time.
+        StudyError: why there can be no times to come back.
     """
     null = results.plan.nulls.get((comparison.policy, comparison.table))
     original = results.times_of(comparison.original)
@@ -145,20 +142,17 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
     return original, other
 
 
-def _self_repair(
-    comparison: Comparison, pair: Pair, null: Pair
-) -> tuple[SelfRepair, tuple[RepairCurve, ...]]:
+def _repair_curves(comparison: Comparison, pair: Pair, null: Pair) -> tuple[RepairCurve, ...]:
     onset = comparison.changed.setting.onset
     end = comparison.original.condition.duration
-    generator = streams.generator(0, "self-repair")
-    pooled = spi.self_repair(*pair, null, onset=onset, end=end, generator=generator)
     curves = []
     for runs, times in (("fault", pair), ("no fault", null)):
-        seconds, back = spi.repair_times(*times, onset=onset, end=end)
+        window = window_of(comparison)
+        seconds, back = spi.repair_times(*times, onset=onset, end=end, window=window)
         curve = spi.kaplan_meier(seconds, back)
         censored = int(np.count_nonzero(~back))
-        curves.append(RepairCurve(runs, curve, pooled.followed, censored, back.size))
-    return pooled, tuple(curves)
+        curves.append(RepairCurve(runs, curve, end - onset - window, censored, back.size))
+    return tuple(curves)
 
 
 _LONGEST_WINDOW = 100.0  # s

@@ -32,6 +32,7 @@ def import_results(
     columns: Mapping[str, str] | None = None,
     ignore: Sequence[str] = (),
     duration: float | None = None,
+    decimal: str = ".",
     setup: Mapping[str, str] | None = None,
 ) -> int:
     """Make a study of a CSV file of trials (`spi.read_trials`); return how many runs it holds.
@@ -43,7 +44,7 @@ def import_results(
     Args:
         file: the CSV.
         out: directory of the study; it may not hold another.
-        columns, ignore, duration: as for `spi.read_trials`.
+        columns, ignore, duration, decimal: as for `spi.read_trials`.
         setup: name and value of what the report is to say of the conditions.
 
     Raises:
@@ -51,7 +52,9 @@ def import_results(
     """
     refuse_study_in(out, "import")
     try:
-        trials = read_trials(file, columns=columns, ignore=ignore, duration=duration)
+        trials = read_trials(
+            file, columns=columns, ignore=ignore, duration=duration, decimal=decimal
+        )
     except IndicatorError as error:
         raise StudyError(str(error)) from error
     conditions: dict[object, list[Trial]] = {}

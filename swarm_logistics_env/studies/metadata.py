@@ -23,8 +23,6 @@ from .store import FILE_NAME, Store, new_store, refuse_study_in
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
 _Share = Annotated[float, Field(gt=0, lt=1)]
-# Below ten seeds a verdict rests on normal differences: no look is proposed there.
-FEWEST_TO_PROPOSE = 10
 
 
 class StoredSpecification(BaseModel):
@@ -62,7 +60,7 @@ class Declaration(BaseModel):
 
     Attributes:
         first_seed, seeds: the smallest seed, and how many there are of every condition.
-        looks: numbers of seeds, from the first on, at which it was to be judged; empty: any.
+        looks: numbers of seeds, from the first on, at which comparisons may stop; empty: none.
         margin: of equivalence, as a share of P_o.
     """
 
@@ -96,13 +94,12 @@ class Declaration(BaseModel):
         declared = _counted(self.seed_numbers)
         if self.looks:
             declared = f"looks at {', '.join(map(str, self.looks))} seeds from {self.first_seed} on"
-        least = max(FEWEST_TO_PROPOSE, self.seeds)
         fresh = max(self.seed_numbers.stop, plan.seeds[-1] + 1)
         return (
             f"This study declared {declared} before its first run: over {_counted(plan.seeds)} "
             "every verdict is exploratory. For verdicts that stand, run a new study in another "
-            f"directory, on fresh seeds and with declared looks: first_seed = {fresh}, "
-            f"seeds = {least}, looks = [{least}, {2 * least}, {4 * least}]."
+            f"directory, on fresh seeds, until it is clear: first_seed = {fresh}, seeds = 200, "
+            "until_clear = true."
         )
 
 

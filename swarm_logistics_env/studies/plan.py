@@ -130,7 +130,7 @@ def make_plan(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
-    # Only comparisons with the robots removed have a self-repair time, which needs the null.
+    # Only comparisons with the robots removed have a time to come back, which needs the null.
     nulls = {
         (one.policy, one.table): Arm(OTHER_BEHAVIOUR, replace(one.original.condition, behaviour=1))
         for one in comparisons

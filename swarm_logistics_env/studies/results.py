@@ -16,7 +16,7 @@ from swarm_logistics_env.tasks.task import Outcome
 
 from .comparisons import Arm, Reference, load_reference
 from .indicator_table import indicator_table
-from .judged_comparisons import CONFIDENCE, CellKey, Level, judge_all, level_at
+from .judged_comparisons import CONFIDENCE, CellKey, Level, judge_all
 from .metadata import Declaration
 from .performance_table import Row, performance_table, rows_of
 from .plan import Plan
@@ -44,7 +44,8 @@ class StudyResults:
         outcomes: of the plan's runs, by key: delivery times and what else P does not tell.
         confidence: confidence level of the indicators' intervals and verdicts; above 0.95 at a
             declared look, so that all looks together err in 5 %.
-        looks: numbers of seeds at which the study was declared to be judged, before its first run.
+        looks: numbers of seeds at which comparisons may stop, of a study that runs until it is
+            clear.
         late_margin: whether another margin of equivalence was declared before the first run, so
             that the verdicts on it are exploratory.
     """
@@ -98,15 +99,13 @@ def judge(
     margin = plan.specification.margin
     reference = load_reference(plan.specification.reference)
     exploratory = declared is not None and not declared.covers(plan)
-    looks = declared.looks if declared else ()
-    level, found = Level(), None
+    looks = declared.looks if declared else plan.specification.looks
+    found = None
     if plan.specification.until_clear:
         found = standing(plan, outcomes)
         plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
-    elif looks and not exploratory:
-        level = level_at(looks.index(len(plan.seeds)), looks)
     performance = performance_table(plan, outcomes, reference)
-    judged = found.judged if found else judge_all(plan, _by_arm(performance), level)
+    judged = found.judged if found else judge_all(plan, _by_arm(performance), Level())
     return StudyResults(
         plan,
         reference,
@@ -114,7 +113,6 @@ def judge(
         indicator_table(judged, reference, margin),
         exploratory=exploratory,
         outcomes=outcomes,
-        confidence=level.confidence,
         looks=looks,
         late_margin=declared is not None and declared.margin != margin,
     )

@@ -31,15 +31,8 @@ from .performance_table import Played, played
 from .plan import Plan
 from .runs import Condition, Run
 
-# Below twenty seeds the studentised bootstrap of skewed counts errs at the small levels of a look.
-FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10
 MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"
-
-
-def looks_up_to(most: int) -> tuple[int, ...]:
-    """Return the looks of a study of at most so many seeds; the last is at `most`."""
-    return (*range(FIRST_LOOK, most, SEEDS_BETWEEN_LOOKS), most)
 
 
 @dataclass(frozen=True)

@@ -24,13 +24,13 @@ ENVIRONMENT_SOURCES = (
 _environments: dict[str, str] = {}
 
 
-def code_version(world: type = Warehouse) -> str:
-    """Return the digest of the code that decides an episode in a world, 16 hexadecimal digits.
+def code_version() -> str:
+    """Return the digest of the code that decides an episode, 16 hexadecimal digits.
 
-    Its modules are those that the world and `run_episode` use; policies have identities of their
-    own. Docstrings, comments on lines of their own and blank lines do not count.
+    Its modules are those that the warehouse and `run_episode` use; policies have identities of
+    their own. Docstrings, comments on lines of their own and blank lines do not count.
     """
-    return code_digest(Play, world)
+    return code_digest(Play, Warehouse)
 
 
 def environment_version(settings: str, functions: Iterable[object], make: Callable[[], Any]) -> str:

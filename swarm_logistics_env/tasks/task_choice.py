@@ -14,11 +14,7 @@ from .task import Task
 DEFAULT = "warehouse"
 NAMES = {
     DEFAULT: "swarm_logistics_env.tasks.warehouse_task:WAREHOUSE",
-    "foraging": "swarm_logistics_env.tasks.foraging_task:FORAGING",
     "recorded trials": "swarm_logistics_env.tasks.recorded_trials:RECORDED",
-    "rware": "swarm_logistics_env.tasks.rware_task:RWARE",
-    "simple-spread": "swarm_logistics_env.tasks.spread_task:SPREAD",
-    "dispersion": "swarm_logistics_env.tasks.dispersion_task:DISPERSION",
 }
 
 
@@ -38,8 +34,7 @@ def task_of(source: object) -> Task:
         try:
             found = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError, ValueError) as error:
-            remedy = "; pip install 'swarm-logistics-env[tasks]'" if source in NAMES else ""
-            raise StudyError(f"task {source!r} cannot be imported: {error}{remedy}") from None
+            raise StudyError(f"task {source!r} cannot be imported: {error}") from None
     if not isinstance(found, Task):
         raise StudyError(f"{source!r} is no task: should have the attributes of tasks.Task")
     return found

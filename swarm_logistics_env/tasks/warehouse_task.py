@@ -10,7 +10,6 @@ import numpy as np
 
 from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import Fault
 
@@ -29,7 +28,6 @@ class WarehouseTask:
     performance = "the number of items delivered in the order requested"
     default = Scenario()
     policies: Mapping[str, Callable[..., Any]] = MappingProxyType({})
-    world: type[Warehouse] = Warehouse
 
     @property
     def fields(self) -> dict[str, str]:
@@ -48,7 +46,7 @@ class WarehouseTask:
 
     def code(self) -> str:
         """Return the version of the simulation."""
-        return code_version(self.world)
+        return code_version()
 
     def vary(self, base: Scenario, fields: Mapping[str, Any]) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.
@@ -74,7 +72,6 @@ class WarehouseTask:
             seed,
             condition.faults,
             policy_seed,
-            self.world,
         )
         return Outcome(
             "",

@@ -15,10 +15,10 @@ from swarm_logistics_env.tasks.code_version import code_version
 
 FILE_NAME = "training.json"
 # Fields that may change when a training goes on, because they change nothing of what was done.
-MAY_CHANGE = frozenset({"about", "threads", "scores", "trials", "confirm"})
+MAY_CHANGE = frozenset({"about", "threads", "scores"})
 PACKAGES = (
     "swarm-logistics-env", "torch", "stable-baselines3", "numpy", "numba", "pymunk", "gymnasium",
-    "optuna", "safetensors",
+    "safetensors",
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""What each robot is doing, as faults that strike by role and the attribution of losses ask it."""
+"""What each robot is doing, as faults that strike by role ask it."""
 
 from __future__ import annotations
 

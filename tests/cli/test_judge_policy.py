@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -82,8 +81,6 @@ def test_a_policy_gets_a_card_and_the_same_command_plays_nothing_twice(
     assert "Their P: " in printed
     assert "homing" not in printed.split("Their P: ")[1].splitlines()[0]  # not ranked by itself
     assert printed.splitlines()[-1].startswith("57 runs played in ")
-    ET.fromstring((out / "badge.svg").read_text())
-    assert f">{p:.1f} [" in (out / "card.html").read_text()
     assert (out / "report.md").is_file()
 
     assert app.run(["judge", "homing", "--processes", "1"]) == 0
@@ -100,7 +97,7 @@ def test_a_policy_of_ones_own_is_judged_where_it_lies(
     # Nobody delivers in a second: there is no ratio, and no rank by one.
     assert "| P | N = 25, no fault | 0.0" in printed
     assert "| A | delivery_width 2 -> 1 m | – | ! blocked | – |" in printed
-    assert {"card.html", "badge.svg", "report.md"} <= {path.name for path in Path("card").iterdir()}
+    assert Path("card", "report.md").is_file()
 
 
 def test_a_policy_that_fails_in_every_run_gets_a_card_without_numbers(
@@ -112,5 +109,3 @@ def test_a_policy_that_fails_in_every_run_gets_a_card_without_numbers(
     printed = capsys.readouterr().out
     assert "| P | N = 25, no fault | – |  | – |" in printed
     assert "19 failed, the first with RuntimeError: no more" in printed.splitlines()[-1]
-    ET.fromstring((folder / "card" / "badge.svg").read_text())
-    assert "nan" not in (folder / "card" / "card.html").read_text().casefold()

@@ -163,19 +163,18 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     assert app.run(["study", "run", "quick", "--out", str(out)]) == 2
     assert "holds the study 'mine'" in capsys.readouterr().err
 
-    # What it proposes is a study that can be run, and whose verdicts stand at every look.
-    (proposed,) = re.findall(r"(first_seed = \d+), (seeds = \d+), (looks = \[.*\])\.", printed)
-    assert proposed == ("first_seed = 4", "seeds = 10", "looks = [10, 20, 40]")
-    lines = [*proposed, *file.read_text().splitlines()[1:]]
+    # What it proposes is a study that can be run, and whose verdicts stand.
+    (proposed,) = re.findall(r"(first_seed = \d+), (seeds = \d+), (until_clear = true)\.", printed)
+    assert proposed == ("first_seed = 4", "seeds = 200", "until_clear = true")
+    lines = [proposed[0], "seeds = 30", proposed[2], *file.read_text().splitlines()[1:]]
     file.write_text("\n".join(lines))
     new = ["study", "run", str(file), "--processes", "1", "--out", str(tmp_path / "new")]
-    for arguments in ([], ["--seeds", "20"]):
-        assert app.run([*new, *arguments]) == 0
-        assert "xploratory" not in capsys.readouterr().out
-    assert app.run([*new, "--seeds", "20", "--first-seed", "24"]) == 0
+    assert app.run(new) == 0
+    assert "xploratory" not in capsys.readouterr().out
+    assert app.run([*new, "--first-seed", "24"]) == 0
     printed = capsys.readouterr().out
-    assert "declared looks at 10, 20, 40 seeds from 4 on before its first run" in printed
-    assert "over 20 seeds (24 to 43) every verdict is exploratory." in printed
+    assert "declared looks at 20, 30 seeds from 4 on before its first run" in printed
+    assert "over 30 seeds (24 to 53) every verdict is exploratory." in printed
 
 
 def test_shards_are_kept_apart_and_merged(tmp_path: Path) -> None:
@@ -202,7 +201,7 @@ def imported(path: Path, faulty: tuple[int, ...], first: int = 0) -> str:
     rows = [f"none,0,25,{s},{40 + s}\nremoved,1,25,{s},{38 + s}\n" for s in seeds]
     rows += [f"FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
     path.with_suffix(".csv").write_text(TABLE + "".join(rows))
-    assert app.run(["study", "import", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
+    assert app.run(["judge", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
     return str(path)
 
 
@@ -248,7 +247,7 @@ def test_power_of_a_stored_study_and_of_a_pilot(
     assert "FT" not in printed
     path = tmp_path / "mine.toml"
     path.write_text(
-        "looks = [10, 20]\nseeds = 10\nscenario = { n_robots = 3, n_items = 4, "
+        "seeds = 10\nscenario = { n_robots = 3, n_items = 4, "
         "warehouse_width = 3, warehouse_height = 3, delivery_width = 1, duration = 20 }\n"
         "[[sizes]]\nvalues = [2, 3]\n"
     )

@@ -12,7 +12,7 @@ def test_no_number_is_cut_at_a_narrow_terminal(
     monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes the output for a terminal
     monkeypatch.setenv("COLUMNS", "30")
     value = "123.4567[122.1234,125.9876]"
-    show(Section("P", ("policy", "P", "R"), (("swarm-dt-follow-tuned", value, value),)))
+    show(Section("P", ("policy", "P", "R"), (("swarm-dt-follow", value, value),)))
     printed = capsys.readouterr().out
     assert "…" not in printed
     for digits in ("1", "2", "3", "4", "5", "6", "7", "8", "9"):

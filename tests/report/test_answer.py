@@ -30,7 +30,7 @@ def compared() -> StudyResults:
         collapses = setting.name == "FM1"
         return published if policy == "swarm-dt" else published * (0.1 if collapses else 0.5)
 
-    return results(10, p, policies=["swarm-dt", "swarm-dt-follow-tuned"])
+    return results(10, p, policies=["swarm-dt", "swarm-dt-follow"])
 
 
 def test_every_question_has_the_sign_of_its_verdict(found: StudyResults) -> None:
@@ -90,22 +90,22 @@ def test_what_is_provisional_surprises_nobody() -> None:
     def p(policy: str, setting: Setting) -> float:
         return 39.0 if setting.name == "FM4" and policy == "swarm-dt" else 20.0
 
-    few = results(4, p, policies=["swarm-dt", "swarm-dt-follow-tuned"])
+    few = results(4, p, policies=["swarm-dt", "swarm-dt-follow"])
     assert "refuted" in set(few.indicators["claim_verdict_holm"])
     assert not answer(few).surprises
 
 
 def test_the_furthest_of_many_answers_is_no_surprise_by_chance() -> None:
     for seeds in (15, 20, 29):  # the same policy twice
-        twins = results(seeds, policies=["swarm-dt", "swarm-dt-follow-tuned"])
+        twins = results(seeds, policies=["swarm-dt", "swarm-dt-follow"])
         assert not any("differs most" in one for one in answer(twins).surprises)
 
 
 def test_policies_stand_side_by_side_with_their_greatest_contrast(compared: StudyResults) -> None:
     found = answer(compared)
-    assert found.matrix.policies == ("swarm-dt", "swarm-dt-follow-tuned")
+    assert found.matrix.policies == ("swarm-dt", "swarm-dt-follow")
     assert any(
-        "FM1" in one and "differs most" in one and "swarm-dt-follow-tuned -0." in one
+        "FM1" in one and "differs most" in one and "swarm-dt-follow -0." in one
         for one in found.surprises
     )
     text = digest(found, 80, None)

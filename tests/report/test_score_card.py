@@ -1,12 +1,10 @@
-"""The score card: ranks, page and badge, and the recorded cards of the shipped policies."""
+"""The score card: ranks, and the recorded cards of the shipped policies."""
 
 from __future__ import annotations
 
 import importlib
 import json
 import math
-import re
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -14,7 +12,6 @@ import pytest
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.report import score_card
 from swarm_logistics_env.report.score_card import Line, ScoreCard, rank, recorded
-from swarm_logistics_env.report.score_card_page import badge, card_page
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import PRESETS
 
@@ -52,21 +49,6 @@ def test_a_rank_leaves_open_what_the_intervals_leave_open() -> None:
     assert str(rank(CARD, CARD.lines[0])) == "2 of 4 (2 to 3)"
     assert str(rank(CARD, CARD.lines[3])) == "1 of 1"
     assert str(rank(CARD, CARD.lines[4])) == "–"
-
-
-@pytest.mark.usefixtures("beside")
-def test_page_and_badge_are_well_formed_and_load_nothing() -> None:
-    page, image = card_page(CARD), badge(CARD)
-    said = ET.fromstring(image).attrib["aria-label"]
-    # The weakest of the two answers on S is shown.
-    assert said == "swarm P 50 S ? R ✗ FT ! A ✓ fault budget 1"
-    assert "mine<b>" not in page
-    assert "50.0 [45.0, 55.0]" in page
-    for drawing in re.findall(r'<svg class="strip".*?</svg>', page):
-        ET.fromstring(drawing)
-        assert "nan" not in drawing
-        assert "inf" not in drawing
-    assert not re.findall(r"(?:src|href)=|url\(|<script", page)
 
 
 def test_recorded_cards_are_those_of_the_shipped_policies() -> None:

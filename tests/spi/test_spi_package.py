@@ -42,3 +42,8 @@ def test_every_public_name_is_there_and_documented() -> None:
         assert getattr(spi, name) is not None
         if name not in ("Spending", "Verdict"):
             assert getattr(spi, name).__doc__, name
+
+
+def test_a_removed_name_says_what_to_use_instead() -> None:
+    with pytest.raises(ImportError, match=r"removed in 0\.3\.0: use spi\.repair_times"):
+        from swarm_logistics_env.spi import self_repair  # type: ignore[attr-defined]  # noqa: F401

@@ -103,7 +103,7 @@ def test_store_merged_with_its_own_copy_stays_as_it_is(tmp_path: Path) -> None:
         ({"sizes": [{"values": [2, 4]}]}, "SELECT 1", "differ in sizes"),
         ({"seeds": 3}, "SELECT 1", "differ in seeds, what they declared: should be shards"),
         ({"policies": ["random-walk"]}, "SELECT 1", "differ in policies"),
-        ({"looks": [2, 4]}, "SELECT 1", "differ in looks"),
+        ({"until_clear": True}, "SELECT 1", "differ in until_clear"),
         ({"margin": 0.3}, "SELECT 1", "differ in margin"),
     ],
 )

@@ -110,8 +110,6 @@ def test_a_fault_that_cannot_be_is_refused_before_any_run(
         ("[[faults]]\nmodes = ['FM1']\nrobots = [1, 1]", "each value once"),
         ("[faults]\nmodes = ['FM1']", "Specification.faults = {'modes': ['FM1']}"),
         ("indicators = ['Q']", "Specification.indicators = ['Q']: no indicator 'Q'"),
-        ("looks = [10, 5]\nseeds = 10", "rising"),
-        ("looks = [10, 20]\nseeds = 15", "seeds = 15: should be one of the looks (10, 20)"),
         ("scenario = { n_robot = 3 }", "did you mean 'n_robots'?"),
         ("scenario = 3", "Specification.scenario = 3"),
         ("seeds = ", "is not TOML: Invalid value"),

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies.code_identity import modules_used, without_prose
-from swarm_logistics_env.tasks.code_version import code_version
-from swarm_logistics_env.tasks.foraging import Foraging
 from swarm_logistics_env.warehouse import Warehouse
 
 
@@ -41,10 +39,3 @@ def test_covers_all_that_an_episode_loads() -> None:
         "errors.py", "records.py", "environment/__init__.py", "environment/registration.py"
     }  # fmt: skip
     assert {"warehouse/physics.py", "policies/policy.py", "kernels.py"} <= covered <= loaded
-
-
-def test_another_world_has_its_own_version_and_policies_none() -> None:
-    assert code_version(Foraging) != code_version()
-    files = {path.name for path in modules_used(Play, Foraging).values()}
-    assert "foraging.py" in files
-    assert not files & {"swarm_dt.py", "homing.py", "thread_pool.py"}

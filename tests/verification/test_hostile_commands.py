@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from swarm_logistics_env.cli import app
 
 COMMANDS = [["run"], ["scenario"], ["study", "plan"], ["study", "run"], ["study", "report"],
-            ["study", "export"], ["study", "import"], ["study", "merge"], ["study", "compare"],
+            ["study", "export"], ["study", "merge"], ["study", "compare"],
             ["study", "power"], ["study"], []]  # fmt: skip
 WORDS = [
     "--seed", "--set", "--preset", "--policy", "--fault", "--out", "--seeds", "--processes",

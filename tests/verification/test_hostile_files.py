@@ -26,7 +26,6 @@ STUDY = """\
 name = "mine"
 policies = ["swarm-dt", "random-walk"]
 seeds = 3
-looks = [3, 6]
 indicators = ["S", "FT", "R", "A"]
 scenario = { preset = "paper", n_robots = 4, n_items = 8, duration = 20.0 }
 
@@ -141,7 +140,7 @@ def test_any_study_file_is_planned_or_refused(source: random.Random) -> None:
                 "parameters",
                 "ablations",
                 "indicators",
-                "looks",
+                "until_clear",
                 "reference",
                 "sead",
             ]

@@ -129,8 +129,7 @@ def test_the_kit_checks_it() -> None:
     def make() -> FixedAgents:
         return FixedAgents(SwarmSize(small(), [3, 6], leave=[(1, 0.5)]))
 
-    testing.check_spaces(make, steps=15)
-    testing.check_conservation(make, steps=15)
+    testing.check_wrapper(make, steps=15)
 
 
 def test_the_example_runs() -> None:

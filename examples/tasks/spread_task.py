@@ -1,7 +1,7 @@
 """MPE2's simple_spread as a task: P is how many landmarks are covered, summed over the steps.
 
 Lowe et al., Multi-Agent Actor-Critic for Mixed Cooperative-Competitive Environments, NeurIPS 2017.
-`pip install 'swarm-logistics-env[tasks]'` brings it. Its own reward is minus a distance, which has
+`pip install mpe2` brings it. Its own reward is minus a distance, which has
 no positive mean, so that no ratio of it means anything.
 """
 
@@ -16,8 +16,8 @@ from mpe2.simple_spread.simple_spread import Scenario
 from numpy.typing import NDArray
 from pettingzoo.utils.conversions import aec_to_parallel
 
-from .parallel_policies import Env
-from .parallel_task import ParallelTask
+from swarm_logistics_env.tasks import ParallelTask
+from swarm_logistics_env.tasks.parallel_policies import Env
 
 STAY, LEFT, RIGHT, DOWN, UP = range(5)
 # A robot steers by where it will be after a while, or it would shoot past the landmark.

@@ -1,7 +1,7 @@
 """VMAS's dispersion, by its Gymnasium door, as a task: P is the number of pieces of food eaten.
 
 Bettini et al., VMAS: A Vectorized Multi-Agent Simulator for Collective Robot Learning, DARS 2022.
-`pip install 'swarm-logistics-env[tasks]'` brings it.
+`pip install vmas shimmy` brings it.
 """
 
 from __future__ import annotations
@@ -13,9 +13,7 @@ import numpy as np
 import vmas
 from numpy.typing import NDArray
 
-from .parallel_task import ParallelTask
-from .performance import SumOfRewards
-from .tuple_env import TupleEnv
+from swarm_logistics_env.tasks import ParallelTask, SumOfRewards, TupleEnv
 
 STILL = np.zeros(2, dtype=np.float32)
 GAIN = 3.0  # of the push by the distance, so that robots slow down near the food

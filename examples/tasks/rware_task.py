@@ -1,7 +1,7 @@
 """RWARE, the multi-robot warehouse, as a task: P is the number of shelves delivered.
 
 Papoudakis et al., Benchmarking Multi-Agent Deep Reinforcement Learning Algorithms in Cooperative
-Tasks, NeurIPS 2021. `pip install 'swarm-logistics-env[tasks]'` brings it.
+Tasks, NeurIPS 2021. `pip install rware` brings it.
 """
 
 from __future__ import annotations
@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 from rware.warehouse import RewardType, Warehouse
 
 from swarm_logistics_env import streams
-
-from .parallel_policies import Env
-from .parallel_task import ParallelTask
-from .tuple_env import TupleEnv
+from swarm_logistics_env.tasks import ParallelTask, TupleEnv
+from swarm_logistics_env.tasks.parallel_policies import Env
 
 Cell = tuple[int, int]  # column, row
 

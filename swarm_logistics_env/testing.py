@@ -1,0 +1,129 @@
+"""Two checks: for a policy of one's own, and for wrappers of one's own.
+
+Each plays short episodes and raises CheckError with a sentence about the first thing that is wrong.
+
+Example:
+    >>> from swarm_logistics_env import testing
+    >>> testing.check_policy("swarm-dt", steps=20)
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterator
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium.spaces import Box
+
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.episode import Play
+from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.policy import Policy, decide, start
+from swarm_logistics_env.removed import refuse
+from swarm_logistics_env.scenario import Scenario
+
+Moment = dict[str, Any]  # what each agent got at one moment
+
+
+class CheckError(AssertionError):
+    """A policy or a wrapper does not hold what the package needs of it."""
+
+
+def check_policy(
+    policy: Policy | str, scenario: Scenario | None = None, seed: int = 0, steps: int = 200
+) -> None:
+    """Check that a policy's commands can be taken, and that they follow from the seed alone.
+
+    It plays an episode, another one with another seed, the first one again, and the first one with
+    a pickled copy, as worker processes need it.
+
+    Args:
+        policy: a name, a path, or the object.
+        scenario: None: the paper's.
+        steps: the largest number of steps to play.
+
+    Raises:
+        CheckError: two episodes of one seed part; it names the first step.
+        PolicyError: commands of the wrong shape, or not finite.
+    """
+    chosen = load(policy) if isinstance(policy, str) else policy
+    asked = scenario or Scenario()
+
+    def trajectory(player: Policy, seed: int) -> list[bytes]:
+        play, places = Play(asked, player, seed), []
+        while not play.is_over and len(places) < steps:
+            play.step()
+            places.append(play.world.state.robot_position.tobytes())
+        return places
+
+    first = trajectory(chosen, seed)
+    trajectory(chosen, seed + 1)
+    _compare(first, trajectory(chosen, seed), "after another episode: reset should forget it")
+    copy = pickle.loads(pickle.dumps(chosen))
+    _compare(first, trajectory(copy, seed), "with a pickled copy of the policy")
+
+
+def check_wrapper(
+    make: Callable[[], Any], policy: Policy | str = "swarm-dt", seed: int = 0, steps: int = 200
+) -> None:
+    """Check that a wrapped environment keeps to its spaces, and that a seed fixes its episode.
+
+    Args:
+        make: returns a new `SwarmLogisticsEnv` in any parallel wrappers.
+        policy: who plays: a name, a path, or the object.
+        steps: the largest number of steps to play.
+
+    Raises:
+        CheckError: an agent without an observation, an observation outside of its space, or two
+            episodes of one seed that part.
+    """
+    first = list(_moments(make(), policy, seed, steps))
+    pair = _moments(make(), policy, seed, steps), _moments(make(), policy, seed + 1, steps)
+    again = [one for one, _ in zip_longest(*pair)][: len(first)]
+    _compare(first, again, "beside another live world")
+
+
+def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[Moment]:
+    if not isinstance(env.unwrapped, SwarmLogisticsEnv):
+        raise CheckError(f"make() = {env}: should be a SwarmLogisticsEnv in parallel wrappers")
+    player = load(policy) if isinstance(policy, str) else pickle.loads(pickle.dumps(policy))
+    observations, _ = env.reset(seed=seed)
+    world = env.unwrapped.warehouse
+    start(player, world.scenario, seed)
+    for step in range(steps):
+        yield _checked(env, step, observations)
+        if not env.agents:
+            return
+        rows = world.observe()
+        commands = np.asarray(decide(player, rows, world.state))
+        actions = {}
+        for agent in env.agents:
+            robot, action = int(agent.removeprefix("robot_")), env.action_space(agent)
+            actions[agent] = np.zeros(action.shape, np.float32)
+            if robot < len(commands):  # with FixedAgents there are agents without a robot
+                actions[agent][: commands.shape[1]] = commands[robot]
+        observations, rewards, *_ = env.step(actions)
+        yield {agent: repr(reward) for agent, reward in rewards.items()}
+
+
+def _checked(env: Any, step: int, observations: dict[str, Any]) -> Moment:
+    for agent in env.agents:
+        space: Box = env.observation_space(agent)
+        seen = observations.get(agent)
+        if not isinstance(seen, np.ndarray) or not space.contains(seen):
+            raise CheckError(f"{agent}'s observation at step {step} is outside of {space}: {seen}")
+    return {agent: value.tobytes() for agent, value in observations.items()}
+
+
+def _compare(first: list[Any], second: list[Any], where: str) -> None:
+    for step, (one, other) in enumerate(zip_longest(first, second)):
+        if one != other:
+            raise CheckError(f"the same seed gives another episode {where}: they part at {step}")
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        refuse(__name__, name)

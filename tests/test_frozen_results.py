@@ -1,0 +1,151 @@
+"""Results of three studies, frozen as data: P, delivery times, intervals and verdicts.
+
+`python tests/test_frozen_results.py` plays them anew. A change of what a seed produces is a new
+version of the environment; a change of how the package is built may change nothing here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.tasks import Outcome
+
+FROZEN = Path(__file__).parent / "frozen"
+SHIPPED = Path(__file__).parents[1] / "examples" / "shipped_policies.toml"
+POLICIES = ["swarm-dt", "swarm-dt-follow", "homing", "ppo-delivery", "ppo-robust", "ppo-indicator"]
+NUMBERS = ("value", "low", "high", "p_value", "p_holm", "change", "change_low", "change_high")
+WORDS = ("policy", "indicator", "comparison", "verdict", "verdict_holm", "claim_verdict_holm")
+WORDS += ("equivalence", "equivalence_holm", "conclusion", "flags")
+
+
+def paper() -> Study:
+    return Study.preset("paper", seeds=3)
+
+
+def quick() -> Study:
+    return Study.preset("quick")
+
+
+def shipped_policies() -> Study:
+    return Study.from_file(SHIPPED, policies=POLICIES, seeds=3)
+
+
+STUDIES = (paper, quick, shipped_policies)
+
+
+def conditions(study: Study) -> Iterator[tuple[str, dict[int, str]]]:
+    """Yield every condition in words, and the keys of its runs by seed."""
+    plan = study.plan()
+    for condition in plan.conditions:
+        fields = condition.scenario.model_dump(mode="json")
+        default = Scenario().model_dump(mode="json")
+        words = {
+            "policy": condition.policy.label,
+            "scenario": {k: v for k, v in fields.items() if v != default[k]},
+            "faults": [f.model_dump(mode="json") for f in condition.faults],
+            "behaviour": condition.behaviour,
+        }
+        yield json.dumps(words), {s: condition.run(plan.code, s).key for s in plan.seeds}
+
+
+def verdicts(results: StudyResults) -> list[dict[str, Any]]:
+    """Return the words and numbers of every comparison, to nine digits."""
+    rows = results.indicators.to_dict("records")
+    return [
+        {name: row[name] for name in WORDS}
+        | {name: None if row[name] != row[name] else float(f"{row[name]:.9g}") for name in NUMBERS}
+        for row in rows
+    ]
+
+
+def frozen(name: str) -> dict[str, Any]:
+    read: dict[str, Any] = json.loads((FROZEN / f"{name}.json").read_text(encoding="utf-8"))
+    return read
+
+
+def freeze(study: Study, *, times: bool) -> dict[str, Any]:
+    study.run(processes=2)
+    results = study.findings()
+    runs: dict[str, list[dict[str, Any]]] = {}
+    for words, keys in conditions(study):
+        for seed, key in keys.items():
+            found = results.outcomes[key]
+            assert found.error is None
+            run = {
+                "seed": seed,
+                "P": found.delivered,
+                "all_delivered": found.all_delivered,
+                "equal_runs": (found.digest or "")[:8],
+            }
+            if times:
+                run["times"] = found.delivery_times.round(6).tolist()
+            runs.setdefault(words, []).append(run)
+    return {"runs": runs, "verdicts": verdicts(results)}
+
+
+@pytest.mark.parametrize("named", STUDIES)
+def test_verdicts_follow_from_the_frozen_runs(named: Any) -> None:
+    expected, study = frozen(named.__name__), named()
+    outcomes = {}
+    for words, keys in conditions(study):
+        for run in expected["runs"][words]:
+            times = run.get("times")
+            key = keys[run["seed"]]
+            outcomes[key] = Outcome(
+                key,
+                delivery_times=np.array(times or []),
+                untimed=run["P"] if times is None else None,
+                all_delivered=run["all_delivered"],
+                digest=run["equal_runs"],
+            )
+    found = verdicts(judge(study.plan(), outcomes))
+    assert len(found) == len(expected["verdicts"])
+    for one, known in zip(found, expected["verdicts"]):
+        assert {name: one[name] for name in WORDS} == {name: known[name] for name in WORDS}
+        numbers = [np.array([row[n] for n in NUMBERS], dtype=float) for row in (one, known)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-7, abs=1e-12, nan_ok=True), known
+
+
+@pytest.mark.parametrize(
+    ("name", "study"),
+    [
+        ("quick", Study.preset("quick", seeds=1)),
+        (
+            "shipped_policies",
+            Study.from_file(
+                SHIPPED,
+                policies=POLICIES,
+                seeds=1,
+                sizes=[{"values": [5, 25]}],
+                parameters=[],
+                faults=[{"modes": ["FM4"], "robots": [2]}],
+            ),
+        ),
+    ],
+)
+def test_runs_played_anew_equal_the_frozen_ones(name: str, study: Study) -> None:
+    expected = frozen(name)["runs"]
+    study.run()
+    outcomes = study.findings().outcomes
+    for words, keys in conditions(study):
+        for seed, key in keys.items():
+            run = next(run for run in expected[words] if run["seed"] == seed)
+            assert outcomes[key].delivered == run["P"], words
+            if "times" in run:
+                assert outcomes[key].delivery_times.tolist() == pytest.approx(run["times"])
+
+
+if __name__ == "__main__":
+    FROZEN.mkdir(exist_ok=True)
+    for named in STUDIES:
+        text = json.dumps(freeze(named(), times=named is quick), indent=0)
+        (FROZEN / f"{named.__name__}.json").write_text(text + "\n", encoding="utf-8")
