@@ -1,38 +1,41 @@
-"""Compilation of the package's kernels, and the random numbers they draw."""
+"""Compilation of the package's kernels, and the random numbers they draw.
+
+A kernel is compiled when it is first called, with all that it calls, and kept on disk.
+"""
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import functools
 import hashlib
 import math
+import multiprocessing
+import os
+import sys
+import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import config, types
+from numba.core import config, event, types
+from numba.core.compiler_lock import global_compiler_lock
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.progress_bar import ProgressBar
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-
-def _digest_of_sources() -> str:
-    here = Path(__file__).parent
-    digest = hashlib.blake2b(digest_size=6)
-    for pattern in ("*.py", "warehouse/*.py", "motion/*.py", "policies/*.py"):
-        for path in sorted(here.glob(pattern)):
-            source = path.read_bytes()
-            # Kernels, what they are made of, and the files whose constants and arrays they use.
-            marks = (b"swarm_logistics_env.kernels import", b"import intrinsic")
-            others = ("kernels.py", "observations.py", "structs.py")
-            if any(mark in source for mark in marks) or path.name in others:
-                digest.update(source)
-    return digest.hexdigest()
-
-
-_SOURCES = _digest_of_sources()
+QUIET = "SWARM_LOGISTICS_QUIET"  # environment variable of workers: nobody reads what they say
+_SILENCE = 1.0  # [s] of compiling that nobody is told of
+_HERE = Path(__file__).parent
+# Folders of kernels, by the folder of those that call them.
+_CALLED = {"warehouse": ("warehouse",), "motion": ("motion",)}
+_all_kernels: list[Any] = []
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -48,27 +51,23 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` with numba as a part of the kernels that call it.
 
-    A structure of arrays costs nothing then, where a call would copy hundreds of words.
+    For small ones that are called in loops: every caller is larger by it.
     """
     return _compiled(function, is_inlined=True)
 
 
 def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
-    # numba notices a change of a kernel's own file only, not of the kernels and constants from
-    # other files that were compiled into it. So their digest goes into the name of the cache.
-    name = function.__qualname__
-    function.__qualname__ = f"{name}-{_SOURCES}"
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": is_inlined}
-    options["no_cfunc_wrapper"] = True  # nobody calls a kernel from C
-    try:
-        compiled = numba.njit(function, cache=True, **options)
-    except RuntimeError:
-        # Neither the installation nor the user's own folder can be written.
-        _warn_of_no_cache()
-        compiled = numba.njit(function, **options)
-    function.__qualname__ = name
+    compiled: Any = numba.njit(
+        function,
+        nogil=True,
+        error_model="numpy",
+        forceinline=is_inlined,
+        no_cfunc_wrapper=True,  # nobody calls a kernel from C
+    )
     if not config.DISABLE_JIT:
         compiled.get_call_template = functools.partial(_call_template, compiled)
+        compiled.compile = functools.partial(_compile, compiled)
+        _all_kernels.append(compiled)
     return cast("Callable[P, R]", compiled)
 
 
@@ -78,12 +77,117 @@ def _call_template(compiled: Any, args: tuple[Any, ...], named: dict[str, Any]) 
     return type(compiled).get_call_template(compiled, plain, named)
 
 
+def _compile(compiled: Any, signature: Any) -> Any:
+    """Compile a kernel for a signature, or load it: with all that it calls, if Python calls it."""
+    compile_it = functools.partial(type(compiled).compile, compiled, signature)
+    with global_compiler_lock:
+        if _Report.current is not None or signature in compiled.overloads:
+            return compile_it()  # a part of the kernel that Python calls
+        with _kept_on_disk(compiled), _Report():
+            return compile_it()
+
+
+@contextlib.contextmanager
+def _kept_on_disk(compiled: Any) -> Iterator[None]:
+    """Let numba load what is compiled, or keep it, while no other process does."""
+    if not compiled.stats.cache_path:
+        try:
+            compiled.enable_caching()
+        except RuntimeError:
+            # Neither the installation nor the user's own folder can be written.
+            _warn_of_no_cache()
+            yield
+            return
+        # numba looks at the file's time alone, not at the kernels and constants of other files.
+        compiled._cache._cache_file._source_stamp = _digest_for(
+            Path(compiled.py_func.__code__.co_filename).parent
+        )
+    from filelock import FileLock
+
+    kept = Path(compiled.stats.cache_path)
+    kept.mkdir(parents=True, exist_ok=True)
+    with FileLock(kept / "swarm_logistics_env.lock"):
+        yield
+
+
+@functools.cache
+def _digest_for(folder: Path) -> str:
+    """Return a digest of all code that kernels of a folder may be made of."""
+    rooms = _CALLED.get(folder.name, ("motion", "policies", "train"))
+    digest = hashlib.blake2b(digest_size=8)
+    for room in (".", *rooms):
+        for path in sorted((_HERE / room).glob("*.py")):
+            source = path.read_bytes()
+            if any(mark in source for mark in (b"kernel", b"intrinsic", b"NamedTuple", b"N_BEAMS")):
+                digest.update(_code_of(source))
+    return digest.hexdigest()
+
+
+def _code_of(source: bytes) -> bytes:
+    """Return functions, constants and structures of a module, which kernels may be made of."""
+    lines, found = source.splitlines(), []
+    for part in ast.parse(source).body:
+        is_class = isinstance(part, ast.ClassDef) and not any(
+            isinstance(base, ast.Name) and base.id == "NamedTuple" for base in part.bases
+        )
+        is_text = isinstance(part, ast.Expr)
+        if not is_class and not is_text:
+            found += lines[part.lineno - 1 : part.end_lineno]
+    return b"\n".join(found)
+
+
+class _Report(event.Listener):  # type: ignore[misc]  # numba ships no types
+    """Tells a person once that kernels are being compiled and for how long, with a bar."""
+
+    current: _Report | None = None
+    is_told = False
+    seconds, n_done = 0.0, 0  # of compiling, and kernels that are compiled, in this process
+
+    def __enter__(self) -> None:
+        self._bar: ProgressBar | None = None
+        self._last = time.monotonic()
+        _Report.current = self
+        event.register("numba:compile", self)
+
+    def __exit__(self, *_: object) -> None:
+        _Report.current = None
+        event.unregister("numba:compile", self)
+        if self._bar is not None:
+            self._bar.__exit__()
+
+    def on_start(self, event: Any) -> None:
+        """Begin to count the time, as nothing could be loaded."""
+        self._last = time.monotonic()
+
+    def on_end(self, event: Any) -> None:
+        """Count a kernel, and tell a person who has been waiting."""
+        now = time.monotonic()
+        _Report.seconds += now - self._last
+        self._last = now
+        _Report.n_done += event.data["dispatcher"] in _all_kernels
+        is_worker = QUIET in os.environ or multiprocessing.parent_process() is not None
+        if is_worker or _Report.seconds < _SILENCE or not self.n_done:
+            return
+        total = max(len(_all_kernels), self.n_done)
+        if not _Report.is_told:
+            _Report.is_told = True
+            left = self.seconds / self.n_done * (total - self.n_done)
+            sys.stderr.write(f"Compiling for this processor, once: about {left:.0f} s.\n")
+        if self._bar is None and sys.stderr.isatty():
+            from swarm_logistics_env.progress_bar import ProgressBar
+
+            self._bar = ProgressBar("compiling", total, "kernels", done=self.n_done)
+            self._bar.__enter__()
+        if self._bar is not None:
+            self._bar.reach(self.n_done)
+
+
 @functools.cache
 def _warn_of_no_cache() -> None:
     warnings.warn(
         "compiled code can be kept nowhere, so every process compiles for itself, which takes "
-        "half a minute: set NUMBA_CACHE_DIR to a folder that can be written",
-        stacklevel=5,
+        "some ten seconds: set NUMBA_CACHE_DIR to a folder that can be written",
+        stacklevel=8,
     )
 
 

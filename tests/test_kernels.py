@@ -1,32 +1,120 @@
+"""Kernels are compiled once, kept for other processes, and a person hears of it."""
+
 from __future__ import annotations
 
-from typing import Any
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
-import numba
 import pytest
 
+import swarm_logistics_env
 from swarm_logistics_env import kernels
+
+PACKAGE = Path(swarm_logistics_env.__file__).parent
+# Two signatures of one kernel, so that two processes write one index.
+FIRST_CALLS = """
+import numpy as np
+from swarm_logistics_env import kernels
+from swarm_logistics_env.warehouse import layout
+keys = np.arange(3, dtype=np.uint64)
+layout.draw_order(keys, 0, np.zeros(3, np.int64))
+print(kernels.pair_key(np.uint64(1), 2), kernels.pair_key(np.uint64(1), np.int32(2)))
+print(sum(sum(each.stats.cache_hits.values()) for each in kernels._all_kernels))
+"""
+
+
+def started(script: str, cache: Path, **variables: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), **variables}
+    command = [sys.executable, "-c", script]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, text=True)
+
+
+def finished(process: subprocess.Popen[str]) -> list[str]:
+    printed, told = process.communicate(timeout=300)
+    assert process.returncode == 0, told
+    return [*printed.splitlines(), told]
+
+
+def test_two_processes_that_start_at_once_keep_one_cache(tmp_path: Path) -> None:
+    for round_ in range(3):
+        cache = tmp_path / str(round_)
+        both = [finished(each) for each in [started(FIRST_CALLS, cache) for _ in range(2)]]
+        third = finished(started(FIRST_CALLS, cache))
+        assert both[0][0] == both[1][0] == third[0]
+        assert int(third[1]) == 3  # both signatures, and what `draw_order` calls with it
 
 
 def test_a_kernel_compiles_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    compile_it = numba.njit
-
-    def njit(function: Any, **options: Any) -> Any:
-        if options.get("cache"):
-            raise RuntimeError("cannot cache function: no locator available")
-        return compile_it(function, **options)
-
-    monkeypatch.setattr(numba, "njit", njit)
-    kernels._warn_of_no_cache.cache_clear()
-
     def double(number: float) -> float:
         return 2.0 * number
 
     def half(number: float) -> float:
         return number / 2.0
 
-    with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
-        compiled = [kernels.kernel(function) for function in (double, half)]
-    assert len(told) == 1
-    assert [function(3.0) for function in compiled] == [6.0, 1.5]
+    def refuse(self: object) -> None:
+        raise RuntimeError("cannot cache function: no locator available")
+
+    compiled = [kernels.kernel(function) for function in (double, half)]
+    monkeypatch.setattr(type(compiled[0]), "enable_caching", refuse)
     kernels._warn_of_no_cache.cache_clear()
+    with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
+        assert [function(3.0) for function in compiled] == [6.0, 1.5]
+    assert len(told) == 1
+    kernels._warn_of_no_cache.cache_clear()
+
+
+LONG = """
+from swarm_logistics_env import kernels
+kernels._SILENCE = 0.0
+kernels.uniform(1, 2), kernels.gaussian(1, 2)
+"""
+
+
+@pytest.mark.parametrize(("quiet", "lines"), [({}, 1), ({kernels.QUIET: "1"}, 0)])
+def test_compiling_tells_a_person_once_and_never_from_a_worker(
+    tmp_path: Path, quiet: dict[str, str], lines: int
+) -> None:
+    told = finished(started(LONG, tmp_path, **quiet))[-1]
+    assert len(told.splitlines()) == lines
+    assert not lines or re.fullmatch(r"Compiling for this processor, once: about \d+ s\.\n", told)
+    assert finished(started(LONG, tmp_path))[-1] == ""  # loaded
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "changes"),
+    [
+        ("warehouse/grid.py", "_FEW = 80", "_FEW = 81", True),
+        ("observations.py", "N_BEAMS = 16", "N_BEAMS = 18", True),
+        ("warehouse/structs.py", "    step: Annotated[", "    steps: Annotated[", True),
+        ("warehouse/radio.py", "aged = robots.heard[robot] + period", "aged = period", True),
+        ("policies/homing.py", "AVOID_GAIN", "AVOID_GAINS", False),  # no world calls it
+        ("warehouse/warehouse.py", "self.n_removed += 1", "self.n_removed += 2", False),
+        ("warehouse/layout.py", '"""The places', '"""Places', False),
+    ],
+)
+def test_what_is_kept_is_used_until_code_of_kernels_changes(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    file: str,
+    old: str,
+    new: str,
+    changes: bool,
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(kernels, "_HERE", copy)
+
+    def digest() -> str:
+        kernels._digest_for.cache_clear()
+        return kernels._digest_for(copy / "warehouse")
+
+    before, text = digest(), (copy / file).read_text(encoding="utf-8")
+    assert old in text
+    (copy / file).write_text(text.replace(old, new), encoding="utf-8")
+    assert (digest() != before) == changes
+    kernels._digest_for.cache_clear()

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import swarm_logistics_env
-from swarm_logistics_env import kernels, policies
+from swarm_logistics_env import policies
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 ROOT = Path(__file__).parents[1]
@@ -161,7 +161,7 @@ class Copy:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.package = folder / PACKAGE.name
-        shutil.copytree(PACKAGE, self.package, ignore=_other_caches)
+        shutil.copytree(PACKAGE, self.package, ignore=shutil.ignore_patterns("*.lock", "*.tmp.*"))
         self.changed: set[str] = set()
 
     def write(self, name: str, text: str) -> None:
@@ -211,12 +211,6 @@ class Copy:
     def command(self, *arguments: str) -> str:
         small = ("--set", "n_robots=3", "--set", "n_items=4", "--set", "duration=5")
         return self.run("-c", "from swarm_logistics_env.cli import app; app()", *arguments, *small)
-
-
-def _other_caches(folder: str, names: list[str]) -> set[str]:
-    """Leave out compiled kernels of other versions, and files that are being written."""
-    caches = {name for name in names if Path(folder).name == "__pycache__"}
-    return {name for name in caches if kernels._SOURCES not in name or ".tmp." in name}
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.kernels import QUIET
 from swarm_logistics_env.tasks.task import Outcome
 
 from .engines import execute
@@ -16,6 +17,11 @@ from .runs import Run
 
 RETRIES = 1  # after a worker's death, as local processes do
 QUEUED_PER_CORE = 2  # so that no core waits for this process
+
+
+def _execute_quietly(run: Run) -> Outcome:
+    os.environ[QUIET] = "1"
+    return execute(run)
 
 
 class Cluster:
@@ -46,7 +52,7 @@ class Cluster:
         ray, ours = self._connected()
         pending: dict[Any, Run] = {}
         try:
-            play = ray.remote(num_cpus=1, max_retries=RETRIES)(execute)
+            play = ray.remote(num_cpus=1, max_retries=RETRIES)(_execute_quietly)
             # A policy travels with every run, so only a few runs are sent at a time.
             limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
             pending[_submitted(play, first)] = first
