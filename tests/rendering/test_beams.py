@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
-from swarm_logistics_env.rendering.beams import N_BEAMS, ranges
+from swarm_logistics_env.rendering.readings import N_BEAMS, ranges
 
 
 def test_beams_end_where_the_robot_itself_sees_them_end() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
-from swarm_logistics_env.rendering.links import followed
+from swarm_logistics_env.rendering.readings import followed
 from swarm_logistics_env.warehouse import WarehouseState
 from swarm_logistics_env.warehouse.state import NOBODY
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.rendering.trails import TRAIL_SECONDS, Trails
+from swarm_logistics_env.rendering.readings import TRAIL_SECONDS, Trails
 from swarm_logistics_env.warehouse import WarehouseState
 
 Situation = Callable[..., tuple[WarehouseState, Scenario]]
