@@ -72,19 +72,17 @@ def save(picture: NDArray[np.uint8], name: str) -> None:
 
 
 def figures() -> None:
-    """Keep two figures of a study's report."""
+    """Keep a figure of a study's report."""
     study = Study(
         seeds=10,
         scenario={"duration": 300.0},
-        sizes=[{"values": [5, 10, 20, 40]}],
         faults=[{"modes": ["FM1", "FM2", "FM4"], "robots": [1, 2, 3]}],
     )
     study.run(processes=2)
     with tempfile.TemporaryDirectory() as folder:
         written = {path.name: path for path in _files(study, Path(folder))}
-        for name, start_of_name in (("scalability", "P-N"), ("faults", "FT-R")):
-            (path,) = (written[file] for file in written if file.startswith(start_of_name))
-            shutil.copy(path, MEDIA / f"{name}.svg")
+        (path,) = (written[file] for file in written if file.startswith("FT-R"))
+        shutil.copy(path, MEDIA / "faults.svg")
 
 
 def _files(study: Study, folder: Path) -> list[Path]:

@@ -43,7 +43,7 @@ def worth(constants, scenario, seeds):
 def main(rounds=30, seeds=8, confirm=30, scenario=None):
     """Search, print the best constants, and return the change of P that they make."""
     scenario = scenario or Scenario(restock=True)
-    own = policies.load("swarm-dt").parameters
+    own = policies.SwarmDT().parameters
     best = {name: getattr(own, name) for name in RANGES}
     highest = worth(best, scenario, range(1000, 1000 + seeds))
     for number in range(rounds):

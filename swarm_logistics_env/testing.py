@@ -21,8 +21,8 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import Policy, decide, start
-from swarm_logistics_env.removed import refuse
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spi.removed import refuse
 
 Moment = dict[str, Any]  # what each agent got at one moment
 
@@ -52,7 +52,8 @@ def check_policy(
     asked = scenario or Scenario()
 
     def trajectory(player: Policy, seed: int) -> list[bytes]:
-        play, places = Play(asked, player, seed), []
+        play = Play(asked, player, seed)
+        places: list[bytes] = []
         while not play.is_over and len(places) < steps:
             play.step()
             places.append(play.world.state.robot_position.tobytes())

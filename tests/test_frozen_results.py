@@ -23,8 +23,10 @@ FROZEN = Path(__file__).parent / "frozen"
 SHIPPED = Path(__file__).parents[1] / "examples" / "shipped_policies.toml"
 POLICIES = ["swarm-dt", "swarm-dt-follow", "homing", "ppo-delivery", "ppo-robust", "ppo-indicator"]
 NUMBERS = ("value", "low", "high", "p_value", "p_holm", "change", "change_low", "change_high")
-WORDS = ("policy", "indicator", "comparison", "verdict", "verdict_holm", "claim_verdict_holm")
-WORDS += ("equivalence", "equivalence_holm", "conclusion", "flags")
+WORDS = (
+    "policy", "indicator", "comparison", "verdict", "verdict_holm", "claim_verdict_holm",
+    "equivalence", "equivalence_holm", "conclusion", "flags",
+)  # fmt: skip
 
 
 def paper() -> Study:

@@ -40,8 +40,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "policies": WORLD | {"motion"},
     "adapters": ENVIRONMENT | {"motion", "policies", "wrappers"},
     "episode": WORLD | {"policies"},
-    "removed": set(),
-    "spi": {"removed"},
+    "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
     "studies": {"errors", "records", "streams", "spi", "tasks"},
@@ -50,7 +49,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "train": RUNS
     | ENVIRONMENT
     | {"progress_bar", "wrappers", "adapters", "spi", "tasks", "studies"},
-    "testing": RUNS | ENVIRONMENT | {"removed"},
+    "testing": RUNS | ENVIRONMENT | {"spi"},
 }
 # A Study offers its report, so it stands above both; the other modules of studies stand below.
 MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report", "progress_bar"}

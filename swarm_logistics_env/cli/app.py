@@ -8,7 +8,6 @@ import typer
 
 from .application import Application
 from .fault_commands import attack_command
-from .film_command import film_command
 from .judging import judge_command
 from .options import (
     FaultOption,
@@ -23,7 +22,7 @@ from .options import (
 )
 from .study_commands import study
 from .train import train_command
-from .watch import watch_command
+from .watch import film_command, watch_command
 
 app = Application(
     name="swarm-logistics",

@@ -1,9 +1,9 @@
-"""`swarm-logistics watch`."""
+"""`swarm-logistics watch` and `film`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,11 +12,17 @@ from .options import (
     PolicyOption,
     PresetOption,
     ScenarioOption,
+    SeedOption,
     SetOption,
     TrustPolicyOption,
     faults_of,
     scenario_of,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from swarm_logistics_env.warehouse.faults import Fault
 
 
 def watch_command(
@@ -73,3 +79,91 @@ def watch_command(
     page = recorded_page(session, session.scenario.duration if until is None else until)
     save.write_text(page, encoding="utf-8")
     typer.echo(f"{save}: {session.run.world.state.time:g} s, {len(page) / 1e6:.2f} MB")
+
+
+def film_command(
+    out: Annotated[
+        Path,
+        typer.Argument(metavar="FILE.mp4|FILE.gif", help="The film; an older one is replaced."),
+    ],
+    policies: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--policy",
+            help="Name (`policies` lists them), path of a policy file, or package.module:Class; "
+            "may be repeated.",
+        ),
+    ] = None,
+    seed: SeedOption = 0,
+    preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
+    changes: SetOption = None,
+    faults: FaultOption = None,
+    twin: Annotated[
+        bool, typer.Option("--twin", help="Show each run beside the same seed without faults.")
+    ] = False,
+    until: Annotated[
+        float | None,
+        typer.Option(help="Where the film ends [s of the run]; with the episode if not given."),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="How many times real time it plays.")] = 4.0,
+    frame_rate: Annotated[float, typer.Option("--fps", help="Frames a second.")] = 25.0,
+    size: Annotated[int, typer.Option(help="Longer side of each warehouse [px].")] = 480,
+    trails: Annotated[bool, typer.Option("--trails", help="Draw the paths of robots.")] = False,
+    links: Annotated[
+        bool,
+        typer.Option(
+            "--links", help="Draw which robot each follows; otherwise for the carrier only."
+        ),
+    ] = False,
+    trust_code: TrustPolicyOption = False,
+) -> None:
+    """Write an episode as a film; several policies, or with and without faults, side by side."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from swarm_logistics_env.errors import SetupError
+    from swarm_logistics_env.policies import load
+    from swarm_logistics_env.rendering.renderer import load_pygame
+    from swarm_logistics_env.rendering.video import check_film, write_film
+
+    scenario = scenario_of(preset, scenario_file, changes)
+    scheduled = faults_of(faults, scenario)
+    if twin and not scheduled:
+        raise SetupError("--twin: shows the run without its faults, so --fault should be given")
+    check_film(out)
+    load_pygame()
+    from swarm_logistics_env.episode import Play
+    from swarm_logistics_env.watch.film import Film, Take
+
+    takes = []
+    for name in policies or ["swarm-dt"]:
+        for these in ((), scheduled) if twin else (scheduled,):
+            title = _title(name, these) if scheduled else _short(name)
+            play = Play(scenario, load(name, trust_code=trust_code), seed, these)
+            takes.append(Take(title, play))
+    end = scenario.duration if until is None else until
+    film = Film(takes, end, speed, frame_rate, size, trails=trails, all_links=links)
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        frames = progress.track(film.frames(), total=film.n_frames, description=out.name)
+        count = write_film(out, frames, frame_rate)
+    typer.echo(
+        f"{out}: {count} frames, {count / frame_rate:.1f} s, {out.stat().st_size / 1e6:.2f} MB"
+    )
+
+
+def _short(policy: str) -> str:
+    from swarm_logistics_env.policies import called
+
+    policy = called(policy)
+    # A long path of a user's own policy is cut at its beginning.
+    return policy if len(policy) <= 24 else f"…{policy[-23:]}"
+
+
+def _title(policy: str, faults: Sequence[Fault]) -> str:
+    counts = [
+        f"{fault.mode} × {fault.robots if isinstance(fault.robots, int) else len(fault.robots)}"
+        for fault in faults
+    ]
+    return f"{_short(policy)}, {', '.join(counts) or 'no fault'}"

@@ -12,11 +12,9 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
 from . import palette, sprites
-from .beams import N_BEAMS, ranges
 from .canvas import Point, draw_line, stamp
-from .links import followed
 from .projection import Projection
-from .trails import Trails
+from .readings import N_BEAMS, Trails, followed, ranges
 
 _TRAIL_SHADES = 5
 

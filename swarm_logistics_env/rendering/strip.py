@@ -8,7 +8,7 @@ import pygame
 
 from . import palette
 from .canvas import Point, draw_line, new_canvas
-from .curves import Curve, Event
+from .readings import Curve, Event
 from .sprites import badge, words
 
 _GRID_LINES = 4

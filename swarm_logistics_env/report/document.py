@@ -11,9 +11,8 @@ from swarm_logistics_env.studies.results import StudyResults
 
 from .answer import Answer, answer
 from .figures import Figure, indicator_figures, size_figures
-from .further_measures import budget_sections, load_sections, look_sections
+from .further_measures import budget_sections, load_sections, look_sections, resilience_sections
 from .policies_compared import policy_sections
-from .resilience_sections import resilience_sections
 from .result_tables import Section, tables, warnings
 from .setup_sheet import glossary, methods, setup_sheet
 from .wording import sentence

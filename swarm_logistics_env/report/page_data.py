@@ -20,7 +20,7 @@ from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_o
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.tasks.policy_choice import runs_code
 from swarm_logistics_env.tasks.replay import Recording, record_run
-from swarm_logistics_env.tasks.task_choice import DEFAULT
+from swarm_logistics_env.tasks.task import DEFAULT
 
 from . import wording
 from .verdict_matrix import VerdictMatrix

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.removed import refuse
-
 from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .fault_budget import FaultBudget, fault_budget
@@ -19,6 +17,7 @@ from .power import (
     seeds_for_equivalence,
     seeds_for_power,
 )
+from .removed import refuse
 from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
 from .sequential import Spending, look_alphas
 from .summaries import (

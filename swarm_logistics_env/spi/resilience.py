@@ -112,7 +112,7 @@ def repair_times(
         return np.asarray(np.searchsorted(times, onset + starts + window, side="right") - before)
 
     enough = np.array([counts(run) >= counts(other) for run, other in zip(*pair)])
-    back = enough.any(axis=1)
+    back: NDArray[np.bool_] = np.asarray(enough.any(axis=1))
     return np.where(back, starts[enough.argmax(axis=1)], followed), back
 
 

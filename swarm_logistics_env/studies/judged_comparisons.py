@@ -15,8 +15,6 @@ from .performance_table import Row
 from .plan import Plan
 
 CONFIDENCE = 0.95
-# A float cannot hold a confidence level much nearer to 1, and an early look may ask for one.
-_LEAST_ALPHA = 1e-12
 CellKey = tuple[str, str, Arm]  # policy, table, arm
 
 
@@ -32,7 +30,7 @@ class Level(NamedTuple):
     alpha: float = ALPHA
 
 
-def level_at(look: int, looks: Sequence[int], spending: spi.Spending = "obrien-fleming") -> Level:
+def level_at(look: int, looks: Sequence[int], spending: spi.Spending) -> Level:
     """Return the level of one of the declared looks, counted from 0.
 
     Each test spends its own error over all of them: 5 % on both sides of a threshold, and as much
@@ -40,7 +38,7 @@ def level_at(look: int, looks: Sequence[int], spending: spi.Spending = "obrien-f
     """
     both = spi.look_alphas(looks, 1 - CONFIDENCE, spending=spending)[look]
     one_sided = spi.look_alphas(looks, 2 * ALPHA, spending=spending)[look] / 2
-    return Level(1 - max(both, _LEAST_ALPHA), max(one_sided, _LEAST_ALPHA))
+    return Level(1 - both, one_sided)
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class Judged:
     stopped_at: int | None = None
 
 
-def judge_all(plan: Plan, cells: Mapping[CellKey, Row], level: Level) -> list[Judged]:
+def judge_all(plan: Plan, cells: Mapping[CellKey, Row]) -> list[Judged]:
     """Return every comparison of a plan, judged; in the order of the plan.
 
     A comparison that needs a run which failed or is missing is blocked, and with it the adjusted
@@ -77,9 +75,8 @@ def judge_all(plan: Plan, cells: Mapping[CellKey, Row], level: Level) -> list[Ju
     Args:
         plan: of the study.
         cells: rows of the table of performances.
-        level: of intervals and verdicts.
     """
-    found = [judge_one(comparison, cells, plan, level) for comparison in plan.comparisons]
+    found = [judge_one(comparison, cells, plan, Level()) for comparison in plan.comparisons]
     families: dict[tuple[str, str], list[int]] = {}
     for index, one in enumerate(found):
         families.setdefault(one.comparison.family, []).append(index)

@@ -12,8 +12,7 @@ from pydantic_core import to_json
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.spi.trials import Trial
-from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.task_choice import NAMES, refuse_untrusted
+from swarm_logistics_env.tasks.task import NAMES, Task, refuse_untrusted
 
 from .plan import Plan
 from .runs import seeds_in_words

@@ -16,7 +16,7 @@ from swarm_logistics_env.tasks.task import Outcome
 
 from .comparisons import Arm, Reference, load_reference
 from .indicator_table import indicator_table
-from .judged_comparisons import CONFIDENCE, CellKey, Level, judge_all
+from .judged_comparisons import CONFIDENCE, CellKey, judge_all
 from .metadata import Declaration
 from .performance_table import Row, performance_table, rows_of
 from .plan import Plan
@@ -105,7 +105,7 @@ def judge(
         found = standing(plan, outcomes)
         plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
     performance = performance_table(plan, outcomes, reference)
-    judged = found.judged if found else judge_all(plan, _by_arm(performance), Level())
+    judged = found.judged if found else judge_all(plan, _by_arm(performance))
     return StudyResults(
         plan,
         reference,

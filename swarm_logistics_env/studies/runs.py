@@ -13,8 +13,7 @@ from typing import Any, Self
 from swarm_logistics_env import streams
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import canonical_json
-from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.task_choice import DEFAULT
+from swarm_logistics_env.tasks.task import DEFAULT, Task
 
 
 @dataclass(frozen=True)

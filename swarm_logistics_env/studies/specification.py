@@ -21,8 +21,7 @@ from swarm_logistics_env.records import Record, each_of, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
-from swarm_logistics_env.tasks.task import Task
-from swarm_logistics_env.tasks.task_choice import DEFAULT, TaskSource, refuse_untrusted, task_of
+from swarm_logistics_env.tasks.task import DEFAULT, Task, TaskSource, refuse_untrusted, task_of
 
 ScenarioFields = dict[str, Any]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.

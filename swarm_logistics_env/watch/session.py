@@ -16,7 +16,7 @@ from swarm_logistics_env.errors import (
     suggest,
 )
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.rendering.curves import Curve, Event
+from swarm_logistics_env.rendering.readings import Curve, Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import failed_robots

@@ -12,7 +12,7 @@ import pytest
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.tasks.parallel_policies import observation_rows
-from swarm_logistics_env.tasks.task_choice import task_of
+from swarm_logistics_env.tasks.task import task_of
 
 STUDIES = Path(__file__).parents[2] / "examples" / "tasks"
 # File of the study: the package that it needs, where a row of observations tells a place.

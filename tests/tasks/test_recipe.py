@@ -27,7 +27,7 @@ def test_a_task_needs_two_files(tmp_path: Path) -> None:
     copy = tmp_path / PACKAGE.name
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(lane.__file__, copy / "tasks" / "lane_task.py")
-    choice = copy / "tasks" / "task_choice.py"
+    choice = copy / "tasks" / "task.py"
     text = choice.read_text(encoding="utf-8")
     name = '    "lane": "swarm_logistics_env.tasks.lane_task:LANE",\n'
     choice.write_text(text.replace("NAMES = {\n", f"NAMES = {{\n{name}"), encoding="utf-8")
@@ -38,4 +38,4 @@ def test_a_task_needs_two_files(tmp_path: Path) -> None:
         check=True,
     )
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    assert "Files: `tasks/NAME_task.py`, `tasks/task_choice.py`" in page
+    assert "Files: `tasks/NAME_task.py`, `tasks/task.py`" in page

@@ -14,8 +14,7 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import columns
 from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.beams import ranges
-from swarm_logistics_env.rendering.links import followed
+from swarm_logistics_env.rendering.readings import followed, ranges
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState

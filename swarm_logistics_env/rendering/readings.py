@@ -1,0 +1,124 @@
+"""What a picture tells of a world besides places: beams, who follows whom, trails, curves."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.rangers import Pose, scan_disc, scan_walls
+from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+
+from .palette import MARKS
+
+N_BEAMS = 16
+
+
+def ranges(state: WarehouseState, scenario: Scenario, robot: int) -> NDArray[np.float32]:
+    """Return how far each beam of `robot` sees robots, walls and free items: (3, N_BEAMS) [m].
+
+    Walls include obstacles. A beam that meets nothing reads the robot's ranger range, all of them
+    read 0 for a robot that is blind.
+    """
+    reach = state.ranger_range[robot]
+    scans = np.full((3, N_BEAMS), reach, np.float32)
+    if reach == 0.0:
+        return scans
+    x, y = state.robot_position[robot].tolist()
+    heading = float(state.robot_heading[robot])
+    cosine, sine = math.cos(heading), math.sin(heading)
+    others = state.robot_present.copy()
+    others[robot] = False
+    pose = Pose(x, y, cosine, sine)
+    scan_walls(pose, scenario.warehouse_width, scenario.warehouse_height, scans[1])
+    for scan, centres, radius in (
+        (scans[0], state.robot_position[others], scenario.robot_radius),
+        (scans[1], state.obstacle_position, scenario.obstacle_radius),
+        (scans[2], state.item_position[state.item_status == STORED], scenario.item_radius),
+    ):
+        for centre_x, centre_y in centres.tolist():
+            dx, dy = centre_x - x, centre_y - y
+            square = dx * dx + dy * dy
+            if square < (reach + radius) ** 2:
+                scan_disc(dx * cosine + dy * sine, dy * cosine - dx * sine, square, radius, scan)
+    return scans
+
+
+def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
+    """Return the neighbour whose timer is the lowest that `robot` hears, or NOBODY.
+
+    If several tell the same, it is the nearest of them.
+    """
+    if not (state.robot_present[robot] and state.hears[robot]):
+        return NOBODY
+    offset = state.robot_position - state.robot_position[robot]
+    square = (offset * offset).sum(axis=1)
+    heard = state.robot_present & state.sends & (square <= scenario.radio_range**2)
+    heard &= ~np.isnan(state.robot_told)
+    heard[robot] = False
+    candidates = np.flatnonzero(heard)
+    if not candidates.size:
+        return NOBODY
+    order = np.lexsort((square[candidates], state.robot_told[candidates]))
+    return int(candidates[order[0]])
+
+
+TRAIL_SECONDS = 2.5
+
+
+class Trails:
+    """Remembers the robots' positions over the last `TRAIL_SECONDS` of one episode."""
+
+    def __init__(self) -> None:
+        self._past: deque[tuple[float, NDArray[np.float64]]] = deque()
+
+    def note(self, state: WarehouseState) -> None:
+        """Remember where robots are; a time or a swarm that doesn't continue starts afresh."""
+        past = self._past
+        if past and (state.time < past[-1][0] or state.n_robots != len(past[-1][1])):
+            past.clear()
+        if not past or state.time > past[-1][0]:
+            present = state.robot_present[:, np.newaxis]
+            past.append((state.time, np.where(present, state.robot_position, np.nan)))
+        while past[0][0] < state.time - TRAIL_SECONDS - 1e-9:
+            past.popleft()
+
+    def positions(self) -> NDArray[np.float64]:
+        """Return what is remembered, oldest first: (T, N, 2) [m], NaN where a robot was absent."""
+        return np.array([positions for _, positions in self._past])
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Deliveries of one run.
+
+    Attributes:
+        name: the name of the run.
+        times: the times of its deliveries [s], ascending.
+        until: the time that the run has reached [s].
+        style: an index of `palette.RUNS`; runs differ by thickness and lightness as well.
+    """
+
+    name: str
+    times: Sequence[float]
+    until: float
+    style: int
+
+
+@dataclass(frozen=True)
+class Event:
+    """A robot that failed, or was repaired: a mark on the time axis."""
+
+    time: float  # [s]
+    robot: int
+    mode: str | None  # None if it was repaired
+
+    @property
+    def label(self) -> str:
+        """The text of the mark."""
+        return "ok" if self.mode is None else MARKS.get(self.mode, self.mode)

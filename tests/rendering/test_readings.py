@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, observations
+from swarm_logistics_env.rendering.readings import N_BEAMS, TRAIL_SECONDS, Trails, followed, ranges
+from swarm_logistics_env.warehouse import WarehouseState
+from swarm_logistics_env.warehouse.state import NOBODY
+
+
+def test_beams_end_where_the_robot_itself_sees_them_end() -> None:
+    assert N_BEAMS == observations.N_BEAMS
+    scenario = Scenario(n_robots=20, n_obstacles=4)
+    world = Warehouse(scenario)
+    rows = world.reset(2, [Fault("removed", [3], onset=0.5)])
+    for _ in range(20):
+        rows = world.step(np.tile([1.0, 0.0, 0.2, 1.0], (20, 1)))
+    seen = observations.unflatten(rows, scenario)
+    for robot in np.flatnonzero(world.state.robot_present):
+        scans = ranges(world.state, scenario, int(robot))
+        for scan, name in zip(scans, ("range_robots", "range_walls", "range_items"), strict=True):
+            np.testing.assert_allclose(scan, seen[name][robot], atol=1e-5)
+
+
+def test_blind_robot_has_no_beams() -> None:
+    world = Warehouse(Scenario(n_robots=2))
+    world.reset(0, [Fault("rangers_blind", [1])])
+    assert (ranges(world.state, world.scenario, 1) == 0.0).all()
+
+
+@pytest.mark.parametrize("relay", ["none", "gossip"])
+def test_follows_whom_the_robot_itself_hears(relay: str) -> None:
+    scenario = Scenario(n_robots=30, radio_range=2.0).replace(relay=relay)
+    world = Warehouse(scenario)
+    faults = [Fault("FM1", [0, 1]), Fault("FM3_send", [2, 3]), Fault("FM3_hear", [4, 5])]
+    world.reset(1, [*faults, Fault("removed", [6], onset=1.0)])
+    compared = 0
+    for _ in range(60):
+        rows = observations.unflatten(world.step(np.tile([1.0, 0.2, 0.1, 0.0], (30, 1))), scenario)
+        state = world.state
+        for robot in range(30):
+            leader = followed(state, scenario, robot)
+            assert (leader != NOBODY) == bool(rows["lowest_timer_present"][robot, 0])
+            if leader == NOBODY:
+                continue
+            compared += 1
+            assert state.robot_told[leader] == state.robot_heard[robot]
+            offset = state.robot_position[leader] - state.robot_position[robot]
+            seen = [rows["lowest_timer_x"][robot, 0], rows["lowest_timer_y"][robot, 0]]
+            assert np.hypot(*offset) == pytest.approx(np.hypot(*seen), abs=1e-5)
+    assert compared > 100
+
+
+def test_nearest_of_those_that_tell_the_same(
+    situation: Callable[..., tuple[WarehouseState, Scenario]],
+) -> None:
+    state, scenario = situation([[2, 2], [5, 2], [4, 2]], [[7, 7]])
+    state.robot_told[:] = [0.0, 1.0, 1.0]
+    assert followed(state, scenario, 0) == 2
+    state.robot_told[2] = 1.1
+    assert followed(state, scenario, 0) == 1
+
+
+Situation = Callable[..., tuple[WarehouseState, Scenario]]
+
+
+def test_remembers_so_long_and_no_longer(situation: Situation) -> None:
+    state, _ = situation([[2, 2]], [[5, 5]])
+    trails = Trails()
+    for step in range(100):
+        state.time = 0.1 * step
+        state.robot_position[0, 0] = step
+        trails.note(state)
+        trails.note(state)  # the same moment twice counts once
+    expected = np.arange(99 - round(10 * TRAIL_SECONDS), 100)
+    assert trails.positions()[:, 0, 0].tolist() == expected.tolist()
+
+
+def test_starts_afresh_with_an_episode(situation: Situation) -> None:
+    state, _ = situation([[2, 2]], [[5, 5]])
+    trails = Trails()
+    state.time = 3.0
+    trails.note(state)
+    state.time = 0.0
+    trails.note(state)
+    assert trails.positions().shape == (1, 1, 2)
+    larger, _ = situation([[2, 2], [3, 3]], [[5, 5]])
+    larger.time = 0.1
+    trails.note(larger)
+    assert trails.positions().shape == (1, 2, 2)
+
+
+def test_absent_robot_leaves_no_trail(situation: Situation) -> None:
+    state, _ = situation([[2, 2], [3, 3]], [[5, 5]])
+    state.robot_present[1] = False
+    trails = Trails()
+    trails.note(state)
+    assert np.isnan(trails.positions()[0, 1]).all()
+    assert trails.positions()[0, 0].tolist() == [2.0, 2.0]
