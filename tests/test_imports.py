@@ -44,7 +44,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
     "studies": {"errors", "records", "streams", "spi", "tasks"},
-    "report": {"errors", "fault_text", "spi", "tasks", "studies"},
+    "report": {"errors", "records", "fault_text", "spi", "tasks", "studies"},
     "fault_analysis": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS
     | ENVIRONMENT

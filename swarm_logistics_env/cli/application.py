@@ -94,7 +94,7 @@ def _of_a_policy(error: Exception) -> str | None:
 
 
 def _complain(sentence: str, code: int) -> int:
-    # The sentence may repeat what was typed: signs that steer a terminal are escaped.
-    shown = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)
-    sys.stderr.write(f"swarm-logistics: {shown}\n")
+    from swarm_logistics_env.records import plain
+
+    sys.stderr.write(f"swarm-logistics: {plain(sentence)}\n")  # it may repeat what was typed
     return code

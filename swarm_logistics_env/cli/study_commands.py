@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import plain
 
 if TYPE_CHECKING:
     from swarm_logistics_env.report.document import Document
@@ -284,7 +285,8 @@ def run_study(asked: Study, engine: Engine, shard: Shard | None = None) -> Tally
 def in_one_line(tally: Tally, players: str) -> str:
     """Return how many runs `players` have played, in which time."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
-    why = f", the first with {tally.error}; study export has each traceback" if tally.error else ""
+    error = plain(tally.error or "")
+    why = f", the first with {error}; study export has each traceback" if error else ""
     return (
         f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
         f"were kept from before; {tally.failed} failed{why}"

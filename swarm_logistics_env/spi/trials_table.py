@@ -6,6 +6,7 @@ import csv
 import difflib
 import math
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -174,6 +175,13 @@ def read_table(path: Path, columns: dict[str, str], ignore: tuple[str, ...]) -> 
             f"{path} is not a CSV file in UTF-8 ({error.reason}): save it as CSV UTF-8"
         ) from error
     lines = text.splitlines()
+    for number, line in enumerate(lines, 1):
+        for sign in line.replace("\t", ""):
+            if unicodedata.category(sign) in ("Cc", "Cf"):
+                raise IndicatorError(
+                    f"{path}, line {number}: holds {sign!r}: should be plain text, without control "
+                    "signs"
+                )
     # Spreadsheets may say the delimiter in a first line such as "sep=;".
     empty = ("", "sep=;", "sep=,", "sep=")
     start = next((n for n, line in enumerate(lines) if line.strip().lower() not in empty), None)

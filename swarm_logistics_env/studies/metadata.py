@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 from pydantic_core import to_json
 
-from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.spi.trials import Trial
 from swarm_logistics_env.tasks.task import Task
@@ -111,7 +112,7 @@ def _counted(seeds: Sequence[int]) -> str:
     return f"{count} ({seeds_in_words(seeds)})"
 
 
-class Origin(BaseModel):
+class Origin(Record):
     """The source of recorded trials.
 
     Attributes:
@@ -123,7 +124,7 @@ class Origin(BaseModel):
         trials: the first of every condition, in the file's order.
     """
 
-    model_config = ConfigDict(frozen=True)
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
 
     file: str
     digest: str

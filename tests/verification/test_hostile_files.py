@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 import sqlite3
 import sys
@@ -328,28 +327,6 @@ def spoiled(whole: Whole, spoil: Callable[[sqlite3.Connection], None]) -> None:
         database.close()
         read_all(out)
         assert {path.name for path in out.iterdir()} <= ALLOWED
-
-
-def test_names_in_a_study_neither_leave_its_folder_nor_become_markup(tmp_path: Path) -> None:
-    evil = "../../<script>alert(1)</script>"
-    out = tmp_path / "a" / "b" / "out"
-    fields = json.loads(json.dumps({"title": evil, "values": [2, 3]}))
-    study = Study(
-        out=out,
-        name=evil,
-        seeds=2,
-        scenario={"n_robots": 3, "n_items": 5, "warehouse_width": 3.0, "warehouse_height": 3.0,
-                  "delivery_width": 1.0, "duration": 10.0},
-        sizes=[fields],
-    )  # fmt: skip
-    study.run()
-    study.report()
-    assert {path.name for path in tmp_path.iterdir()} == {"a"}
-    assert {path.name for path in (tmp_path / "a").iterdir()} == {"b"}
-    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == {"out"}
-    page = out / "report.html"
-    if page.exists():  # it needs the extra `study`
-        assert "<script>alert" not in page.read_text(encoding="utf-8")
 
 
 def test_what_is_refused_says_where(tmp_path: Path) -> None:
