@@ -307,7 +307,11 @@ def show_report(
 
     for section in whole.summary if full else ():
         show(section)
-    written = write_report(results, out, whole) if out else (None,)
+    try:
+        written = write_report(results, out, whole) if out else (None,)
+    except StudyError:  # as where the disk is full: what was found is told all the same
+        show_digest(whole.answer, None, whole=full)
+        raise
     show_digest(whole.answer, written[0], whole=full)
     if out and (missing := missing_packages()):
         typer.echo(how_to_get_figures(missing))

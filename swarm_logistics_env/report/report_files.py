@@ -18,6 +18,7 @@ from swarm_logistics_env.records import plain
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
+from swarm_logistics_env.writing import becoming
 
 from .answer import digest
 from .document import Document, document, with_attributions
@@ -59,7 +60,8 @@ def write_report(
         for figure in whole.figures():
             svg, png = images(figure.draw, figure.height)
             write_text(pictures / f"{figure.name}.svg", svg)
-            (pictures / f"{figure.name}.png").write_bytes(png)
+            with becoming(pictures / f"{figure.name}.png", StudyError) as part:
+                part.write_bytes(png)
             drawings[figure.name] = _inline_svg(figure.name, svg)
         write_text(paths[0], markdown(whole, pictures=pictures.name))
         write_text(page, html(results, whole, drawings))
@@ -74,10 +76,8 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         StudyError: the file cannot be written.
     """
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise StudyError(f"cannot write {path}: {error.strerror}") from error
+    with becoming(path, StudyError) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _inline_svg(name: str, svg: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar, Self
@@ -56,6 +57,16 @@ class StoredSpecification(BaseModel):
         if task is None:
             refuse_untrusted(self.task, place, trust_code=trust_code)
         return Specification(**{**self.model_dump(), "task": task or self.task})
+
+    def differing(self, asked: Specification, place: Path) -> list[str]:
+        """Return which fields of what is asked are not those that were declared.
+
+        How far it is played, and how it is judged, may change: `Declaration` guards these.
+        """
+        declared = self.read(place, task=asked.played)
+        free = ("name", "seeds", "first_seed", "looks", "until_clear", "margin", "reference")
+        mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
+        return [name for name in mine if name not in free and mine[name] != theirs[name]]
 
 
 class Declaration(BaseModel):
