@@ -121,6 +121,12 @@ class Table:
         return value if math.isfinite(value) else None
 
     @cached_property
+    def spellings(self) -> dict[str, str]:
+        """Each fault in small letters to the way in which its first row has it."""
+        faults = [self.text(row, "fault") for row in range(len(self.rows))]
+        return {fault.casefold(): fault for fault in reversed(faults)}
+
+    @cached_property
     def _varying(self) -> tuple[int, ...]:
         return tuple(place for place in self.others if len({row[place] for row in self.rows}) > 1)
 

@@ -147,7 +147,7 @@ def test_what_cannot_be_written_whole_leaves_the_older_file(tmp_path: Path) -> N
 @pytest.mark.skipif(sys.platform != "linux", reason="no /dev/full")
 @pytest.mark.parametrize("arguments", [("policies",), ("scenario", "--json"), ("--help",)])
 def test_an_output_that_is_full_ends_in_one_line(arguments: tuple[str, ...]) -> None:
-    with open("/dev/full", "w") as full:
+    with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()", *arguments],
             stdout=full,
