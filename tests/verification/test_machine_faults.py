@@ -118,8 +118,9 @@ def test_a_disk_that_is_full_keeps_what_is_finished_and_the_study_goes_on(
 
 
 def test_a_full_disk_leaves_a_finished_study_readable(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    Study(out=out, seeds=2, scenario=SCENARIO, sizes=[{"values": [2, 3]}]).run()
+    file, out = tmp_path / "mine.toml", tmp_path / "out"
+    file.write_text(FILE)
+    Study.from_file(file, out=out, seeds=2).run()
     store = (out / FILE_NAME).read_bytes()
     told = command("study", "report", str(out), limit=0)
     assert "2 paired seeds" in told.stdout  # the answer, though no file of it can be written
@@ -128,7 +129,7 @@ def test_a_full_disk_leaves_a_finished_study_readable(tmp_path: Path) -> None:
     assert os.strerror(errno.EFBIG) in said
     exported = command("study", "export", str(out), "--to", str(tmp_path / "x.csv"), limit=0)
     assert str(tmp_path / "x.csv") in complaint(exported)
-    more = ("study", "run", "quick", "--out", str(out), "--processes", "1")
+    more = ("study", "run", str(file), "--out", str(out), "--processes", "1")
     assert "no room" in complaint(command(*more, limit=0))
     assert (out / FILE_NAME).read_bytes() == store
     assert not list(tmp_path.glob("*.csv")) + list(tmp_path.glob(".*"))
