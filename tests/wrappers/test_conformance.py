@@ -41,9 +41,10 @@ def test_a_step_after_the_end_is_refused(make: Make, stack: str) -> None:
     env.reset(seed=0)
     env.step({agent: env.action_space(agent).sample() for agent in env.agents})
     n_rows, columns = env.n_rows, env.action_space("robot_0").shape[0]
-    for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((n_rows, columns)))):
-        with pytest.raises(SetupError, match="after the end of the episode: call reset"):
-            step()
+    with pytest.raises(SetupError, match="after the end of the episode: call reset"):
+        env.step({})
+    with pytest.raises(SetupError, match="after the end of the episode: call reset"):
+        env.step_arrays(np.zeros((n_rows, columns)))
 
 
 @each_size
