@@ -20,6 +20,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.metadata import merge
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.store import FILE_NAME, Store, export
 
 STUDY = """\
@@ -292,7 +293,7 @@ def assert_same_or_missing(whole: Whole, out: Path) -> None:
     sound = Study.stored(whole.path.parent).findings().performance
     if list(found["cell"]) != list(sound["cell"]):
         return  # another study was noted
-    for here, there in zip(found.itertuples(), sound.itertuples(), strict=True):
+    for here, there in zip(rows_of(found), rows_of(sound), strict=True):
         if here.n_seeds == there.n_seeds:
             assert list(here.by_seed) == list(there.by_seed)
 

@@ -254,7 +254,10 @@ def test_headers_of_trials_are_refused_or_reported(
     file = tmp_path / "mine.csv"
     for number, name in enumerate(WRITTEN):
         text = io.StringIO()
-        rows = [["delivered", name], *([value, 1 + value % 2] for value in range(5, 13))]
+        rows: list[list[Any]] = [
+            ["delivered", name],
+            *([value, 1 + value % 2] for value in range(5, 13)),
+        ]
         csv.writer(text).writerows(rows)
         file.write_text(text.getvalue(), encoding="utf-8", newline="")
         out = tmp_path / "tried" / str(number)

@@ -290,8 +290,8 @@ def test_what_needs_an_episode_is_refused_before_the_first_reset(
         (lambda world: world.reset(0, ["FM1"]), FaultError, "should be a list of Fault"),
         (lambda world: world.reset(0, (), {}), ScenarioError, "scenario = {}: should be a Scen"),
         (lambda world: world.set_faults(None), FaultError, "faults = None"),
-        (lambda _: Warehouse(dict), ScenarioError, "scenario = <class 'dict'>: should be"),
-        (lambda _: Warehouse({}), ScenarioError, "scenario = {}: should be a Scenario"),
+        (lambda world: type(world)(dict), ScenarioError, "scenario = <class 'dict'>: should be"),
+        (lambda world: type(world)({}), ScenarioError, "scenario = {}: should be a Scenario"),
     ],
 )
 def test_what_is_no_scenario_fault_or_seed_is_refused(
