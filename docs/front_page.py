@@ -101,9 +101,7 @@ def findings(page: str) -> str:
     rows = rows_of(policies)
     told = [*_learned(rows), *_faults(rows), *_sizes(rows), *_paper(block_of(page, "paper"))]
     lines = [f"* {one}" for one in told]
-    note = (
-        f"Means and indicators with 95 % intervals over {seeds} seeds on which nothing was fitted"
-    )
+    note = f"Means and indicators with 95 % intervals over {seeds} seeds"
     note += "".join(f" ({count} where a fault makes P skewed)" for count, _, _ in more)
     return "\n".join([*lines, "", f"{note}; `docs/results.md` has all of them."])
 

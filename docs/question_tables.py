@@ -34,7 +34,7 @@ LEGEND = (
 def over(found: StudyResults) -> str:
     """Return over which seeds a table is."""
     seeds = found.plan.seeds
-    return f"{len(seeds)} paired seeds from {seeds[0]:,} on, on which nothing was fitted"
+    return f"{len(seeds)} paired seeds from {seeds[0]:,} on"
 
 
 def with_sign(test: Row) -> str:

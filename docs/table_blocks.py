@@ -143,7 +143,7 @@ def policies_block(results: StudyResults, skewed: StudyResults) -> str:
     replaced = dict.fromkeys(f"{j.indicator}, {j.comparison}" for j in rows_of(skewed.indicators))
     fewer = [f"`{name}`" for name in judged_policies(skewed)]
     text = (
-        f"{count} seeds from {first:,} on, on which nothing was fitted; {more} for "
+        f"{count} seeds from {first:,} on; {more} for "
         f"{wording.listed(list(replaced))} of {wording.listed(fewer)}, whose P is skewed there."
     )
     head = ("", *(f"`{name}`" for name in names))

@@ -36,6 +36,7 @@ _HERE = Path(__file__).parent
 # Folders of kernels, by the folder of those that call them.
 _CALLED = {"warehouse": ("warehouse",), "motion": ("motion",)}
 _all_kernels: list[Any] = []
+_config, _events, _types = cast("tuple[Any, Any, Any]", (config, event, types))  # without types
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -57,14 +58,10 @@ def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
-    compiled: Any = numba.njit(
-        function,
-        nogil=True,
-        error_model="numpy",
-        forceinline=is_inlined,
-        no_cfunc_wrapper=True,  # nobody calls a kernel from C
-    )
-    if not config.DISABLE_JIT:
+    # Nobody calls a kernel from C.
+    options: dict[str, Any] = {"forceinline": is_inlined, "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(function, nogil=True, error_model="numpy", **options)
+    if not _config.DISABLE_JIT:
         compiled.get_call_template = functools.partial(_call_template, compiled)
         compiled.compile = functools.partial(_compile, compiled)
         _all_kernels.append(compiled)
@@ -73,7 +70,7 @@ def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
 
 def _call_template(compiled: Any, args: tuple[Any, ...], named: dict[str, Any]) -> Any:
     # A number that stands in the code is no type of its own, or each would be compiled for.
-    plain = tuple(types.unliteral(kind) for kind in args)
+    plain = tuple(_types.unliteral(kind) for kind in args)
     return type(compiled).get_call_template(compiled, plain, named)
 
 
@@ -136,7 +133,7 @@ def _code_of(source: bytes) -> bytes:
     return b"\n".join(found)
 
 
-class _Report(event.Listener):  # type: ignore[misc]  # numba ships no types
+class _Report(event.Listener):
     """Tells a person once that kernels are being compiled and for how long, with a bar."""
 
     current: _Report | None = None
@@ -147,11 +144,11 @@ class _Report(event.Listener):  # type: ignore[misc]  # numba ships no types
         self._bar: ProgressBar | None = None
         self._last = time.monotonic()
         _Report.current = self
-        event.register("numba:compile", self)
+        _events.register("numba:compile", self)
 
     def __exit__(self, *_: object) -> None:
         _Report.current = None
-        event.unregister("numba:compile", self)
+        _events.unregister("numba:compile", self)
         if self._bar is not None:
             self._bar.__exit__()
 

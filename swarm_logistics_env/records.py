@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
-from collections.abc import Callable
+import unicodedata
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 from swarm_logistics_env.errors import SwarmLogisticsError, suggest
 
 _OTHER_KIND = ("int_type", "tuple_type")
+_LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system
+_FILE_NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{_LONGEST_NAME - 1}}}")
 
 
 class Record(BaseModel):
@@ -20,7 +31,8 @@ class Record(BaseModel):
 
     Raises:
         The class's `error_type` (a `ValueError`), which names each bad field, its value and what
-        would be right. For an unknown field it suggests the nearest known one.
+        would be right. For an unknown field it suggests the nearest known one. Text with signs that
+        steer a terminal or a page (`steers`) is refused in every field, however deep.
     """
 
     model_config = ConfigDict(
@@ -33,6 +45,16 @@ class Record(BaseModel):
             super().__init__(**fields)
         except ValidationError as error:
             raise self.error_type(self._sentence(error)) from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_plain_text(cls, fields: object) -> object:
+        for place, text in _texts(cls.__name__, fields):
+            if steers(text):
+                raise ValueError(
+                    f"{place} = {_short(text)}: should be plain text, without control signs"
+                )
+        return fields
 
     def replace(self, **fields: Any) -> Self:
         """Return a copy with `fields` changed, validated like a new record."""
@@ -125,6 +147,51 @@ def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> 
     if not isinstance(found, dict):
         raise error_type(f"the {what} {path} should hold a table of fields")
     return found
+
+
+def steers(text: str) -> bool:
+    """Return whether a text has signs that steer a terminal or turn the direction of writing."""
+    return not text.isprintable() and any(
+        unicodedata.category(sign) in ("Cc", "Cf", "Cs", "Zl", "Zp") for sign in text
+    )
+
+
+def plain(text: str) -> str:
+    """Return a text as a terminal may show it: signs that steer it are written as escapes."""
+    return "".join(repr(sign)[1:-1] if steers(sign) else sign for sign in text)
+
+
+def _texts(place: str, value: object) -> Iterator[tuple[str, str]]:
+    """Yield every text in a value as JSON and TOML have it, names in tables too, and its place."""
+    waiting = [(place, value)]  # no recursion: a file may be nested deep
+    while waiting:
+        match waiting.pop():
+            case place, str() as text:
+                yield place, text
+            case place, dict() as table:
+                waiting += [(place, name) for name in table]
+                waiting += [(f"{place}.{plain(str(name))}", table[name]) for name in table]
+            case place, list() | tuple() as values:
+                waiting += [(f"{place}.{number}", each) for number, each in enumerate(values)]
+
+
+def _checked_file_name(name: str) -> str:
+    if not _FILE_NAME.fullmatch(name):
+        raise ValueError(
+            "should be of letters, digits, - and _, and points within, at most "
+            f"{_LONGEST_NAME}: files are called so"
+        )
+    return name
+
+
+# A name from a file that becomes part of a path.
+FileName = Annotated[str, AfterValidator(_checked_file_name)]
+
+
+def file_name(text: str) -> str:
+    """Return a `FileName` made of any text; other signs become hyphens."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:_LONGEST_NAME]
+    return plain or "unnamed"
 
 
 def canonical_json(value: object) -> str:

@@ -69,6 +69,33 @@ def parse(arguments: list[str]) -> None:
         _, command, arguments = command.resolve_command(context, rest)
 
 
+# What may stand in brackets without a command: the range that a value can have, and, by page, a
+# result of a network that is gone.
+RANGES = {"[-1, 1]", "[-2, 2]", "[-4, 4]", "[0, 1]", "[0, 2]", "[0, 10]"}
+GONE = {"training.md": {"[-0.001, 0.015]"}}
+MARKED = re.compile(r"<!-- tables: .*?<!-- end of tables -->|^```.*?^```|`[^`\n]*`", re.S | re.M)
+INTERVAL = re.compile(r"\[[-+]?\d*\.?\d+(?: ?%)?,\s[-+]?\d*\.?\d+(?: ?%)?\]|\d ± \d")
+
+
+def typed_by_hand(page: str) -> set[str]:
+    """Return the intervals outside of what commands write."""
+    return set(INTERVAL.findall(MARKED.sub("", page))) - RANGES
+
+
+@pytest.mark.parametrize("name", ["../README.md", *PAGES])
+def test_every_interval_comes_from_a_command(name: str) -> None:
+    page = (DOCS / name).read_text(encoding="utf-8")
+    assert typed_by_hand(page) == GONE.get(name, set())
+
+
+def test_an_interval_that_is_typed_is_seen() -> None:
+    block = "<!-- tables: x -->\n9.2 [8.3, 10.1]\n<!-- end of tables -->\n"
+    assert not typed_by_hand(f"{block}```text\n[1.5, 2]\n```\nin [0, 1]\n")
+    assert typed_by_hand(f"{block}R = .007 [-.001, .015]") == {"[-.001, .015]"}
+    assert typed_by_hand("81.3 [72.3,\n90.3]") == {"[72.3,\n90.3]"}
+    assert typed_by_hand("0.175 ± 0.026") == {"5 ± 0"}
+
+
 def test_targets_of_make_exist() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     heads = re.findall(r"^([\w -]+):(?!=)", makefile, flags=re.MULTILINE)

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from swarm_logistics_env import FAILURE_MODES, Scenario
+from swarm_logistics_env import FAILURE_MODES, Scenario, policies
+from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.studies import Study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -24,10 +25,25 @@ def test_evolution_moves_the_rates(capsys: pytest.CaptureFixture[str]) -> None:
     assert "return on a new seed" in capsys.readouterr().out
 
 
-def test_ppo_learns_over_two_swarm_sizes(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("stable_baselines3", reason="needs the extra train")
+def test_ppo_learns_over_two_swarm_sizes(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    PPO = pytest.importorskip("stable_baselines3", reason="needs the extra train").PPO
+    weights: list[list[Any]] = []
+    learn = PPO.learn
+
+    def watched(model: Any, *arguments: Any) -> Any:
+        weights.append([part.detach().clone() for part in model.policy.parameters()])
+        learn(model, *arguments)
+        weights.append([part.detach().clone() for part in model.policy.parameters()])
+        assert model.num_timesteps == 2_304
+        assert model.n_envs == 2 * 3 + 2 * 6
+
+    monkeypatch.setattr(PPO, "learn", watched)
     delivered = main("ppo_swarm", total_timesteps=2_304, duration=10.0)
-    assert len(delivered) == 3
+    assert f"P on three new seeds: {delivered}" in capsys.readouterr().out
+    before, after = weights
+    assert all(not bool((old == new).all()) for old, new in zip(before, after, strict=True))
 
 
 def test_a_loop_of_ones_own_learns_on_the_frame_of_motion(
@@ -39,6 +55,7 @@ def test_a_loop_of_ones_own_learns_on_the_frame_of_motion(
     own, scripted = main("ppo_from_nothing", total_timesteps=30_720, duration=20.0, judged=2)
     assert len(own) == len(scripted) == 2
     assert sum(scripted) > 0
+    assert sum(own) > 0  # an untrained one delivers nothing
     assert "Swarm D-T's" in capsys.readouterr().out
 
 
@@ -61,9 +78,29 @@ def test_own_failure_mode_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [estimate.indicator for estimate in estimates] == ["R", "FT"]
 
 
-def test_gate_judges_the_change(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main("regression_gate", seeds=2, duration=20.0, out=tmp_path) in (0, 1)
-    assert "change, no fault" in capsys.readouterr().out
+@pytest.mark.parametrize(("driving", "code"), [(0.0, 1), (1.0, 0)])
+def test_gate_judges_the_change(
+    driving: float,
+    code: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A new controller that stands still fails the gate, the old one itself passes."""
+
+    class Weak(SwarmDT):
+        identity = f"weak {driving}"
+
+        def act(self, observations: Any) -> Any:
+            return driving * super().act(observations)
+
+    def load(name: str, **parameters: Any) -> Any:
+        return Weak() if parameters else SwarmDT()
+
+    monkeypatch.setattr(policies, "load", load)
+    assert main("regression_gate", seeds=6, duration=60.0, out=tmp_path) == code
+    (said,) = [line for line in capsys.readouterr().out.splitlines() if "change, no fault" in line]
+    assert said.startswith("FAILS  'change < 0'" if code else "passes 'change < 0'")
 
 
 @pytest.mark.parametrize("study", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.name)

@@ -102,7 +102,7 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             CommandError: the action has another shape than the action space, cannot be read, or is
                 not finite.
-            SetupError: there was no reset.
+            SetupError: there was no reset, or the episode is over.
         """
         state = self.env.warehouse.state
         commands = np.array(as_array(action, "action"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import shlex
 import sys
 import traceback
@@ -11,6 +12,9 @@ from typing import Any
 
 import typer
 from rich.markup import escape
+
+# A disk, a quota or a file that is full; a pipe that nobody reads.
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EPIPE)
 
 
 class Application(typer.Typer):
@@ -21,7 +25,12 @@ class Application(typer.Typer):
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Run the command line in `sys.argv`, or that in `args`."""
-        sys.exit(self.run(kwargs.get("args")))
+        code = self.run(kwargs.get("args"))
+        try:
+            sys.stdout.flush()
+        except OSError:  # what is left in the buffer would be tried again
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(code)
 
     def run(self, arguments: list[str] | None = None) -> int:
         """Run a command line and return the exit code."""
@@ -36,6 +45,7 @@ class Application(typer.Typer):
             typed = sys.argv[1:] if arguments is None else arguments
             words = shlex.join(["swarm-logistics", *typed])
             code = command(arguments, standalone_mode=False, obj=words)
+            sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
         except Exception as error:
@@ -70,6 +80,8 @@ def _sentence(error: Exception) -> str | None:
         return str(error)
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        return f"cannot write {error.filename or 'the output'}: {error.strerror}"
     return _of_a_policy(error)
 
 
@@ -94,7 +106,7 @@ def _of_a_policy(error: Exception) -> str | None:
 
 
 def _complain(sentence: str, code: int) -> int:
-    # The sentence may repeat what was typed: signs that steer a terminal are escaped.
-    shown = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)
-    sys.stderr.write(f"swarm-logistics: {shown}\n")
+    from swarm_logistics_env.records import plain
+
+    sys.stderr.write(f"swarm-logistics: {plain(sentence)}\n")  # it may repeat what was typed
     return code

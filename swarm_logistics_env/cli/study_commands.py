@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import plain
 
 if TYPE_CHECKING:
     from swarm_logistics_env.report.document import Document
@@ -285,7 +286,8 @@ def run_study(asked: Study, engine: Engine, shard: Shard | None = None) -> Tally
 def in_one_line(tally: Tally, players: str) -> str:
     """Return how many runs `players` have played, in which time."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
-    why = f", the first with {tally.error}; study export has each traceback" if tally.error else ""
+    error = plain(tally.error or "")
+    why = f", the first with {error}; study export has each traceback" if error else ""
     return (
         f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
         f"were kept from before; {tally.failed} failed{why}"
@@ -306,7 +308,11 @@ def show_report(
 
     for section in whole.summary if full else ():
         show(section)
-    written = write_report(results, out, whole) if out else (None,)
+    try:
+        written = write_report(results, out, whole) if out else (None,)
+    except StudyError:  # as where the disk is full: what was found is told all the same
+        show_digest(whole.answer, None, whole=full)
+        raise
     show_digest(whole.answer, written[0], whole=full)
     if out and (missing := missing_packages()):
         typer.echo(how_to_get_figures(missing))

@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import DIGEST_LINES, Answer, digest
 from swarm_logistics_env.report.report_files import section_markdown
 from swarm_logistics_env.report.result_tables import Section
@@ -30,17 +31,17 @@ def show(section: Section) -> None:
         # No wrapping: whatever reads this knows no terminal width.
         console.out(section_markdown(section), highlight=False)
         return
-    console.rule(escape(section.title), align="left")
+    console.rule(escape(plain(section.title)), align="left")
     if section.columns:
         table = Table(box=None, pad_edge=False, header_style="bold")
         for column in section.columns:
             # Folded where a terminal is narrow: a number that is cut is another number.
-            table.add_column(escape(column), overflow="fold")
+            table.add_column(escape(plain(column)), overflow="fold")
         for row in section.rows:
-            table.add_row(*(escape(value) for value in row))
+            table.add_row(*(escape(plain(value)) for value in row))
         console.print(table)
     for line in section.lines:
-        console.print(escape(line))
+        console.print(escape(plain(line)))
     console.print()
 
 

@@ -57,6 +57,7 @@ def watch_command(
     from swarm_logistics_env.errors import SetupError
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.web import recorded_page, serve
+    from swarm_logistics_env.writing import becoming
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
@@ -77,7 +78,8 @@ def watch_command(
         serve(session, port, announce=typer.echo)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)
-    save.write_text(page, encoding="utf-8")
+    with becoming(save, SetupError) as part:
+        part.write_text(page, encoding="utf-8")
     typer.echo(f"{save}: {session.run.world.state.time:g} s, {len(page) / 1e6:.2f} MB")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from gymnasium.spaces import Box, Space
@@ -84,18 +84,16 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
 
         Returns:
             Observations, rewards, terminations, truncations and infos (see `reset`) of the agents
-            that were present; empty dicts when the episode is over.
+            that were present.
 
         Raises:
             CommandError: `actions` is not a dict, or a command is missing, belongs to an unknown
                 agent, cannot be read, has the wrong shape or is not finite.
-            SetupError: there was no reset.
+            SetupError: there was no reset, or the episode is over.
         """
         agents = self.agents
         if not agents:
-            if not self.is_begun:
-                raise SetupError("step before reset: call reset(seed) first")
-            return {}, {}, {}, {}, {}
+            self.refuse_to_step()
         wanted = self.action_space(agents[0]).shape
         commands = gathered(actions, agents, self.possible_agents, wanted)
         outcome: tuple[NDArray[Any], ...]
@@ -114,6 +112,11 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
             dict(zip(agents, truncations.tolist(), strict=True)),
             self._infos(agents),
         )
+
+    def refuse_to_step(self) -> NoReturn:
+        """Raise the SetupError that says why nobody can take a step."""
+        when = "after the end of the episode" if self.is_begun else "before reset"
+        raise SetupError(f"step {when}: call reset(seed) first")
 
     def _infos(self, agents: list[str]) -> Infos:
         # Robots do not sense who failed; infos are for those who train or evaluate them.

@@ -197,7 +197,10 @@ class SwarmLogisticsEnv(DictView):
         Raises:
             CommandError: the commands have the wrong shape, cannot be read or are not finite; the
                 world has not changed then.
+            SetupError: there was no reset, or the episode is over: nobody is left in `agents`.
         """
+        if not self.agents:
+            self.refuse_to_step()
         if not isinstance(commands, np.ndarray):
             commands = as_array(commands, "commands")
         return self.outcome(self.warehouse.step(commands))

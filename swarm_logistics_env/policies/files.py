@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies.card import PolicyCard
 from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
+from swarm_logistics_env.writing import becoming
 
 SUFFIX = ".safetensors"
 CARD = "swarm_logistics_policy"  # the header's entry that holds the card
@@ -52,12 +53,8 @@ def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.
     content = save(
         {name: np.ascontiguousarray(t) for name, t in tensors.items()}, {CARD: card.to_json()}
     )
-    part = path.with_name(f"{path.name}.part")
-    try:
+    with becoming(path, PolicyError) as part:
         part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        raise PolicyError(f"cannot write the policy file {path}: {error.strerror}") from error
 
 
 def _contents(path: Path) -> tuple[PolicyCard, dict[str, NDArray[np.float32]]]:

@@ -11,6 +11,7 @@ from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
 from swarm_logistics_env.policies.files import CARD
 from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.writing import becoming
 
 # Both are old enough for the runtimes of 2022.
 OPERATORS, FORMAT = 17, 8
@@ -79,8 +80,5 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
     props = {CARD: policy.card.to_json(), DEVIATIONS: " ".join(map(str, noise.tolist()))}
     helper.set_model_props(model, props)
     checker.check_model(model)
-    path = Path(path)
-    try:
-        path.write_bytes(model.SerializeToString())
-    except OSError as error:
-        raise PolicyError(f"cannot write the ONNX file {path}: {error.strerror}") from error
+    with becoming(Path(path), PolicyError) as part:
+        part.write_bytes(model.SerializeToString())

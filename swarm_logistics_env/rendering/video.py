@@ -5,16 +5,16 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-import secrets
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.writing import becoming
 
 from .palette import film_colours
 
@@ -55,7 +55,7 @@ def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
         SetupError: as `check_film` raises it; or there are no frames, or ffmpeg fails.
     """
     check_film(path)
-    with _becoming(path) as whole:
+    with becoming(path, SetupError) as whole:
         if path.suffix.lower() == ".mp4":
             return _encode(frames, frame_rate, [*_MP4, str(whole)])
         with tempfile.TemporaryDirectory() as folder:
@@ -72,19 +72,6 @@ def _palette() -> bytes:
     colours[: len(known), :3], colours[: len(known), 3] = known, 255
     # The last colour is transparent and stands for what did not change.
     return colours.tobytes()
-
-
-@contextlib.contextmanager
-def _becoming(path: Path) -> Iterator[Path]:
-    """Give a path beside `path`, of the same kind; what is there in the end takes its place."""
-    part = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
-    try:
-        yield part
-        part.replace(path)
-    except OSError as error:
-        raise SetupError(f"{path}: cannot be written: {error.strerror}") from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> int:

@@ -199,5 +199,5 @@ def _asked(results: StudyResults, factor: Factor) -> pd.DataFrame:
 
 
 def slug(*parts: object) -> str:
-    """Return a name for files of letters, digits and hyphens."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(map(str, parts))).strip("-")
+    """Return a name for files of letters, digits and hyphens, at most 80."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(map(str, parts))).strip("-")[:80]

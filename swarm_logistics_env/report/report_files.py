@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import plain
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
+from swarm_logistics_env.writing import becoming
 
 from .answer import digest
 from .document import Document, document
@@ -58,7 +60,8 @@ def write_report(
         for figure in whole.figures():
             svg, png = images(figure.draw, figure.height)
             write_text(pictures / f"{figure.name}.svg", svg)
-            (pictures / f"{figure.name}.png").write_bytes(png)
+            with becoming(pictures / f"{figure.name}.png", StudyError) as part:
+                part.write_bytes(png)
             drawings[figure.name] = _inline_svg(figure.name, svg)
         write_text(paths[0], markdown(whole, pictures=pictures.name))
         write_text(page, html(results, whole, drawings))
@@ -73,10 +76,8 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         StudyError: the file cannot be written.
     """
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise StudyError(f"cannot write {path}: {error.strerror}") from error
+    with becoming(path, StudyError) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _inline_svg(name: str, svg: str) -> str:
@@ -115,9 +116,10 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
     """
     lines = [f"# {document.title}", ""]
     for paragraph in (*document.text, note):
-        lines += [paragraph, ""] if paragraph else []
+        lines += [_inert(paragraph), ""] if paragraph else []
     shown = digest(document.answer, WIDTH, None, most=None)
-    lines += ["## Answer", "", "```text", shown, "```", ""]
+    fence = "`" * max([3, *(len(run) + 1 for run in re.findall("`+", shown))])
+    lines += ["## Answer", "", f"{fence}text", shown, fence, ""]
     for chapter in document.chapters:
         lines += [f"## {chapter.title}", ""]
         lines += [chapter.text, ""] if chapter.text else []
@@ -128,15 +130,17 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
 
 def section_markdown(section: Section, *, level: int = 2, pictures: str | None = None) -> str:
     """Return one section, its heading of the given level."""
-    lines = [f"{'#' * level} {section.title}", ""] if section.title else []
+    lines = [f"{'#' * level} {_inert(section.title)}", ""] if section.title else []
     lines += _figures(section, pictures)
     if section.sentences:
-        lines += [f"* **{one.head}** {one.text}" for one in section.sentences] + [""]
+        lines += [f"* **{_inert(one.head)}** {_inert(one.text)}" for one in section.sentences] + [
+            ""
+        ]
     if section.columns:
         lines += [_row(section.columns), _row(["---"] * len(section.columns))]
         lines += [_row(row) for row in section.rows] + [""]
     for line in section.lines:
-        lines += [line, ""]
+        lines += [_inert(line), ""]
     return "\n".join(lines)
 
 
@@ -144,12 +148,21 @@ def _figures(section: Section, pictures: str | None) -> Iterator[str]:
     for figure in section.figures:
         if pictures is not None:
             yield from (f"![{figure.name}]({pictures}/{figure.name}.png)", "")
-        yield from (figure.caption, "")
+        yield from (_inert(figure.caption), "")
 
 
 def _row(values: Sequence[str]) -> str:
-    escaped = (value.replace("|", r"\|") for value in values)
+    escaped = (_inert(value).replace("|", r"\|") for value in values)
     return f"| {' | '.join(escaped)} |"
+
+
+def _inert(text: str) -> str:
+    """Return a text of which Markdown makes neither a tag, nor a link, nor a picture."""
+    return re.sub(r"<(?=[A-Za-z/!?])|(?<=\])(?=\()", _escape, plain(text))
+
+
+def _escape(found: re.Match[str]) -> str:
+    return "&lt;" if found[0] else "\\"
 
 
 def html(results: StudyResults, document: Document, drawings: Mapping[str, str]) -> str:

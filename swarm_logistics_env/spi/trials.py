@@ -196,7 +196,7 @@ def _events(table: Table, duration: float | None) -> list[Trial]:
 def _trial(table: Table, line: int, duration: float | None, performance: float) -> Trial:
     n_robots = table.whole(line, "n_robots", least=1)
     fault, faulty = table.text(line, "fault"), table.whole(line, "faulty", least=0) or 0
-    fault = _FAULT_NAMES.get(fault.lower(), fault)
+    fault = _FAULT_NAMES.get(fault.lower(), table.spellings[fault.casefold()])
     is_fault = fault not in (NO_FAULT, REPEATED)
     if is_fault and not faulty:
         raise table.error(line, "faulty", f"should be how many robots fail by {fault!r}, 1 or more")

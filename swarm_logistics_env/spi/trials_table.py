@@ -6,6 +6,7 @@ import csv
 import difflib
 import math
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -118,6 +119,12 @@ class Table:
         return value if math.isfinite(value) else None
 
     @cached_property
+    def spellings(self) -> dict[str, str]:
+        """Each fault in small letters to the way in which its first row has it."""
+        faults = [self.text(row, "fault") for row in range(len(self.rows))]
+        return {fault.casefold(): fault for fault in reversed(faults)}
+
+    @cached_property
     def _varying(self) -> tuple[int, ...]:
         return tuple(place for place in self.others if len({row[place] for row in self.rows}) > 1)
 
@@ -147,6 +154,13 @@ def read_table(
             f"{path} is not a CSV file in UTF-8 ({error.reason}): save it as CSV UTF-8"
         ) from error
     lines = text.splitlines()
+    for number, line in enumerate(lines, 1):
+        for sign in line.replace("\t", ""):
+            if unicodedata.category(sign) in ("Cc", "Cf"):
+                raise IndicatorError(
+                    f"{path}, line {number}: holds {sign!r}: should be plain text, without control "
+                    "signs"
+                )
     # Spreadsheets may say the delimiter in a first line such as "sep=;".
     empty = ("", "sep=;", "sep=,", "sep=")
     start = next((n for n, line in enumerate(lines) if line.strip().lower() not in empty), None)

@@ -43,6 +43,19 @@ CREATE TABLE runs (
 """
 
 
+# SQLite's codes of a write that did not fit: of the file itself, of its log, of the log's index.
+_FULL = (
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_IOERR_WRITE,
+    sqlite3.SQLITE_IOERR_SHMSIZE,
+    sqlite3.SQLITE_IOERR_SHMOPEN,
+)
+
+
+class FullDiskError(StudyError):
+    """A store that cannot be written, because there is no room on its disk."""
+
+
 class Database:
     """A connection to a store's file; every error of SQLite becomes a StudyError that names it.
 
@@ -124,7 +137,8 @@ class Database:
             application = self.number("PRAGMA application_id")
             tables = self.number("SELECT count(*) FROM sqlite_master")
         finally:
-            self._connection.execute("ROLLBACK")
+            if self._connection.in_transaction:  # a full disk has ended it already
+                self._connection.execute("ROLLBACK")
         if application != APPLICATION_ID and tables:
             raise StudyError(f"{self.path} is a database, but not the store of a study")
         if application == APPLICATION_ID and version != SCHEMA_VERSION:
@@ -171,7 +185,10 @@ class Database:
         try:
             yield
         except sqlite3.Error as error:
-            raise StudyError(f"cannot use the store {self.path}: {error}") from error
+            reason = f"cannot use the store {self.path}: {error}"
+            if getattr(error, "sqlite_errorcode", None) in _FULL:
+                raise FullDiskError(f"{reason}: there is no room on its disk") from error
+            raise StudyError(reason) from error
 
 
 def _refuse_unmerged(path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
@@ -69,7 +70,7 @@ def import_results(
         trials=tuple(replace(rows[0], times=None) for rows in conditions.values()),
     )
     specification = Specification(
-        name=file.stem,
+        name=file_name(file.stem),
         task=RECORDED.name,
         policies=tuple(dict.fromkeys(row.policy for row in trials.rows)),
         seeds=max(map(len, conditions.values())),

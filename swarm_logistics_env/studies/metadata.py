@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 from pydantic_core import to_json
 
-from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.spi.trials import Trial
 from swarm_logistics_env.tasks.task import NAMES, Task, refuse_untrusted
@@ -52,6 +54,16 @@ class StoredSpecification(BaseModel):
         if task is None:
             refuse_untrusted(self.task, place, trust_code=trust_code)
         return Specification(**{**self.model_dump(), "task": task or self.task})
+
+    def differing(self, asked: Specification, place: Path) -> list[str]:
+        """Return which fields of what is asked are not those that were declared.
+
+        How far it is played, and how it is judged, may change: `Declaration` guards these.
+        """
+        declared = self.read(place, task=asked.played)
+        free = ("name", "seeds", "first_seed", "looks", "until_clear", "margin", "reference")
+        mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
+        return [name for name in mine if name not in free and mine[name] != theirs[name]]
 
 
 class Declaration(BaseModel):
@@ -107,7 +119,7 @@ def _counted(seeds: Sequence[int]) -> str:
     return f"{count} ({seeds_in_words(seeds)})"
 
 
-class Origin(BaseModel):
+class Origin(Record):
     """The source of recorded trials.
 
     Attributes:
@@ -119,7 +131,7 @@ class Origin(BaseModel):
         trials: the first of every condition, in the file's order.
     """
 
-    model_config = ConfigDict(frozen=True)
+    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
 
     file: str
     digest: str

@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.records import Record, each_of, read_table
+from swarm_logistics_env.records import FileName, Record, each_of, file_name, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
@@ -149,7 +149,8 @@ class Specification(_Part):
     """All that a study asks: which policies, under which conditions, over how many seeds.
 
     Args:
-        name: the study's name.
+        name: the study's name, of which its directory is called: at most 80 letters, digits, -, _
+            and, within, points.
         task: the task to play: "warehouse", another name that the package knows, or the import path
             "package.module:OBJECT" of a `tasks.Task`; in Python also the object itself.
         policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
@@ -171,7 +172,7 @@ class Specification(_Part):
         StudyError: a field is unknown, or its value is not allowed; the message names each.
     """
 
-    name: str = "study"
+    name: FileName = "study"
     task: TaskSource = DEFAULT
     policies: Annotated[
         tuple[PolicySource, ...], Field(min_length=1), AfterValidator(told_apart)
@@ -282,7 +283,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
     fields = read_table(path, "study file", StudyError)
     refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
     try:
-        specification = Specification(**{"name": path.stem, **fields})
+        specification = Specification(**{"name": file_name(path.stem), **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise StudyError(f"{path}: {error}") from error
     named = [*specification.policies, *(ablation.policy for ablation in specification.ablations)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.writing import becoming
 
-from .database import Database
+from .database import Database, FullDiskError
 from .runs import Run
 
 if TYPE_CHECKING:
@@ -69,8 +71,10 @@ class Store(Database):
         path = directory / FILE_NAME
         if not path.is_file():
             raise StudyError(f"no study in {directory}: there is no file {path}")
-        may_write = os.access(path, os.W_OK) and os.access(directory, os.W_OK)
-        return cls(path, read_only=not may_write)
+        if os.access(path, os.W_OK) and os.access(directory, os.W_OK):
+            with contextlib.suppress(FullDiskError):  # which it can be read on
+                return cls(path)
+        return cls(path, read_only=True)
 
     def __enter__(self) -> Self:
         return self
@@ -266,7 +270,5 @@ def write_csv(path: Path, table: pd.DataFrame) -> None:
     Raises:
         StudyError: the file cannot be written.
     """
-    try:
-        table.to_csv(path, index=False, lineterminator="\n")
-    except OSError as error:
-        raise StudyError(f"cannot write {path}: {error.strerror or error}") from error
+    with becoming(path, StudyError) as part:
+        table.to_csv(part, index=False, lineterminator="\n")

@@ -310,6 +310,11 @@ class Study:
                 f"{self.out} holds the study {there!r}: should be another directory for the study "
                 f"{name!r}, or, if it is the same under a new name, name = {there!r}"
             )
+        if differing := noted.specification.differing(self.specification, self.out or Path()):
+            raise StudyError(
+                f"{self.out} holds the study {name!r} with another {', '.join(differing)}: should "
+                "be as it was declared (seeds may be added), or in another directory"
+            )
         return noted
 
     @contextmanager

@@ -9,7 +9,9 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
+from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
+from swarm_logistics_env.writing import becoming
 
 CURVE, SUMMARY, PICTURE = "curve.csv", "summary.json", "curve.png"
 BEST = "best.safetensors"  # the policy as it was at the best evaluation
@@ -52,12 +54,13 @@ class TrainingLog:
         the first evaluation that passed each of them (None: none did), and agent-steps per second
         of the processor for collecting and updating.
         """
-        part = directory / f"{CURVE}.part"
-        with part.open("w", encoding="utf-8", newline="") as file:
+        with (
+            becoming(directory / CURVE, TrainingError) as part,
+            part.open("w", encoding="utf-8", newline="") as file,
+        ):
             writer = csv.DictWriter(file, self.curve[0])
             writer.writeheader()
             writer.writerows(self.curve)
-        part.replace(directory / CURVE)
         done = self.curve[-1]["agent_steps"]
         summary: dict[str, Any] = {
             "best": _told(self.best),
@@ -75,9 +78,8 @@ class TrainingLog:
                 )
             },
         }
-        part = directory / f"{SUMMARY}.part"
-        part.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        part.replace(directory / SUMMARY)
+        with becoming(directory / SUMMARY, TrainingError) as part:
+            part.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
 
     def draw(self, picture: Path, title: str, seeds: int) -> None:
         """Draw P over agent-steps as a PNG, with a line for each scripted policy."""

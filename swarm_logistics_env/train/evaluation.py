@@ -17,6 +17,7 @@ from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.policies import Policy, load
 from swarm_logistics_env.policies.card import Score
+from swarm_logistics_env.records import file_name
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Arm
@@ -119,7 +120,7 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
         factors["faults"] = [{"modes": asked.modes, "robots": asked.robots}]
     study = Study(
         out=out,
-        name=f"{training.name}: scores",
+        name=file_name(f"scores-{training.name}"),
         policies=[policy],
         seeds=asked.seeds,
         scenario=training.scenario.replace(n_robots=asked.n_robots),

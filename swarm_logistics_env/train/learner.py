@@ -19,6 +19,7 @@ from stable_baselines3.common.torch_layers import create_mlp
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train.network_view import KNOWN, NetworkView
 from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.writing import becoming
 
 CHECKPOINT = "checkpoint.pt"
 ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
@@ -138,12 +139,10 @@ def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) 
         "python": random.getstate(),
         "log": log,
     }
-    part = directory / f"{CHECKPOINT}.part"
-    with part.open("wb") as file:
+    with becoming(directory / CHECKPOINT, TrainingError) as part, part.open("wb") as file:
         torch.save(state, file)
         file.flush()
         os.fsync(file.fileno())
-    part.replace(directory / CHECKPOINT)
 
 
 def read_checkpoint(directory: Path) -> dict[str, Any] | None:

@@ -12,6 +12,7 @@ from typing import Any
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.writing import becoming
 
 FILE_NAME = "training.json"
 # Fields that may change when a training goes on, because they change nothing of what was done.
@@ -61,9 +62,8 @@ def enter(directory: Path, training: Record, command: str) -> bool:
         record["sessions"].append(
             {"began": datetime.now(UTC).isoformat(timespec="seconds"), "versions": versions()}
         )
-        part = path.with_name(f"{FILE_NAME}.part")
-        part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
-        part.replace(path)
+        with becoming(path, TrainingError) as part:
+            part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise TrainingError(f"cannot write to {directory}: {error.strerror}") from error
     except KeyError as error:

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model
 from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.card import Network
-from swarm_logistics_env.records import each_of, one_of, read_table
+from swarm_logistics_env.records import FileName, each_of, one_of, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.settings import (
     Conditions,
@@ -57,7 +57,7 @@ class Training(Part):
         TrainingError: a field is unknown, or its value is not allowed.
     """
 
-    name: str = "policy"
+    name: FileName = "policy"
     about: str = ""
     scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
     start: str | None = None
@@ -75,13 +75,6 @@ class Training(Part):
     ppo: Annotated[PPOSettings, BeforeValidator(one_of(PPOSettings))] = PPOSettings()
     evaluation: Annotated[Evaluation, BeforeValidator(one_of(Evaluation))] = Evaluation()
     scores: Annotated[Scores, BeforeValidator(one_of(Scores))] = Scores()
-
-    @field_validator("name")
-    @classmethod
-    def _file_name(cls, name: str) -> str:
-        if not name or not name.replace("-", "").replace("_", "").isalnum():
-            raise ValueError("should be of letters, digits, - and _: the policy file is called so")
-        return name
 
     @field_validator("rewards")
     @classmethod

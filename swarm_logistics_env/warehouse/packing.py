@@ -84,7 +84,7 @@ def _append_words(value: tuple[Any, ...], words: list[int]) -> None:
             _append_words(part, words)
 
 
-class StructureAt(types.Type):  # type: ignore[misc]  # numba ships no types
+class StructureAt(types.Type):
     """The type that compiled code has of a structure: the address of its words.
 
     So a kernel hands a structure on as one word, and reads of it what it uses.
@@ -96,16 +96,16 @@ class StructureAt(types.Type):  # type: ignore[misc]  # numba ships no types
 
 
 @register_model(StructureAt)
-class _Address(models.PrimitiveModel):  # type: ignore[misc]
+class _Address(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: StructureAt) -> None:
-        super().__init__(manager, kind, _WORD)
+        super().__init__(manager, kind, _WORD)  # type: ignore[no-untyped-call]
 
 
 @infer_getattr
-class _Fields(AttributeTemplate):  # type: ignore[misc]
+class _Fields(AttributeTemplate):
     key = StructureAt
 
-    def generic_resolve(self, kind: StructureAt, name: str) -> types.Type | None:
+    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
         found = _places(kind.structure).get(name)
         return None if found is None else found[0]
 
@@ -117,7 +117,7 @@ def unpacked_at(typing_context: Any, structure: Any, address: types.Type) -> Any
     return found(structure, types.int64), lambda context, builder, signature, values: values[1]
 
 
-@lower_getattr_generic(StructureAt)
+@cast("Any", lower_getattr_generic)(StructureAt)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: Any, kind: StructureAt, address: Any, name: str) -> Any:
     found, before = _places(kind.structure)[name]
     if isinstance(found, StructureAt):

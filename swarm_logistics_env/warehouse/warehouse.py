@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
+from swarm_logistics_env.errors import CommandError, FaultError, ScenarioError, SetupError
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
@@ -51,7 +51,7 @@ class Warehouse:
     """
 
     def __init__(self, scenario: Scenario | None = None) -> None:
-        self.scenario = scenario or Scenario()
+        self.scenario = _scenario(scenario, Scenario())
         self.state = WarehouseState(self.scenario)
         self.faults: tuple[Fault, ...] = ()
         self._occurrences: list[Occurrence] = []
@@ -72,11 +72,11 @@ class Warehouse:
             scenario: from now on, instead of the one before.
 
         Raises:
-            FaultError: a fault names robots that are not there.
-            ScenarioError: items or robots found no room.
+            FaultError: `faults` are none, or a fault names robots that are not there.
+            ScenarioError: it is none, or items or robots found no room.
         """
-        scenario = scenario or self.scenario
-        occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in faults]
+        scenario = _scenario(scenario, self.scenario)
+        occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in _faults(faults)]
         state = WarehouseState(scenario)
         self._lay_out(state, scenario, seed)
         self.scenario, self.state, self._seed = scenario, state, seed
@@ -182,7 +182,7 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         seed, n = self._begun("set_faults"), self.state.n_robots
-        occurrences = [Occurrence(fault, seed, n) for fault in faults]
+        occurrences = [Occurrence(fault, seed, n) for fault in _faults(faults)]
         self.faults, self._occurrences = tuple(faults), occurrences
         self._apply_faults()
         self._remember()
@@ -248,13 +248,11 @@ class Warehouse:
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
         self._begun("step")
         try:
-            if np.iscomplexobj(commands):
-                raise CommandError("commands should be numbers: real ones, not complex")
-            given = np.array(commands, dtype=np.float64)
-        except CommandError:
-            raise
+            given = np.asarray(commands)
         except (TypeError, ValueError) as error:
             raise CommandError(f"commands should be an array of numbers: {error}") from None
+        if given.dtype.kind not in "fiub":  # NumPy makes numbers of texts and times, too
+            raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
         n, n_columns = self._command_shape
         plain = len(COMMAND_COLUMNS)
         if given.shape == (n, plain):
@@ -388,3 +386,15 @@ class Warehouse:
         self._words[:] = words
         self._address: int = self._words.ctypes.data
         self._physics.begin(self._words)
+
+
+def _scenario(given: Scenario | None, otherwise: Scenario) -> Scenario:
+    if not isinstance(given, Scenario | None):
+        raise ScenarioError(f"scenario = {given!r}: should be a Scenario")
+    return otherwise if given is None else given
+
+
+def _faults(given: Sequence[Fault]) -> Sequence[Fault]:
+    if not isinstance(given, Sequence) or not all(isinstance(each, Fault) for each in given):
+        raise FaultError(f"faults = {given!r}: should be a list of Fault")
+    return given

@@ -67,7 +67,7 @@ class FixedAgents(Wrapper):
 
         Raises:
             CommandError: wrong shape, not readable or not finite; nothing has happened then.
-            SetupError: there was no reset.
+            SetupError: there was no reset, or the episode is over.
         """
         given = as_array(commands, "commands")
         wanted = (self.n_rows, *self.action_space("robot_0").shape)

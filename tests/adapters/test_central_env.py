@@ -223,7 +223,10 @@ def test_stable_baselines3_learns_from_flat_without_a_warning() -> None:
     env = CentralEnv(n_robots=2, flat=True, **SMALL)
     check_for_sb3(env)
     model = sb3.PPO("MlpPolicy", env, n_steps=32, batch_size=32, n_epochs=1, seed=0)
+    before = [part.detach().clone() for part in model.policy.parameters()]
     assert model.learn(64).num_timesteps == 64
+    after = model.policy.parameters()
+    assert all(not bool((old == new).all()) for old, new in zip(before, after, strict=True))
 
 
 def test_np_random_seed_plays_an_episode_again() -> None:

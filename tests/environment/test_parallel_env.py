@@ -330,6 +330,32 @@ def test_a_step_before_the_reset_is_refused() -> None:
             step()
 
 
+ENDS: dict[str, dict[str, Any]] = {
+    "time": {"max_cycles": 2},
+    "everything delivered": {"scenario": REACHABLE},
+    "nobody left": {"faults": [Fault("removed", (0, 1), onset=0.1)]},
+}
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_a_step_after_the_end_is_refused_and_moves_nothing(end: str) -> None:
+    env = parallel_env(
+        **{"n_robots": 2, **ENDS[end]} if end != "everything delivered" else ENDS[end]
+    )
+    env.reset(seed=0)
+    while env.agents:
+        env.step(east(env))
+    before, time = env.state(), env.warehouse.state.time
+    for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
+        with pytest.raises(SetupError, match=r"step after the end of the episode: call reset"):
+            step()
+    assert env.warehouse.state.time == time
+    np.testing.assert_array_equal(env.state(), before)
+    assert env.state_space.contains(env.state())
+    assert len(env.reset(seed=1)[0]) == 2
+    env.step(east(env))
+
+
 def test_unknown_options_are_ignored_with_a_warning() -> None:
     env = parallel_env(n_robots=2)
     with pytest.warns(UserWarning, match="reset option 'fault' is ignored; did you mean 'faults'"):
@@ -403,7 +429,6 @@ def test_everybody_terminates_when_everything_is_delivered() -> None:
     assert not any(truncated.values())
     assert total == 1.0
     assert infos["robot_1"]["delivered"] == 1
-    assert env.step({}) == ({}, {}, {}, {}, {})
 
 
 def test_with_restock_nobody_terminates() -> None:

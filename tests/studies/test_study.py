@@ -23,6 +23,7 @@ from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.indicator_table import INDICATORS
+from swarm_logistics_env.studies.metadata import Declaration, rows_of
 from swarm_logistics_env.studies.performance_table import PERFORMANCE
 from swarm_logistics_env.studies.runs import Run, Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store, export
@@ -252,6 +253,34 @@ def test_another_study_does_not_enter_the_directory_of_this_one(tmp_path: Path) 
         other.run()
     assert Study.stored(tmp_path).specification.name == "first"
     assert Study.stored(tmp_path).report()[0].read_bytes() == report
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("policies", ["random-walk"]),
+        ("faults", [{"modes": ["FM4"], "robots": [1]}]),
+        ("sizes", [{"values": [2, 5]}]),
+        ("scenario", {**SMALL["scenario"], "n_robots": 5}),
+        ("indicators", ["S"]),
+    ],
+)
+def test_a_study_of_the_same_name_that_asks_something_else_is_refused(
+    field: str, value: Any, tmp_path: Path
+) -> None:
+    fields = {**SMALL, "parameters": [], "ablations": [], "seeds": 1}
+    declared = Study(out=tmp_path, **fields).specification
+    with Store(tmp_path / FILE_NAME) as store:
+        covers = Declaration.model_validate(declared)
+        store.note(rows_of(declared, declared.played.code(), {}, covers))
+        notes = store.notes()
+    other = Study(out=tmp_path, **{**fields, field: value})
+    for ask in (other.run, other.exploratory_because):
+        with pytest.raises(StudyError, match=f"with another {field}: should be as it was declared"):
+            ask()
+    with Store.existing(tmp_path) as store:
+        assert store.notes() == notes
+        assert len(store) == 0
 
 
 def test_stored_study_is_judged_without_its_policies(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import os
 import subprocess
@@ -114,6 +115,49 @@ def test_a_disk_that_is_full_keeps_what_is_finished_and_the_study_goes_on(
     assert done.returncode == 0, done.stderr
     assert f"{N_RUNS - kept} runs played" in done.stdout
     assert digest(out) == undisturbed
+
+
+def test_a_full_disk_leaves_a_finished_study_readable(tmp_path: Path) -> None:
+    file, out = tmp_path / "mine.toml", tmp_path / "out"
+    file.write_text(FILE)
+    Study.from_file(file, out=out, seeds=2).run()
+    store = (out / FILE_NAME).read_bytes()
+    told = command("study", "report", str(out), limit=0)
+    assert "2 paired seeds" in told.stdout  # the answer, though no file of it can be written
+    said = complaint(told)
+    assert str(out) in said
+    assert os.strerror(errno.EFBIG) in said
+    exported = command("study", "export", str(out), "--to", str(tmp_path / "x.csv"), limit=0)
+    assert str(tmp_path / "x.csv") in complaint(exported)
+    more = ("study", "run", str(file), "--out", str(out), "--processes", "1")
+    assert "no room" in complaint(command(*more, limit=0))
+    assert (out / FILE_NAME).read_bytes() == store
+    assert not list(tmp_path.glob("*.csv")) + list(tmp_path.glob(".*"))
+    assert command("study", "report", str(out)).returncode == 0
+
+
+def test_what_cannot_be_written_whole_leaves_the_older_file(tmp_path: Path) -> None:
+    page = tmp_path / "run.html"
+    page.write_text("older")
+    watch = ("watch", "--save", str(page), "--until", "1", "--set", "n_robots=3")
+    assert str(page) in complaint(command(*watch, limit=5000))
+    assert page.read_text() == "older"
+    assert list(tmp_path.iterdir()) == [page]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no /dev/full")
+@pytest.mark.parametrize("arguments", [("policies",), ("scenario", "--json"), ("--help",)])
+def test_an_output_that_is_full_ends_in_one_line(arguments: tuple[str, ...]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()", *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert os.strerror(errno.ENOSPC) in complaint(done)
+    assert len(done.stderr.splitlines()) == 1
 
 
 @contextmanager

@@ -9,7 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
-from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.errors import (
+    CommandError,
+    FaultError,
+    ScenarioError,
+    SetupError,
+    SwarmLogisticsError,
+)
 from swarm_logistics_env.observations import bounds, n_columns, unflatten
 from swarm_logistics_env.warehouse import WarehouseState, stepping
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
@@ -278,12 +284,38 @@ def test_what_needs_an_episode_is_refused_before_the_first_reset(
 
 
 @pytest.mark.parametrize(
+    ("make", "error", "complaint"),
+    [
+        (lambda world: world.reset(0, None), FaultError, "faults = None: should be a list of"),
+        (lambda world: world.reset(0, ["FM1"]), FaultError, "should be a list of Fault"),
+        (lambda world: world.reset(0, (), {}), ScenarioError, "scenario = {}: should be a Scen"),
+        (lambda world: world.set_faults(None), FaultError, "faults = None"),
+        (lambda world: type(world)(dict), ScenarioError, "scenario = <class 'dict'>: should be"),
+        (lambda world: type(world)({}), ScenarioError, "scenario = {}: should be a Scenario"),
+    ],
+)
+def test_what_is_no_scenario_fault_or_seed_is_refused(
+    make: Callable[[Any], object], error: type[Exception], complaint: str
+) -> None:
+    world = Warehouse(Scenario(n_robots=2))
+    first = world.reset(0)
+    with pytest.raises(error, match=complaint):
+        make(world)
+    np.testing.assert_array_equal(world.observe(), first)
+
+
+@pytest.mark.parametrize(
     ("commands", "complaint"),
     [
         (np.zeros((3, 4)), r"\(3, 4\): should be \(2, 4\)"),
         (np.zeros((2, 3)), r"\(2, 3\): should be \(2, 4\)"),
         (np.zeros(8), r"\(8,\): should be \(2, 4\)"),
         ([["a"] * 4] * 2, "numbers"),
+        ([["1"] * 4] * 2, "numbers: real ones, not <U1"),
+        (np.ones((2, 4), "m8[s]"), "numbers: real ones, not timedelta64"),
+        (np.ones((2, 4), "M8[s]"), "numbers: real ones, not datetime64"),
+        (np.full((2, 4), "1", dtype=object), "numbers: real ones, not object"),
+        (np.ones((2, 4), complex), "numbers: real ones, not complex128"),
         ([[0, 0, 0, 0], [0, 0]], "numbers"),
         (np.array([[0, 0, 0, 0], [0, np.nan, 0, 0]]), r"\[1, 1\] = nan: should be finite"),
         (np.array([[0, 0, 0, -np.inf], [0, 0, 0, 0]]), r"\[0, 3\] = -inf: should be finite"),

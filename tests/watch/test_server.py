@@ -8,6 +8,7 @@ import json
 import random
 import socket
 import stat
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -167,6 +168,23 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
     assert answered > 50
     assert ask(served, f"/{served.server.token}/")[0] == 200
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_page_that_closes_in_mid_send_is_no_error(
+    served: Served, caplog: pytest.LogCaptureFixture
+) -> None:
+    request = (
+        f"GET /{served.server.token}/live HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    for _ in range(50):
+        with socket.create_connection(("127.0.0.1", served.server.port)) as page:
+            # Closed at once, without waiting for what is on its way.
+            page.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            page.sendall(request.encode())
+    assert messages(served, [], 1)
+    assert [record.getMessage() for record in caplog.records if record.exc_info] == []
 
 
 def test_time_passes_only_while_a_page_is_open(served: Served) -> None:

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from pettingzoo.utils.conversions import parallel_to_aec
 
+from swarm_logistics_env.errors import SetupError
+
 STACKS = [
     "plain", "faults", "sizes", "changes", "changes(sizes(faults))", "faults(sizes(changes))",
     "fixed(changes(sizes(faults)))",
@@ -31,6 +33,18 @@ def test_parallel_api_after_the_cut(conformance: ModuleType, make: Make, stack: 
     conformance.parallel_api_test(env, num_cycles=20)
     assert env.unwrapped.max_cycles == 20
     assert env.warehouse.state.step == 20
+
+
+@each_stack
+def test_a_step_after_the_end_is_refused(make: Make, stack: str) -> None:
+    env = make(stack, max_cycles=1)
+    env.reset(seed=0)
+    env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+    n_rows, columns = env.n_rows, env.action_space("robot_0").shape[0]
+    with pytest.raises(SetupError, match="after the end of the episode: call reset"):
+        env.step({})
+    with pytest.raises(SetupError, match="after the end of the episode: call reset"):
+        env.step_arrays(np.zeros((n_rows, columns)))
 
 
 @each_size

@@ -282,7 +282,8 @@ def test_credit_goes_to_the_robots_involved(credit: Any) -> None:
 
 
 def test_who_carried_the_item_before_shares_the_credit() -> None:
-    env = IndicatorReward(busy(n_robots=2), "P", references=33.0, credit="carriers")
+    world = busy(n_robots=2, duration=100.0)
+    env = IndicatorReward(world, "P", references=33.0, credit="carriers")
     env.reset(seed=0)
     state = env.unwrapped.warehouse.state
     hold, stay = np.array([0, 0, 0, 1.0]), np.zeros(4)

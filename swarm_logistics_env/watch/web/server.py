@@ -190,10 +190,11 @@ class WatchServer:
 
 
 def _is_own_error(record: logging.LogRecord) -> bool:
-    """Return whether an error is ours: requests that are no HTTP are answered and not shown."""
+    """Return whether an error is ours: no request that is no HTTP, no page that was closed."""
     from aiohttp.http_exceptions import HttpProcessingError
 
-    return not (record.exc_info and isinstance(record.exc_info[1], HttpProcessingError))
+    others = HttpProcessingError | ConnectionError
+    return not (record.exc_info and isinstance(record.exc_info[1], others))
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:

@@ -1,0 +1,272 @@
+"""Names from files of others: no path of theirs is written, no sign of theirs steers a screen."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import itertools
+import json
+import re
+from collections.abc import Mapping
+from html.parser import HTMLParser
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import file_name, steers
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.importing import import_results
+from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.tasks.recorded_trials import RecordedFault, RecordedScenario
+from swarm_logistics_env.tasks.task import Outcome
+
+# A label of 300 signs leaves a drawing no room for its axes.
+pytestmark = pytest.mark.filterwarnings("ignore:constrained_layout:UserWarning")
+
+SIGNS = ["", "\x1b]0;owned\x07", "\x1b[2J", "\x9b31m", "\x00", "\n# A heading\n", "\r", "\x7f",
+         "\u202e", "\u2028", "\ufeff", "\t"]  # fmt: skip
+WORDS = ["../../victim", "/tmp/victim", "..\\victim", "..", ".hidden", "con", "a/b", "~/victim",
+         "<script>alert(1)</script>", "<img src=x onerror=alert(1)>", "</script><script>alert(1)",
+         "![x](http://x.test/y.png)", "[x](javascript:alert(1))", "{{ 7 * 7 }}", "$\\frac$",
+         "[bold red]x[/]"]  # fmt: skip
+ALONE = [
+    "é" * 40,
+    "x" * 300,
+    "x" * 80,
+    "`" * 5,
+    "|",
+    "\\",
+    "a|b",
+    "-rf",
+    "%s%n",
+    "0",
+    "\ud800",
+    "]",
+]
+NAMES = sorted({sign + word for sign, word in itertools.product(SIGNS, WORDS)} | set(ALONE))
+# No lone surrogate can stand in a file of UTF-8.
+WRITTEN = [
+    name for name in NAMES if name.isascii() or name.encode(errors="ignore").decode() == name
+]
+
+
+class Still:
+    """A policy of the fake task."""
+
+    identity = "still"
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin."""
+
+    def act(self, observations: Any) -> Any:
+        """Return nothing to do."""
+        return np.zeros((len(observations), 4))
+
+
+class FakeTask:
+    """A task without a world: P is the number of robots that work."""
+
+    name = "fake"
+    removed: str | None = "removed"
+    performance = "the number of robots that work"
+    default = RecordedScenario(n_robots=4, duration=1.0)
+    policies: ClassVar[Mapping[str, Any]] = MappingProxyType({"still": Still})
+    fields: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    failure_modes: ClassVar[Mapping[str, str]] = MappingProxyType({"removed": "", "jam": ""})
+
+    def code(self) -> str:
+        """Return the version."""
+        return "1"
+
+    def vary(self, base: RecordedScenario, fields: Mapping[str, Any]) -> RecordedScenario:
+        """Return `base` with some fields changed."""
+        return base.replace(**fields)
+
+    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> RecordedFault:
+        """Return the fault."""
+        return RecordedFault(mode=mode, robots=robots, onset=onset)
+
+    def play(self, policy: Any, condition: Any, seed: int, policy_seed: int) -> Outcome:
+        """Return how many robots work."""
+        failed = sum(fault.robots for fault in condition.faults)
+        return Outcome("", untimed=condition.scenario.n_robots - failed + 0.1 * seed, digest="d")
+
+
+class Tags(HTMLParser):
+    """Collects what a page executes or loads."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note tags that load, and attributes that execute."""
+        self.found += [tag] if tag in ("img", "iframe", "object") else []
+        self.found += [name for name, _ in attrs if name.startswith("on")]
+
+
+def check_report(out: Path) -> None:
+    page = (out / "report.html").read_text(encoding="utf-8")
+    tags = Tags()
+    tags.feed(page)
+    assert tags.found == []
+    assert "<script>alert" not in page
+    report = (out / "report.md").read_text(encoding="utf-8")
+    # A page shows what is fenced as it is.
+    outside = re.sub(r"^(`{3,})text\n.*?^\1$", "", report, flags=re.DOTALL | re.MULTILINE)
+    assert "## Answer\n\n\n" in outside
+    for active in ("<script", "<img", "](javascript", "](http", "\n# A heading"):
+        assert active not in outside
+    assert not steers(report.replace("\n", ""))
+
+
+def paths_under(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
+
+
+def test_there_are_about_two_hundred() -> None:
+    assert len(NAMES) >= 200
+
+
+@pytest.mark.parametrize("field", ["name", "task"])
+def test_a_study_file_is_refused_before_anything_is_played(
+    field: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    here = tmp_path / "a" / "b"
+    here.mkdir(parents=True)
+    monkeypatch.chdir(here)
+    file = Path("evil.toml")
+    for name in WRITTEN:
+        if field == "name" and name in ("x" * 80, "con", "-rf", "0"):
+            continue  # these are good names
+        file.write_text(f"{field} = {json.dumps(name)}\n[[sizes]]\nvalues = [2, 3]\n")
+        assert app.run(["study", "run", "evil.toml", "--processes", "1"]) == 2, name
+        said = capsys.readouterr()
+        assert field in said.err
+        assert not steers((said.out + said.err).replace("\n", "")), name
+        assert paths_under(tmp_path) == {"a", "a/b", "a/b/evil.toml"}, name
+
+
+def test_names_of_files_stay_one_part_of_a_path() -> None:
+    for name in NAMES:
+        made = file_name(name)
+        assert Specification(name=made).name == made
+        assert Path(made).name == made
+        try:
+            kept = Specification(name=name).name
+        except StudyError:
+            continue
+        assert Path(kept).name == kept
+
+
+def accepted(names: list[str]) -> list[str]:
+    kept = []
+    for name in names:
+        try:
+            Study(task=FakeTask(), policies=[{"name": "still", "label": name}])
+        except StudyError:
+            continue
+        kept.append(name)
+    return kept
+
+
+def test_labels_are_refused_or_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    labels = accepted(NAMES)
+    assert labels == [name for name in NAMES if not steers(name)]
+    with pytest.raises(StudyError, match="label"):
+        Study(policies=[{"name": "still", "label": "\x1b[2J"}])
+    assert "x" * 300 in labels
+    assert len(labels) >= 20
+    out = tmp_path / "a" / "out"
+    study = Study(
+        out=out,
+        task=FakeTask(),
+        policies=[{"name": "still", "label": label} for label in labels],
+        seeds=3,
+        faults=[{"modes": ["jam"], "robots": [1]}],
+    )
+    study.run()
+    study.report()
+    check_report(out)
+    assert {path.split("/")[0] for path in paths_under(tmp_path)} == {"a"}
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {"out"}
+    assert not steers(capsys.readouterr().out.replace("\n", ""))
+
+
+def table(column: str, names: list[str]) -> str:
+    """Return trials in which `column` has these names, or the header has them."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    header = names if column == "header" else [column]
+    writer.writerow(["delivered", "robots", "faulty", *header, *(["fault"] * (column != "fault"))])
+    for name in names:
+        for fault in ("none", "jam"):
+            values = (
+                ["1" if fault == "none" else "2"] * len(names) if column == "header" else [name]
+            )
+            extra = [fault] if column != "fault" else []
+            if column == "fault":
+                values = ["none"] if fault == "none" else [name]
+            for trial in range(3):
+                writer.writerow([trial + 5, 8, int(fault != "none"), *values, *extra])
+        if column in ("header", "fault"):
+            break
+    if column == "fault":
+        for name in names[1:]:
+            for trial in range(3):
+                writer.writerow([trial + 4, 8, 1, name])
+    return text.getvalue()
+
+
+@pytest.mark.parametrize("column", ["policy", "table", "fault"])
+def test_cells_of_trials_are_refused_or_reported(
+    column: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = []
+    for number, name in enumerate(WRITTEN):
+        file = tmp_path / "one.csv"
+        file.write_text(table(column, [name]), encoding="utf-8", newline="")
+        try:
+            import_results(file, tmp_path / "tried" / str(number))
+        except StudyError:
+            continue
+        kept.append(name.strip())
+    kept = list(dict.fromkeys(kept))
+    assert len(kept) >= 20
+    file, out = tmp_path / "all.csv", tmp_path / "out"
+    file.write_text(table(column, kept), encoding="utf-8", newline="")
+    capsys.readouterr()
+    assert app.run(["judge", str(file), "--out", str(out), "--full"]) == 0
+    assert not steers(capsys.readouterr().out.replace("\n", ""))
+    check_report(out)
+    assert {path.name for path in tmp_path.iterdir()} == {"one.csv", "all.csv", "tried", "out"}
+
+
+def test_headers_of_trials_are_refused_or_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.csv"
+    for number, name in enumerate(WRITTEN):
+        text = io.StringIO()
+        rows: list[list[Any]] = [
+            ["delivered", name],
+            *([value, 1 + value % 2] for value in range(5, 13)),
+        ]
+        csv.writer(text).writerows(rows)
+        file.write_text(text.getvalue(), encoding="utf-8", newline="")
+        out = tmp_path / "tried" / str(number)
+        if number % 40 == 0:
+            done = app.run(["judge", str(file), "--out", str(out)])
+            assert done == (0 if out.exists() else 2)
+            if done == 0:
+                check_report(out)
+        with contextlib.suppress(StudyError):
+            import_results(file, tmp_path / "again" / str(number))
+        said = capsys.readouterr()
+        assert not steers((said.out + said.err).replace("\n", ""))
