@@ -26,7 +26,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "streams": {"errors"},
     "progress_bar": set(),
-    "kernels": {"errors"},
+    "kernels": {"errors", "progress_bar"},
     "records": {"errors"},
     "writing": {"errors"},
     "scenario": {"errors", "records", "streams"},
@@ -44,7 +44,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
-    "studies": {"errors", "records", "writing", "streams", "spi", "tasks"},
+    "studies": {"errors", "records", "writing", "streams", "kernels", "spi", "tasks"},
     "report": {"errors", "records", "writing", "fault_text", "spi", "tasks", "studies"},
     "fault_analysis": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS
