@@ -80,7 +80,8 @@ def main() -> None:
     for name, count in (counts or {}).items():
         console.print(f"{name}: {count:,.0f} instructions a control step")
     if given.out:
-        start_up = {"import": package, "import_of_needed": needed, "first_step": first_step, **compiling}
+        start_up = {"import": package, "import_of_needed": needed, "first_step": first_step}
+        start_up |= compiling
         save(
             given.out,
             as_json(

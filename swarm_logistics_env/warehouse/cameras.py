@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import inlined_kernel
 
 from .logistics import is_remembered
 from .radio import ITEM_SEEN, ROBOT_SEEN, is_missed

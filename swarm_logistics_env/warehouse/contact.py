@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import inlined_kernel
 
 from .rangers import Pose
 from .structs import World
