@@ -1,0 +1,1 @@
+"""Faults that meet: what they leave, by a slow reference in plain Python."""
