@@ -70,7 +70,7 @@ def run_tests(copy: Path, tests: Sequence[str], *, interpreted: bool, limit: flo
     failed = [line for line in said.splitlines() if line.startswith(("FAILED ", "ERROR "))]
     if running.returncode not in (1, 2, 3) and not failed:
         raise RuntimeError(f"pytest {' '.join(tests)} ended with {running.returncode}\n{said}")
-    return failed[0].split(" ")[1] if failed else "pytest itself"
+    return failed[0].partition(" ")[2].split(" - ")[0] if failed else "pytest itself"
 
 
 def caught_by(mutant: Mutant, copy: Path) -> str:
@@ -86,11 +86,13 @@ def caught_by(mutant: Mutant, copy: Path) -> str:
         os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
 
 
-def failing(copy: Path, mutants: Sequence[Mutant], *, interpreted: bool) -> str:
-    """Return a test of these mutants that fails without any of them; empty: none does."""
-    chosen = [mutant for mutant in mutants if mutant.interpreted is interpreted]
-    tests = sorted({test for mutant in chosen for test in mutant.tests})
-    return run_tests(copy, tests, interpreted=interpreted, limit=1800.0) if tests else ""
+def guilty(copy: Path, caught: Sequence[tuple[Mutant, str]]) -> str:
+    """Return one of the tests that caught mutants if it fails without any; empty: none does."""
+    for mode in (False, True):
+        tests = {test for mutant, test in caught if mutant.interpreted is mode and "::" in test}
+        if tests and (test := run_tests(copy, sorted(tests), interpreted=mode, limit=1800.0)):
+            return test
+    return ""
 
 
 def main(words: Sequence[str]) -> int:
@@ -101,39 +103,35 @@ def main(words: Sequence[str]) -> int:
         if not words or any(word in f"{mutant.room} {mutant.file} {mutant.name}" for word in words)
     ]
     start, copies = time.monotonic(), fresh_copies()
-    with ThreadPoolExecutor(WORKERS) as pool:
-        jobs = [
-            pool.submit(failing, copy, chosen, interpreted=mode)
-            for mode, copy in zip((False, True), copies)
-        ]
-        if broken := [test for job in jobs if (test := job.result())]:
-            print(f"fails without any mutant: {', '.join(broken)}")
-            return 2
-        free: SimpleQueue[Path] = SimpleQueue()
-        for copy in copies:
+    free: SimpleQueue[Path] = SimpleQueue()
+    for copy in copies:
+        free.put(copy)
+
+    def made(mutant: Mutant) -> str:
+        copy, began = free.get(), time.monotonic()
+        try:
+            test = caught_by(mutant, copy)
+        finally:
             free.put(copy)
+        print(
+            f"{time.monotonic() - began:4.0f} s  {mutant.room}: {mutant.name}: "
+            f"{test or 'SURVIVES'}",
+            flush=True,
+        )
+        return test
 
-        def made(mutant: Mutant) -> tuple[Mutant, str, float]:
-            copy, began = free.get(), time.monotonic()
-            try:
-                return mutant, caught_by(mutant, copy), time.monotonic() - began
-            finally:
-                free.put(copy)
-
-        caught: Counter[str] = Counter()
-        survivors = []
-        for mutant, test, seconds in pool.map(made, chosen):
-            caught[mutant.room] += bool(test)
-            if not test:
-                survivors.append(mutant)
-            print(
-                f"{seconds:4.0f} s  {mutant.room}: {mutant.name}: {test or 'SURVIVES'}", flush=True
-            )
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = list(zip(chosen, pool.map(made, chosen)))
+    survivors = [mutant for mutant, test in found if not test]
+    rooms = Counter(mutant.room for mutant in survivors)
     for room, count in Counter(mutant.room for mutant in chosen).items():
-        print(f"{room}: {caught[room]} of {count} caught")
+        print(f"{room}: {count - rooms[room]} of {count} caught")
     print(f"{len(survivors)} of {len(chosen)} survive, {(time.monotonic() - start) / 60:.0f} min")
     for mutant in survivors:
         print(f"SURVIVES {mutant.name}: {mutant.survives or 'should be caught'}")
+    if test := guilty(copies[0], [one for one in found if one[1]]):
+        print(f"{test} fails without any mutant, so it catches none")
+        return 2
     return int(any(not mutant.survives for mutant in survivors))
 
 
