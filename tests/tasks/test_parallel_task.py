@@ -96,9 +96,9 @@ def test_whole_rewards_are_events_with_times(file: Path) -> None:
 def test_what_the_team_shares_counts_once(shared: bool, wanted: float) -> None:
     told = {"a": 2.0, "b": 2.0, "c": 2.0}
     infos = {agent: {"done": value} for agent, value in told.items()}
-    assert SumOfRewards(shared)(None, told, {}) == wanted  # type: ignore[arg-type]
-    assert SumOfInfos("done", shared)(None, {}, {**infos, "d": {}}) == wanted  # type: ignore[arg-type]
-    assert SumOfRewards(shared)(None, {}, {}) == 0.0  # type: ignore[arg-type]
+    assert SumOfRewards(shared)(None, told, {}) == wanted
+    assert SumOfInfos("done", shared)(None, {}, {**infos, "d": {}}) == wanted
+    assert SumOfRewards(shared)(None, {}, {}) == 0.0
 
 
 def test_an_event_is_at_the_end_of_its_step() -> None:

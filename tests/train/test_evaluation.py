@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
-from swarm_logistics_env import Fault, Scenario, policies
+from swarm_logistics_env import Fault, Scenario, policies, run_episode
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.studies.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
@@ -42,11 +42,10 @@ def test_an_episode_follows_from_its_seed_alone(threads: int) -> None:
 
 def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
     seeds = set()
-    play = evaluation.run_episode
 
     def noted(scenario: Scenario, policy: Any, seed: int, faults: Any) -> Any:
         seeds.add(seed)
-        return play(scenario.replace(duration=0.5), policy, seed, faults)
+        return run_episode(scenario.replace(duration=0.5), policy, seed, faults)
 
     monkeypatch.setattr(evaluation, "run_episode", noted)
     asked = Evaluation(seeds=3, n_robots=6, faults={"FM1": 1})

@@ -47,6 +47,7 @@ def run_tests(copy: Path, tests: Sequence[str], *, interpreted: bool, limit: flo
         "NUMBA_CACHE_DIR": str(COPIES / "numba"),
         "PYTHONPATH": str(copy),
         "PYTHONDONTWRITEBYTECODE": "1",
+        "HYPOTHESIS_PROFILE": "mutants",
     }
     plugin: list[str] = []
     if interpreted:
