@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import os
 import signal
 import subprocess
 import sys
@@ -192,9 +194,18 @@ def test_workers_end_with_a_parent_that_is_killed() -> None:
         "        print(len({pool.submit(os.getpid).result() for _ in range(20)}), flush=True)\n"
         "        os.kill(os.getpid(), signal.SIGKILL)\n"
     )
-    killed = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
-    # Its workers write there as well, so that there is an end to it only once they have ended.
-    said, _ = killed.communicate(timeout=60)
+    killed = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        # Its workers write there as well, so that it ends only once they have ended.
+        said, _ = killed.communicate(timeout=30)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(killed.pid, signal.SIGKILL)
     assert int(said) >= 1
     assert killed.returncode == -signal.SIGKILL
 
