@@ -168,6 +168,17 @@ def assert_told(world: Warehouse, told: list[float]) -> None:
     assert world.state.robot_told.tolist() == pytest.approx(told, nan_ok=True)
 
 
+@pytest.mark.parametrize("first", sorted(FAILURE_MODES))
+def test_any_two_modes_add_up(first: str) -> None:
+    scenario = Scenario(
+        n_robots=3, n_items=3, warehouse_width=2.5, warehouse_height=1.6, delivery_width=1.2,
+        duration=STEPS * 0.1, restock=True, pickup_range=0.6, message_size=1, timer_limit=5.0,
+    )  # fmt: skip
+    for number, second in enumerate(sorted(FAILURE_MODES)):
+        planned = (Planned(first, 2, 4), Planned(second, 2, 10))
+        play(Case(number, scenario, planned, None, {"delivery": 1.0}, "nothing"), STEPS)
+
+
 @given(case=cases())
 @settings(max_examples=EXAMPLES, report_multiple_bugs=False)
 def test_faults_that_meet_leave_pay_and_end_as_the_reference_says(case: Case) -> None:
