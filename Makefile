@@ -32,7 +32,7 @@ help:
 	@echo "make check           lint and types only"
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
 	@echo "make combined-faults  2,000 small worlds whose faults meet, against a slow reference"
-	@echo "make mutants         faults made on purpose in all rooms, and the test that catches each"
+	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"

@@ -296,6 +296,17 @@ def test_a_worn_motor_slows_down_linearly_until_the_end(build: Build, factor: fl
     assert world.state.max_turn_rate[0] == pytest.approx(6.0 * left)
 
 
+@pytest.mark.parametrize(("failed", "held_up"), [((), 0), ((0,), 1), ((0, 1), 0), ((1, 2), 1)])
+def test_sound_robots_that_touch_failed_ones_are_held_up(
+    build: Build, failed: tuple[int, ...], held_up: int
+) -> None:
+    places = [(2.0, 5.0), (2.255, 5.0), (8.0, 1.0)]
+    world = build(places, [FAR], [Fault("FM1", failed)] if failed else [])
+    for _ in range(10):
+        world.step([STAY] * 3)
+    assert world.state.anchoring_seconds == pytest.approx(held_up * 1.0)
+
+
 def test_faults_of_one_robot_add_up() -> None:
     world = Warehouse(SMALL)
     world.reset(0, [Fault("FM2", (3,)), Fault("motor_slow", (3,)), Fault("motor_slow", (3, 4))])
