@@ -230,6 +230,13 @@ def test_ten_differences_are_skewed_beyond_twice_the_standard_error_of_g(
     assert spi.robustness(p_o, p_f, n=25, m=1).flags == flags
 
 
+@pytest.mark.parametrize(("n", "flags"), [(60, ("skewed",)), (200, ())])
+def test_many_seeds_make_up_for_skewness(n: int, flags: tuple[str, ...]) -> None:
+    # g of exponential differences is nearly 2, far beyond chance; 25 g^2 is about 90.
+    waits = -np.log((np.arange(n) + 0.5) / n)
+    assert spi.robustness(np.full(n, 40.0), 40.0 - waits, n=25, m=1).flags == flags
+
+
 counts = st.lists(st.integers(0, 60), min_size=2, max_size=8)
 
 

@@ -42,6 +42,14 @@ def test_planned_seeds_reach_80_percent_and_one_fewer_does_not(effect: float) ->
         assert share_supported(PILOT, effect, n - 1) < 0.81
 
 
+def test_equivalence_is_planned_for_both_of_its_tests() -> None:
+    p_o = np.full(10, 40.0)
+    asked = spi.equivalence(p_o, p_o + np.array([3, -2, 1, 4, -5, 2, 0, -3, 1, -1]))
+    # Both reject with .8 at least where each does with .9.
+    each = [spi.seeds_for_power(test, 0.0, power=0.9) for test in (asked.above, asked.below)]
+    assert each[0] == each[1] == spi.seeds_for_equivalence(asked, power=0.8)
+
+
 def test_minimum_detectable_effect_is_found_in_80_percent() -> None:
     effect = spi.minimum_detectable_effect(PILOT)
     assert effect is not None
