@@ -13,6 +13,7 @@ from .power import (
     lower_decile_of_power,
     minimum_detectable_effect,
     no_plan_because,
+    seeds_against_stalls,
     seeds_for_equivalence,
     seeds_for_power,
 )
@@ -21,6 +22,7 @@ from .scaling import ScalingFit, compare_scaling, fit_scaling
 from .self_repair import SelfRepair, repair_times, self_repair
 from .sequential import Spending, look_alphas
 from .simulation import Simulation, mean_with_simulation
+from .stalls import share_stalled
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -75,8 +77,10 @@ __all__ = [
     "resilience_index",
     "robustness",
     "scalability",
+    "seeds_against_stalls",
     "seeds_for_equivalence",
     "seeds_for_power",
     "self_repair",
+    "share_stalled",
     "worst_decile",
 ]

@@ -159,6 +159,7 @@ def combined_ratio(
         degrees_of_freedom=float(df),
         degenerate=degenerate,
         unbounded=unbounded & ~degenerate,
+        p_seen=p_value,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -108,6 +109,34 @@ def test_a_gate_is_as_strict_as_the_look_at_which_the_study_is_judged() -> None:
     for gate in ("R < 0", "change < 0"):
         found = [a.estimate for a in answers(Gate.parse(gate), results(WORSE), looked)]
         assert {one.confidence for one in found if one} == {looked.confidence}
+
+
+def capped(found: StudyResults, m: int, seed: int) -> StudyResults:
+    """Return the same study with every item delivered in one run at m faulty robots of ten."""
+    changed = dict(found.outcomes)
+    for run in found.plan.runs():
+        modes = [fault.mode for fault in run.condition.faults]
+        size = run.condition.scenario.n_robots
+        if (size, modes, run.seed) == (10, ["FM1"] * m, seed):
+            changed[run.key] = replace(changed[run.key], all_delivered=True)
+    return judge(found.plan, changed)
+
+
+def test_a_capped_p_fails_a_change_gate_only_where_a_larger_p_would_too() -> None:
+    well, worse = results(WELL), results(WORSE)
+    assert fails("change < -0.1 at FM1", well, worse)
+    # The true P of the new study may be as large as that of the old one.
+    assert not fails("change < -0.1 at FM1", well, capped(worse, 1, seed=2))
+    # A larger P of the old one only makes the fall larger.
+    assert fails("change < -0.1 at FM1", capped(well, 1, seed=2), worse)
+    assert fails("change > 0.1 at FM1", worse, well)
+    assert not fails("change > 0.1 at FM1", capped(worse, 1, seed=2), well)
+
+
+def test_a_cap_counts_in_the_seeds_that_are_compared() -> None:
+    more = capped(results(WORSE, seeds=8), 1, seed=7)
+    assert fails("change < -0.1 at FM1", results(WELL), more)
+    assert not fails("change < -0.1 at FM1", results(WELL, seeds=8), more)
 
 
 def test_every_shared_condition_is_compared_once() -> None:
