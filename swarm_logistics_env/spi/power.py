@@ -12,7 +12,7 @@ from .bootstrap import MIN_SEEDS
 from .equivalence import Equivalence
 from .estimate import Estimate
 from .inputs import IndicatorError, Numbers, between_0_and_1, count, finite
-from .stalls import critical_with_hidden
+from .stalls import MARGIN, critical_with_hidden
 
 MAX_SEEDS = 1_000_000
 # A pilot's own spread is as often too small as too large, and power falls faster on the one side
@@ -115,15 +115,15 @@ def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int |
 def seeds_against_stalls(estimate: Estimate) -> int | None:
     """Seeds below which no verdict can be had at the value found: too many stalls may be hidden.
 
-    So many seeds of which none stalls leave (1 - confidence)/2 for a share that would move the
-    value to the threshold. None where the verdict is not withheld for hidden stalls.
+    So many seeds of which none stalls leave too little chance for a share that would move the value
+    to the threshold. None where the verdict is not withheld for hidden stalls.
     """
     if "hidden_stalls" not in estimate.flags:
         return None
     distance = (estimate.value - estimate.threshold) * estimate.mean_denominator
-    share = abs(distance) / estimate.at_stake[distance < 0.0]
+    share = min(abs(distance) / estimate.at_stake[distance < 0.0], 0.5)
     error = (1.0 - estimate.confidence) / 2
-    fewest = math.log(error) / math.log1p(-share)
+    fewest = math.log(error / MARGIN) / math.log1p(-share)
     return max(math.floor(fewest), estimate.n_seeds) + 1
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .bootstrap import MIN_SEEDS, critical_value, resampled_pivots, upper_p
 from .inputs import Numbers
@@ -45,7 +45,7 @@ def paired_ratio(
     offset: float = 0.0,
     threshold: float = 0.0,
     confidence: float = 0.95,
-    at_stake: tuple[ArrayLike, ArrayLike] = (0.0, 0.0),
+    at_stake: tuple[Numbers | float, Numbers | float] = (0.0, 0.0),
 ) -> RatioTest:
     """Interval and test of theta over paired seeds, for one study or many at once.
 
@@ -84,11 +84,11 @@ def paired_ratio(
         mirrored = -pivots[::-1]
 
         def larger_p(statistic: Numbers, pivots: Numbers) -> Numbers:
-            return np.maximum(stdtr(df, -statistic), upper_p(pivots, statistic))
+            return np.asarray(np.maximum(stdtr(df, -statistic), upper_p(pivots, statistic)))
 
         above, below = larger_p(statistic, pivots), larger_p(-statistic, mirrored)
         hidden_above, hidden_below = above, below
-        if np.any(at_stake):
+        if any(np.any(items) for items in at_stake):
             taken, added = (np.asarray(items) / standard_error for items in at_stake)
             hidden_above = p_with_hidden(lambda x: larger_p(x, pivots), statistic, taken, n)
             hidden_below = p_with_hidden(lambda x: larger_p(x, mirrored), -statistic, added, n)

@@ -2,14 +2,13 @@
 
 A policy that stalls in 5 % of its runs shows none in 36 % of studies of 20 seeds. Their mean is
 then too high and their spread too small for any test to notice. So p has to hold for every share s
-that may be hidden: it is at least (1 - s)^n p(s), the chance that n runs show no stall, times the p
-of the test if the share had lowered the mean. Where a run did stall, the spread tells, and the test
-keeps its level by itself.
+up to 10 %: it is at least 1.25 (1 - s)^n p(s), where (1 - s)^n is the chance that n runs show no
+stall, and p(s) the p of the test if the share had lowered the mean. Where a run did stall, the
+spread tells, and the test keeps its level by itself.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -21,8 +20,12 @@ from .inputs import Numbers, performance
 # least of 2,000 Poisson counts of mean 30 is about 13). Counts that stop at random, as under FM4,
 # have 17 % of their runs there: they did stall, and their spread tells it.
 SHARE_OF_MEDIAN = 0.25
-# Chances that no run shows a share, from 1 down to less than the smallest p of the bootstrap.
-_UNSEEN = np.exp(-np.arange(0.0, 9.6, 0.2))
+# Of larger shares 10, 20 and 30 runs show nothing in at most 35, 12 and 4 % of studies. To guard
+# against them too would take the verdict from a clear loss of a fifth at ten seeds.
+LARGEST_SHARE = 0.1
+# Studies that show fewer stalls than their share err a little too, which the chance that they show
+# none makes room for: all of them together stay below 6 % a side at 3, 5 and 10 % of stalls.
+MARGIN = 1.25
 
 
 def share_stalled(p: ArrayLike) -> float:
@@ -71,9 +74,8 @@ def p_with_hidden(
         n: Runs of which none stalled.
     """
     worst = np.zeros(())
-    for unseen in _UNSEEN:
-        share = -math.expm1(math.log(unseen) / n)
-        worst = np.maximum(worst, unseen * p_above(statistic - share * loss))
+    for share, chance in zip(*_hidden(n), strict=True):
+        worst = np.maximum(worst, chance * p_above(statistic - share * loss))
     return worst
 
 
@@ -87,9 +89,15 @@ def critical_with_hidden(
         error: One-sided, in (0, 0.5).
         loss, n: As in `p_with_hidden`.
     """
-    unseen = _UNSEEN[error < _UNSEEN]
-    shares = -np.expm1(np.log(unseen) / n)
-    return float((quantile(error / unseen) + shares * loss).max())
+    shares, chances = _hidden(n)
+    likely = chances > error
+    return float((quantile(error / chances[likely]) + shares[likely] * loss).max())
+
+
+def _hidden(n: int) -> tuple[Numbers, Numbers]:
+    """Shares from 0 up and the chances that n runs hide them, to the bootstrap's smallest p."""
+    shares = np.linspace(0.0, min(LARGEST_SHARE, 9.4 / n), 48)
+    return shares, np.minimum(1.0, MARGIN * (1.0 - shares) ** n)
 
 
 def _stalled(p: Numbers) -> NDArray[np.bool_]:
