@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypedDict
 
@@ -214,21 +214,13 @@ def judge(
     if n_seeds == 1 and simulation is None:
         return replace(untested, flags=("single_seed",))
     weights = {name: term.weight(threshold - offset) for name, term in weighted.items()}
-    stakes = (0.0, 0.0)
-    if paired:
-        found = at_stake([(weights[name], term.sample) for name, term in weighted.items()])
-        stakes = float(found[0]), float(found[1])
+    taken, added = at_stake([(weights[name], term.sample) for name, term in weighted.items()])
+    stakes = (float(taken), float(added)) if paired else (0.0, 0.0)
     test, flags, skewness = _tested(untested, weighted, offset, stakes, simulation)
     p_value, probability = float(test.p_value), float(test.probability)
-    # The true P of one that is capped is larger, and moves D by the sign of its weight.
-    side = 1.0 if test.probability > 0.5 else -1.0
-    if n_seeds < LEAST_SEEDS:
-        flags.append("too_few_seeds")
-    if test.degenerate:
-        flags.append("degenerate")
-    if any(weights[name] * side < 0.0 for name in saturated):
-        flags.append("capped")
-    if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
+    blocks = _blocks(untested, test, [weights[name] for name in saturated])
+    flags += blocks
+    if blocks:
         p_value, probability = 1.0, 0.5
     elif not paired or n_seeds < MIN_SEEDS or simulation is not None:
         flags.append("assumes_normal")
@@ -252,6 +244,19 @@ def judge(
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flags),
     )
+
+
+def _blocks(asked: Estimate, test: RatioTest, capped: Sequence[float]) -> list[str]:
+    """Return what leaves no verdict at all; `capped`: weights in D of the P that are capped."""
+    flags = []
+    if asked.n_seeds < LEAST_SEEDS:
+        flags.append("too_few_seeds")
+    if test.degenerate:
+        flags.append("degenerate")
+    # The true P of one that is capped is larger, and moves D by the sign of its weight.
+    if any(weight * (float(test.value) - asked.threshold) < 0.0 for weight in capped):
+        flags.append("capped")
+    return flags
 
 
 def _tested(
