@@ -144,6 +144,34 @@ def test_a_capped_p_is_never_called_equivalent() -> None:
     assert said(judge(same.plan, outcomes)) == {"inconclusive"}
 
 
+def capped(found: StudyResults, m: int, seed: int) -> StudyResults:
+    """Return the same study with every item delivered in one run at m faulty robots of ten."""
+    changed = dict(found.outcomes)
+    for run in found.plan.runs():
+        modes = [fault.mode for fault in run.condition.faults]
+        size = run.condition.scenario.n_robots
+        if (size, modes, run.seed) == (10, ["FM1"] * m, seed):
+            changed[run.key] = replace(changed[run.key], all_delivered=True)
+    return judge(found.plan, changed)
+
+
+def test_a_capped_p_fails_a_change_gate_only_where_a_larger_p_would_too() -> None:
+    well, worse = results(WELL), results(WORSE)
+    assert fails("change < -0.1 at FM1", well, worse)
+    # The true P of the new study may be as large as that of the old one.
+    assert not fails("change < -0.1 at FM1", well, capped(worse, 1, seed=2))
+    # A larger P of the old one only makes the fall larger.
+    assert fails("change < -0.1 at FM1", capped(well, 1, seed=2), worse)
+    assert fails("change > 0.1 at FM1", worse, well)
+    assert not fails("change > 0.1 at FM1", capped(worse, 1, seed=2), well)
+
+
+def test_a_cap_counts_in_the_seeds_that_are_compared() -> None:
+    more = capped(results(WORSE, seeds=8), 1, seed=7)
+    assert fails("change < -0.1 at FM1", results(WELL), more)
+    assert not fails("change < -0.1 at FM1", results(WELL, seeds=8), more)
+
+
 def test_every_shared_condition_is_compared_once() -> None:
     names = [a.name for a in answers(Gate.parse("change < 0"), results(WELL), results(WELL))]
     assert len(names) == 4

@@ -233,4 +233,6 @@ def test_shards_and_missing_looks_are_refused() -> None:
 def test_wrong_verdicts_over_all_looks_are_bounded(model: str) -> None:
     most = 0.08 if model == "geometric" else 0.055
     # 1,500 studies tell 0.05 to 0.011; `python -m verification.verdict_errors` plays 10,000.
-    assert 0.02 < wrong_verdicts(model, looks_up_to(100), studies=1_500).share < most
+    assert wrong_verdicts(model, looks_up_to(100), studies=1_500).share < most
+    seen = wrong_verdicts(model, looks_up_to(100), studies=1_500, only_seen=True).share
+    assert 0.02 < seen < most
