@@ -230,11 +230,12 @@ def test_ten_differences_are_skewed_beyond_twice_the_standard_error_of_g(
     assert ("skewed" in spi.robustness(p_o, p_f, n=25, m=1).flags) == skewed
 
 
-@pytest.mark.parametrize(("n", "flags"), [(60, ("skewed",)), (200, ())])
-def test_many_seeds_make_up_for_skewness(n: int, flags: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(("n", "skewed"), [(60, True), (200, False)])
+def test_many_seeds_make_up_for_skewness(n: int, skewed: bool) -> None:
     # g of exponential differences is nearly 2, far beyond chance; 25 g^2 is about 90.
     waits = -np.log((np.arange(n) + 0.5) / n)
-    assert spi.robustness(np.full(n, 40.0), 40.0 - waits, n=25, m=1).flags == flags
+    found = spi.robustness(np.full(n, 40.0), 40.0 - waits, n=25, m=1)
+    assert ("skewed" in found.flags) == skewed
 
 
 counts = st.lists(st.integers(0, 60), min_size=2, max_size=8)
