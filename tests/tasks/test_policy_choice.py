@@ -108,13 +108,13 @@ def test_specification_survives_json_and_its_store(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("policy", "words"),
     [
-        ({"nam": "swarm-dt"}, "PolicyChoice has no field 'nam'; did you mean 'name'?"),
-        ({"parameters": {"taxis_gain": 1}}, "PolicyChoice.name"),
+        ({"nam": "swarm-dt"}, "PolicySpec has no field 'nam'; did you mean 'name'?"),
+        ({"parameters": {"taxis_gain": 1}}, "PolicySpec.name"),
         ({"name": "swarm-dt", "parameters": {"taxis_gian": 1.0}}, "did you mean 'taxis_gain'?"),
         ({"name": "swarm-dt", "parameters": {"taxis_gain": "x"}}, "taxis_gain = 'x'"),
         ({"name": "swarm-dt", "parameters": {"trust_code": True}}, "'trust_code' is no parameter"),
         ({"name": "swarm-dt", "parameters": {"name": "x"}}, "'name' is no parameter"),
-        ({"name": "swarm-dt", "parameters": 3}, "PolicyChoice.parameters = 3"),
+        ({"name": "swarm-dt", "parameters": 3}, "PolicySpec.parameters = 3"),
         ({"name": "swarm-td", "parameters": {"taxis_gain": 1.0}}, "did you mean 'swarm-dt'?"),
         (3, "a table of name and parameters"),
     ],
