@@ -231,11 +231,11 @@ def files_of(recipe: str, **names: str) -> set[str]:
 def test_a_policy(copy: Copy) -> None:
     copy.write("policies/circles.py", POLICY)
     copy.insert(
-        "policies/loading.py",
+        "policies/spec.py",
         "from swarm_logistics_env.policies.homing",
         "from swarm_logistics_env.policies.circles import Circles",
     )
-    copy.insert("policies/loading.py", '    "homing": ', '    "circles": Circles,')
+    copy.insert("policies/spec.py", '    "homing": ', '    "circles": Circles,')
     assert "with circles, seed 0" in copy.command("run", "--policy", "circles")
     assert copy.changed == files_of("A policy", NAME="circles")
     script = "from swarm_logistics_env import policies as p; print(p.identity(p.load('swarm-dt')))"

@@ -10,8 +10,8 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 
+from .application import TrustPolicyOption
 from .judge_policy import judge_policy, names_policy
-from .options import TrustPolicyOption
 from .study_commands import (
     FullOption,
     PolicyOption,

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from swarm_logistics_env.adapters.buffers import Buffers
+from swarm_logistics_env.adapters.worlds import Buffers
 
 
 def test_memory_is_used_again_only_when_nobody_holds_it() -> None:

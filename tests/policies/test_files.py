@@ -165,7 +165,7 @@ def test_a_model_of_stable_baselines3_asks_to_be_trusted(tmp_path: Path) -> None
 
 
 def test_shipped_policies_are_small() -> None:
-    from swarm_logistics_env.policies.loading import WEIGHTS
+    from swarm_logistics_env.policies.spec import WEIGHTS
 
     sizes = {path.name: path.stat().st_size for path in WEIGHTS.glob("*.safetensors")}
     assert all(size < 1_000_000 for size in sizes.values()), sizes

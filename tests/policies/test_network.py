@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from swarm_logistics_env.policies.network import FeedForward, hyperbolic_tangent
+from swarm_logistics_env.policies.learned import FeedForward, hyperbolic_tangent
 
 WIDTHS = (20, 16, 9, 4)
 

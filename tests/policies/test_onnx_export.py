@@ -15,9 +15,8 @@ from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame, memory
 from swarm_logistics_env.policies import PolicyCard
-from swarm_logistics_env.policies.files import CARD
+from swarm_logistics_env.policies.files import CARD, DEVIATIONS, write_onnx
 from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy, explore
-from swarm_logistics_env.policies.onnx_export import DEVIATIONS, write_onnx
 from swarm_logistics_env.streams import row_keys
 
 PAGE = Path(__file__).parents[2] / "docs" / "onnx.md"

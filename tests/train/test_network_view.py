@@ -13,8 +13,7 @@ import torch
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.motion.memory import HELD
-from swarm_logistics_env.train.learner import make_learner
-from swarm_logistics_env.train.network_view import KNOWN, read_known
+from swarm_logistics_env.train.learner import KNOWN, make_learner, read_known
 from swarm_logistics_env.train.trainer import _new_view
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.warehouse.state import CARRIED

@@ -14,7 +14,7 @@ from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.settings import Conditions
-from swarm_logistics_env.train.training_worlds import (
+from swarm_logistics_env.train.training import (
     EpisodeMix,
     follow_progress,
     make_worlds,

@@ -9,7 +9,7 @@ import zlib
 from typing import Any
 
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web.recording import Recording
+from swarm_logistics_env.watch.messages import Recording
 from tests.watch.conftest import SMALL
 
 

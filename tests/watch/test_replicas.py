@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from swarm_logistics_env import Fault, policies, run_episode, spi
-from swarm_logistics_env.watch.replicas import indicators
+from swarm_logistics_env.watch.server import indicators
 from tests.watch.conftest import SMALL
 
 

@@ -18,8 +18,7 @@ import pytest
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web import WatchServer
-from swarm_logistics_env.watch.web.server import kept_token
+from swarm_logistics_env.watch.server import WatchServer, kept_token
 from tests.watch.conftest import SMALL, Served
 
 

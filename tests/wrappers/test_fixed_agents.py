@@ -18,7 +18,7 @@ from swarm_logistics_env.wrappers import (
     FixedAgents,
     IndicatorReward,
     SwarmSize,
-    fixed_agents,
+    swarm_size,
 )
 
 REACHABLE: dict[str, Any] = {"n_items": 1, "pickup_range": 14.0, "duration": 60.0}
@@ -134,6 +134,6 @@ def test_the_kit_checks_it() -> None:
 
 
 def test_the_example_runs() -> None:
-    ran = doctest.testmod(fixed_agents)
+    ran = doctest.testmod(swarm_size)
     assert ran.attempted
     assert not ran.failed

@@ -23,11 +23,9 @@ from swarm_logistics_env.wrappers import (
     ParameterChange,
     RunningMeans,
     SwarmSize,
+    indicator_payments,
     indicator_reward,
-    reference_performances,
-)
-from swarm_logistics_env.wrappers import (
-    condition as condition_module,
+    wrapper,
 )
 
 N = 4
@@ -438,7 +436,7 @@ def test_pettingzoos_own_tests_pass(conformance: ModuleType, make: Callable[...,
     conformance.api_test(parallel_to_aec(rewarded()), num_cycles=25)
 
 
-@pytest.mark.parametrize("module", [condition_module, indicator_reward, reference_performances])
+@pytest.mark.parametrize("module", [wrapper, indicator_reward, indicator_payments])
 def test_the_examples_run(module: ModuleType) -> None:
     ran = doctest.testmod(module)
     assert ran.attempted

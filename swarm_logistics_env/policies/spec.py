@@ -1,4 +1,4 @@
-"""Policies by name."""
+"""Policies by text: what a text stands for, its label, its identity, whether it is trusted."""
 
 from __future__ import annotations
 
@@ -10,17 +10,23 @@ import re
 from collections.abc import Callable, Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+
+from pydantic import Field, JsonValue, field_validator
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
-from swarm_logistics_env.policies.files import SUFFIX, read_card, read_policy
+from swarm_logistics_env.policies.files import (
+    SB3_SUFFIX,
+    SUFFIX,
+    StableBaselinesPolicy,
+    read_card,
+    read_policy,
+)
 from swarm_logistics_env.policies.homing import Homing
-from swarm_logistics_env.policies.mixed import Mixed
-from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
-from swarm_logistics_env.policies.sb3_policy import StableBaselinesPolicy
+from swarm_logistics_env.policies.policy import Mixed, Policy, identity
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.records import Record, canonical_json
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
 SUFFIXES = (SUFFIX, SB3_SUFFIX)  # of policy files
@@ -86,6 +92,54 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     return policy
 
 
+class PolicySpec(Record):
+    """A policy by its text: what it is called, what names its behaviour, whether it runs code.
+
+    Args:
+        name: the text, for `load`.
+        parameters: handed to the policy; whatever TOML and JSON both hold.
+        label: how a report calls it; empty: made from name and parameters.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+
+    name: str
+    parameters: dict[str, JsonValue] = Field(default_factory=dict)
+    label: str = ""
+
+    @field_validator("parameters")
+    @classmethod
+    def _policys_own(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
+        # These are `load`'s: whether to trust code is not for a file to say.
+        for name in ("name", "trust_code"):
+            if name in parameters:
+                raise ValueError(f"{name!r} is no parameter of a policy")
+        return parameters
+
+    @property
+    def title(self) -> str:
+        """What people call it: its label, or its name with the parameters given."""
+        given = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
+        return self.label or called(self.name) + (f" ({given})" if given else "")
+
+    @property
+    def runs_code(self) -> bool:
+        """Whether to load it runs code that its name leads to, so that somebody has to trust it."""
+        return ":" in self.name or self.name.endswith(SB3_SUFFIX)
+
+    def load(self, *, trust_code: bool = False) -> Policy:
+        """Return the policy; see the function `load`."""
+        return load(self.name, trust_code=trust_code, **self.parameters)
+
+    def identity_of(self, policy: Policy) -> str:
+        """Return text that changes whenever the behaviour of `policy`, made of this, may have."""
+        found = identity(policy)
+        if not self.parameters:
+            return found
+        # A class of one's own need not tell its parameters.
+        return canonical_json({"given": self.parameters, "policy": found})
+
+
 class KnownPolicy(NamedTuple):
     """A policy that `load` knows by name: how it decides, and a sentence about it."""
 
@@ -139,7 +193,12 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
     if path.suffix == SUFFIX:
         return functools.partial(read_policy, path)
     if path.suffix == SB3_SUFFIX:
-        return functools.partial(StableBaselinesPolicy, path, trust_code=trust_code)
+        if not trust_code:
+            raise PolicyError(
+                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
+                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
+            )
+        return functools.partial(StableBaselinesPolicy, path)
     if path.is_file() and path.suffix != ".py":
         raise PolicyError(f"{name} is no policy file: should end in {' or '.join(SUFFIXES)}")
     return None

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, policies, run_episode
+from swarm_logistics_env.attack import STORE, Attack, attack, random_search, search
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.fault_analysis.attack import STORE, Attack, attack
-from swarm_logistics_env.fault_analysis.fault_search import random_search, search
 from swarm_logistics_env.studies.engines import serial
 from swarm_logistics_env.studies.store import Store
 
