@@ -20,7 +20,7 @@ TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist absolute-links format clean
+.PHONY: help paper tables test check soak combined-faults mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -28,7 +28,8 @@ help:
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make check           lint and types only"
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
-	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
+	@echo "make combined-faults  2,000 small worlds whose faults meet, against a slow reference"
+	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"
@@ -62,6 +63,9 @@ check: $(DEV)/installed
 
 soak: $(DEV)/installed
 	$(DEV)/bin/python -m verification.soak --minutes $(MINUTES)
+
+combined-faults: $(DEV)/installed
+	HYPOTHESIS_PROFILE=nightly $(DEV)/bin/python -m pytest tests/verification/test_combined_faults.py
 
 mutants: $(DEV)/installed
 	$(DEV)/bin/python -m verification.mutants

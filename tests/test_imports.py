@@ -26,7 +26,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "streams": {"errors"},
     "progress_bar": set(),
-    "kernels": {"errors"},
+    "kernels": {"errors", "progress_bar"},
     "records": {"errors"},
     "scenario": {"errors", "records", "streams"},
     "observations": FOUNDATION,
@@ -43,7 +43,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
-    "studies": {"errors", "records", "streams", "spi", "tasks"},
+    "studies": {"errors", "records", "streams", "kernels", "spi", "tasks"},
     "report": {"errors", "records", "fault_text", "spi", "tasks", "studies"},
     "attack": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS

@@ -43,6 +43,7 @@ PERFORMANCE: Columns = {
         "whether the published P lies in the interval of one run; None: unknown",
     ),
     "saturated": (bool, "whether a run delivered every item, so that P is capped"),
+    "stalled": (float, "share of runs with less than a quarter of the cell's median P"),
     "problem": (object, "why runs are missing; None: they are complete"),
     "arm": (object, "the setting and the condition"),
     "by_seed": (object, "P seed by seed, shape (n_seeds,)"),
@@ -154,6 +155,7 @@ def _row(
         "prediction_low": one_run.low,
         "prediction_high": one_run.high,
         "published_inside": inside,
+        "stalled": spi.share_stalled(p) if p.size else None,
         "arm": arm,
         **runs._asdict(),
     }

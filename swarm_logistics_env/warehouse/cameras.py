@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import inlined_kernel
 
 from .logistics import is_remembered
 from .radio import ITEM_SEEN, ROBOT_SEEN, is_missed
@@ -45,7 +45,7 @@ def view_square(view_range: float) -> float:
     return view_range**2 if view_range > 0.0 else -1.0
 
 
-@kernel
+@inlined_kernel
 def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> None:
     """Fill the block of items in a row from the free items nearby."""
     robots, grid, nearby = world.robots, world.item_grid, world.nearby
@@ -70,7 +70,7 @@ def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> N
         out[column + 4] = 1.0 if is_remembered(robots.memory, me, item) else 0.0
 
 
-@kernel
+@inlined_kernel
 def choose_neighbours(me: int, world: World, n_found: int) -> int:
     """List in `nearby.chosen` the robots that `me` sees or hears; returns how many."""
     robots, nearby, grid = world.robots, world.nearby, world.robot_grid
@@ -87,7 +87,7 @@ def choose_neighbours(me: int, world: World, n_found: int) -> int:
     return n_chosen
 
 
-@kernel
+@inlined_kernel
 def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
     robots, parameters = world.robots, world.parameters

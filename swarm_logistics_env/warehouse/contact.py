@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.kernels import inlined_kernel
 
 from .rangers import Pose
 from .structs import World
@@ -10,7 +10,7 @@ from .structs import World
 GAP = 0.01  # [m], gap below which two things touch
 
 
-@kernel
+@inlined_kernel
 def touches_solid(pose: Pose, world: World) -> bool:
     """Return whether a robot touches a wall or an obstacle."""
     parameters, obstacles = world.parameters, world.obstacles
@@ -25,7 +25,7 @@ def touches_solid(pose: Pose, world: World) -> bool:
     return touches
 
 
-@kernel
+@inlined_kernel
 def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
     """Return whether `me` touches a robot, and whether it is sound and touches one that failed."""
     limit = (2.0 * world.parameters.robot_radius + GAP) ** 2
@@ -39,7 +39,7 @@ def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
     return touches, is_anchored
 
 
-@kernel
+@inlined_kernel
 def touches_items(world: World, n_found: int) -> bool:
     """Return whether a laden robot touches an item that is in its way."""
     limit = (world.parameters.robot_radius + GAP + world.parameters.item_radius) ** 2

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.kernels import inlined_kernel
 
 from .rangers import Pose
 from .structs import NOBODY, Sensed, World
 
 
-@kernel
+@inlined_kernel
 def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     """Fill the end of a row: load, delivery area, timer, velocity and contact."""
     robots, parameters = world.robots, world.parameters

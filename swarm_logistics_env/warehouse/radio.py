@@ -74,7 +74,7 @@ def run_timers(world: World) -> None:
         robots.told[robot] = 0.0 if is_present and not able.honest[robot] else told
 
 
-@kernel
+@inlined_kernel
 def listen(me: int, world: World, n_found: int) -> None:
     """Note in `nearby.is_heard` which of the robots found nearby `me` hears."""
     robots, able, nearby = world.robots, world.able, world.nearby
@@ -88,7 +88,7 @@ def listen(me: int, world: World, n_found: int) -> None:
         nearby.is_heard[index] = is_heard
 
 
-@kernel
+@inlined_kernel
 def lowest_timer_heard(world: World, n_found: int) -> tuple[int, float]:
     """Return who tells the lowest timer of those nearby that are heard, or NOBODY, and it [s].
 

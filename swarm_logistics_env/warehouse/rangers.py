@@ -105,7 +105,7 @@ def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
             scan[beam] = found if found < scan[beam] else scan[beam]
 
 
-@kernel
+@inlined_kernel
 def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""
     parameters, obstacles = world.parameters, world.obstacles

@@ -84,6 +84,17 @@ def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(
     assert memory[0, known.CANNOT_LIFT] == 0.0
 
 
+def test_what_is_in_reach_after_a_delivery_was_not_held_in_vain(
+    memory: NDArray[np.float64],
+) -> None:
+    laden = sensed()
+    laden[0, [row.CARRYING, row.CARRYING_REQUESTED]] = 1.0
+    hold(memory, laden, 1)
+    known.remember(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
+    hold(memory, sensed(item_at=0.1), 2)
+    assert memory[0, known.CANNOT_LIFT] == 0.0
+
+
 def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> None:
     policy: Any = policies.load("ppo-robust")
     play = Play(Scenario(restock=True, duration=120.0), policy, 60_001, [Fault("FM2", 3)])

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import PolicyCard, identity
-from swarm_logistics_env.policies.learned import LearnedPolicy
+from swarm_logistics_env.policies.learned import LearnedPolicy, explore
+from swarm_logistics_env.streams import row_keys
 
 Tensors = dict[str, NDArray[np.float32]]
 
@@ -41,6 +42,16 @@ def test_an_episode_follows_from_its_seed(
     first = played(0)
     assert played(1) != first
     assert played(0) == first
+
+
+def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:
+    noise, deviations = np.zeros((400, 3), np.float32), np.array([0.1, 1.0, 3.0], np.float32)
+    explore(row_keys(0, "noise", 400), 5, deviations, noise)
+    np.testing.assert_allclose(noise.std(axis=0), deviations, rtol=0.15)
+    assert np.abs(np.corrcoef(noise.T) - np.eye(3)).max() < 0.2
+    later = np.zeros_like(noise)
+    explore(row_keys(0, "noise", 400), 6, deviations, later)
+    assert np.abs([np.corrcoef(a, b)[0, 1] for a, b in zip(noise.T, later.T)]).max() < 0.2
 
 
 def test_outputs_command_in_the_frame_of_motion(

@@ -12,6 +12,7 @@ import torch
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.motion.frame import INPUTS
+from swarm_logistics_env.motion.memory import HELD
 from swarm_logistics_env.train.learner import KNOWN, make_learner, read_known
 from swarm_logistics_env.train.trainer import _new_view
 from swarm_logistics_env.train.training import Training
@@ -42,6 +43,24 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
     told = dict(zip(KNOWN, known[0].tolist()))
     assert (told["is_carried"], told["carrier_delivers"]) == (1.0, 1.0)
     assert told["carrier_to_delivery"] == pytest.approx(0.1)
+
+
+def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: object) -> None:
+    training: Training = small()  # type: ignore[operator]
+    view = _new_view(training)
+    view.seed(0)
+    view.reset()
+    n_steps, commands = 0, np.ones((view.num_envs, 3), np.float32)
+    dones = np.zeros(view.num_envs, np.bool_)
+    while not dones.any():
+        view.step_async(commands)
+        _, _, dones, _ = view.step_wait()
+        n_steps += 1
+        # Decisions in this episode, and whether any command in it is remembered.
+        assert view.frame.counts.tolist() == np.where(dones, 1, n_steps + 1).tolist()
+        assert (view.frame.memory[dones, HELD] == 0.0).all()
+        assert (view.frame.memory[~dones, HELD] > 0.0).all()
+    assert n_steps > 5
 
 
 def test_the_actor_sees_nothing_of_it(small: object) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import http.client
 import json
 import random
@@ -56,7 +57,11 @@ def test_page_and_scripts_come_with_a_content_policy(served: Served) -> None:
         assert status == 200
         assert body
         assert "default-src 'none'; script-src 'self'" in headers["Content-Security-Policy"]
+        assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
         assert headers["Cache-Control"] == "no-store"
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert headers["X-Content-Type-Options"] == "nosniff"
 
 
 @pytest.mark.parametrize(
@@ -140,6 +145,40 @@ def test_order_that_cannot_be_is_refused_in_a_sentence(
     served: Served, order: str, words: str
 ) -> None:
     assert words in messages(served, [order], 10)[-1]["problem"]
+
+
+def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
+    async def talk() -> tuple[int | None, Any]:
+        address = f"{served.server.address}live"
+        async with (
+            aiohttp.ClientSession() as client,
+            client.ws_connect(address) as page,
+            client.ws_connect(address) as other,
+        ):
+            await page.send_str('{"do":"select","robot":' + " " * 5000 + "3}")
+            for _ in range(60):  # frames that are under way
+                if (await page.receive(30)).type is not aiohttp.WSMsgType.TEXT:
+                    break
+            return page.close_code, (await other.receive(30)).type
+
+    assert asyncio.run(talk()) == (aiohttp.WSCloseCode.MESSAGE_TOO_BIG, aiohttp.WSMsgType.TEXT)
+    assert served.server.session.selected is None
+
+
+def test_more_pages_than_there_may_be_are_refused(served: Served) -> None:
+    async def talk() -> list[int]:
+        async with aiohttp.ClientSession() as client, contextlib.AsyncExitStack() as pages:
+            statuses = []
+            for _ in range(20):
+                asked = client.ws_connect(f"{served.server.address}live")
+                try:
+                    await pages.enter_async_context(asked)
+                    statuses.append(101)
+                except aiohttp.WSServerHandshakeError as error:
+                    statuses.append(error.status)
+            return statuses
+
+    assert asyncio.run(talk()) == [101] * 16 + [503] * 4
 
 
 def test_malformed_requests_neither_stop_it_nor_leak_a_path(
