@@ -11,7 +11,7 @@ from swarm_logistics_env import Scenario, policies
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.walls import wall_angle
+from swarm_logistics_env.motion.memory import wall_angle
 
 REACH = 2.0
 

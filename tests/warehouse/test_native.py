@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.warehouse import native, physics
+from swarm_logistics_env.warehouse import packing, physics
 from swarm_logistics_env.warehouse.packing import hints
 from swarm_logistics_env.warehouse.structs import Functions
 
@@ -23,7 +23,7 @@ def test_integers_doubles_and_structures_arrive_in_their_order() -> None:
         noted[0], noted[1], noted[2], noted[3], noted[4], noted[5] = a, b, c, x, y, z
 
     def run(address: int, to: int) -> None:
-        native.call_at(address, (to, 1, (2, 2**62), 4.5, (5.5, -6.5)))
+        packing.call_at(address, (to, 1, (2, 2**62), 4.5, (5.5, -6.5)))
 
     # A structure of two words of a kind is passed as two arguments here.
     called = nb.cfunc(nb.void(doubles, *[nb.int64] * 3, *[nb.double] * 3))(note)
@@ -38,9 +38,9 @@ def test_a_structure_passed_by_reference_arrives(monkeypatch: pytest.MonkeyPatch
         noted[0], noted[1] = given[0], given[1]
 
     def run(address: int, to: int) -> None:
-        native.call_at(address, (to, (5.5, -6.5)))
+        packing.call_at(address, (to, (5.5, -6.5)))
 
-    monkeypatch.setattr(native, "_BY_REFERENCE", True)
+    monkeypatch.setattr(packing, "_BY_REFERENCE", True)
     called = nb.cfunc(nb.void(doubles, doubles))(note)
     seen = np.zeros(2)
     nb.njit(run)(called.address, seen.ctypes.data)
@@ -49,7 +49,7 @@ def test_a_structure_passed_by_reference_arrives(monkeypatch: pytest.MonkeyPatch
 
 def test_a_stored_int_leaves_its_neighbours_alone() -> None:
     def run(address: int) -> None:
-        native.store_at(address, 7)
+        packing.store_at(address, 7)
 
     numbers = np.array([-1, -1, -1], np.int32)
     nb.njit(run)(numbers[1:].ctypes.data)
