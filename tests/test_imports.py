@@ -26,7 +26,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "streams": {"errors"},
     "progress_bar": set(),
-    "kernels": {"errors", "progress_bar"},
+    "kernels": {"errors"},
     "records": {"errors"},
     "scenario": {"errors", "records", "streams"},
     "observations": FOUNDATION,

@@ -257,10 +257,8 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
     """Return the numbers of the robots that `fault` affects, ascending.
 
     Raises:
-        FaultError: it is no fault, of more robots than there are, or of one that is not there.
+        FaultError: it is of more robots than there are, or of one that is not there.
     """
-    if not isinstance(fault, Fault):
-        raise FaultError(f'faults hold {fault!r}: should be a list of faults, as [Fault("FM1", 2)]')
     if isinstance(fault.robots, tuple):
         if max(fault.robots) >= n_robots:  # before numpy, whose integers end at 2**63
             raise FaultError(

@@ -171,14 +171,14 @@ class StructureAt(types.Type):
 @register_model(StructureAt)
 class _Address(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: StructureAt) -> None:
-        super().__init__(manager, kind, _WORD)  # type: ignore[no-untyped-call]
+        super().__init__(manager, kind, _WORD)  # type: ignore[no-untyped-call]  # numba's
 
 
 @infer_getattr
 class _Fields(AttributeTemplate):
     key = StructureAt
 
-    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
+    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]  # not typed
         found = _places(kind.structure).get(name)
         return None if found is None else found[0]
 
@@ -190,7 +190,7 @@ def unpacked_at(typing_context: Any, structure: Any, address: types.Type) -> Any
     return found(structure, types.int64), lambda context, builder, signature, values: values[1]
 
 
-@cast("Any", lower_getattr_generic)(StructureAt)  # type: ignore[untyped-decorator]
+@cast("Any", lower_getattr_generic)(StructureAt)  # type: ignore[untyped-decorator]  # numba's
 def _field(context: Any, builder: Any, kind: StructureAt, address: Any, name: str) -> Any:
     found, before = _places(kind.structure)[name]
     if isinstance(found, StructureAt):

@@ -393,5 +393,5 @@ def _scenario(given: Scenario | None, otherwise: Scenario) -> Scenario:
 
 def _faults(given: Sequence[Fault]) -> Sequence[Fault]:
     if not isinstance(given, Sequence) or not all(isinstance(each, Fault) for each in given):
-        raise FaultError(f"faults = {given!r}: should be a list of Fault")
+        raise FaultError(f'faults = {given!r}: should be a list of Fault, as [Fault("FM1", 2)]')
     return given

@@ -98,6 +98,15 @@ def test_what_is_in_reach_after_a_delivery_was_not_held_in_vain(
     assert memory[0, known.CANNOT_LIFT] == 0.0
 
 
+def test_the_border_sets_right_how_far_it_is_home(memory: NDArray[np.float64]) -> None:
+    memory[0, known.AWAY] = 5.0  # it has reckoned wrongly
+    for way in (1.0, -1.0, 1.0):  # in, out and in again, at 1 m/s
+        rows = sensed()
+        rows[0, row.VELOCITY], rows[0, row.IN_DELIVERY_AREA] = way, way > 0.0
+        known.remember(rows, 0.1, memory)
+        assert memory[0, known.AWAY] == pytest.approx(-0.1 * way)
+
+
 def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> None:
     policy: Any = policies.load("ppo-robust")
     play = Play(Scenario(restock=True, duration=120.0), policy, 60_001, [Fault("FM2", 3)])

@@ -155,7 +155,7 @@ def test_an_unknown_format_is_refused(card: PolicyCard, tensors: Tensors, file: 
 def test_a_missing_file_and_one_of_another_kind_are_refused(tmp_path: Path) -> None:
     refused(tmp_path / "none.safetensors", "cannot read the policy file .*No such file")
     (tmp_path / "weights.pt").write_bytes(b"weights")
-    refused(tmp_path / "weights.pt", "is no policy file: should end in .safetensors, .json or .zip")
+    refused(tmp_path / "weights.pt", "is no policy file: should end in .safetensors or .zip")
 
 
 def test_a_model_of_stable_baselines3_asks_to_be_trusted(tmp_path: Path) -> None:
