@@ -17,7 +17,7 @@ from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
-from pymunk._chipmunk_cffi import ffi, lib
+from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no public name
 from pymunk.batch import BodyFields
 
 from swarm_logistics_env.errors import SetupError

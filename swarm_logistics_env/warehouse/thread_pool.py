@@ -20,7 +20,7 @@ from typing import Any, cast
 
 import numba
 import numpy as np
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
 from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
