@@ -25,7 +25,7 @@ from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_labe
 from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.roles import ROLES
+from swarm_logistics_env.warehouse.faults import ROLES
 
 # Plays pairs of a fault's place in the list and the number of its run, 0, 1, ..; returns the change
 # of performance, P_F - P_o, of each: the lower, the worse the fault.

@@ -15,7 +15,7 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import as_array
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.kinematics import first_not_finite
+from swarm_logistics_env.warehouse.logistics import first_not_finite
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers import Wrapper

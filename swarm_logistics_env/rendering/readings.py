@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.rangers import Pose, scan_disc, scan_walls
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.warehouse.surroundings import Pose, scan_disc, scan_walls
 
 from .palette import MARKS
 

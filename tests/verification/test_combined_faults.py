@@ -20,7 +20,7 @@ from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import POTENTIALS, REWARD_TERMS
 from swarm_logistics_env.warehouse import FAILURE_MODES
-from swarm_logistics_env.warehouse.roles import ROLES
+from swarm_logistics_env.warehouse.faults import ROLES
 from verification.invariants import Watch
 from verification.reference import Faults, Moment, Planned, Radio, ends, rewards
 
