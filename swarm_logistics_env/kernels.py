@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import config, event, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ _HERE = Path(__file__).parent
 # Folders of kernels, by the folder of those that call them.
 _CALLED = {"warehouse": ("warehouse",), "motion": ("motion",)}
 _all_kernels: list[Any] = []
+_parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
 _config, _events, _types = cast("tuple[Any, Any, Any]", (config, event, types))  # without types
 
 
@@ -78,10 +81,64 @@ def _compile(compiled: Any, signature: Any) -> Any:
     """Compile a kernel for a signature, or load it: with all that it calls, if Python calls it."""
     compile_it = functools.partial(type(compiled).compile, compiled, signature)
     with global_compiler_lock:
-        if _Report.current is not None or signature in compiled.overloads:
-            return compile_it()  # a part of the kernel that Python calls
+        if _Report.current is not None:
+            return compile_it() if signature in compiled.overloads else _part(compiled, compile_it)
+        if signature in _parts.get(compiled, ()):
+            _parts[compiled].remove(signature)
+            del compiled.overloads[signature]  # Python cannot call what is only a part
+        if signature in compiled.overloads:
+            return compile_it()
         with _kept_on_disk(compiled), _Report():
             return compile_it()
+
+
+def _part(compiled: Any, compile_it: Callable[[], Any]) -> Any:
+    """Compile what another kernel calls: LLVM is to optimise it there alone, not before as well."""
+    compiler, known = compiled._compiler, set(compiled.overloads)
+    compiler.pipeline_class, compiled._insert = _PartCompiler, lambda *_: None
+    try:
+        return compile_it()
+    finally:
+        compiler.pipeline_class = Compiler
+        del compiled._insert
+        _parts.setdefault(compiled, set()).update(set(compiled.overloads) - known)
+
+
+class _PartCompiler(Compiler):
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)  # type: ignore[no-untyped-call]  # numba's
+        state: Any = self.state
+        state.library = _PartLibrary(
+            state.targetctx.codegen(), state.func_id.func_qualname if state.func_id else "part"
+        )
+        state.flags.no_cpython_wrapper = True
+
+
+class _PartLibrary(JITCodeLibrary):
+    """Code that is only linked into that of others: no machine code is made of it."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        library: Any = self
+        library._finalize_dynamic_globals()
+        library._verify_declare_only_symbols()
+        library._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return that there is no machine code."""
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        """What makes machine code: nobody keeps constants of Python there, which kernels lack."""
+        return _NoEnvironments()
+
+
+class _NoEnvironments:
+    def set_env(self, *_: object) -> None:
+        pass
 
 
 @contextlib.contextmanager

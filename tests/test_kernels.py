@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import swarm_logistics_env
@@ -118,3 +119,16 @@ def test_what_is_kept_is_used_until_code_of_kernels_changes(
     (copy / file).write_text(text.replace(old, new), encoding="utf-8")
     assert (digest() != before) == changes
     kernels._digest_for.cache_clear()
+
+
+def test_a_kernel_that_another_one_called_can_be_called_from_python() -> None:
+    @kernels.kernel
+    def inner(number: float) -> float:
+        return number + 1.0
+
+    @kernels.kernel
+    def outer(number: float) -> float:
+        return 2.0 * inner(number)
+
+    assert [outer(3.0), inner(3.0), outer(4.0), inner(5.0)] == [8.0, 4.0, 10.0, 6.0]
+    assert inner(np.float32(1.0)) == 2.0  # another signature
