@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.studies.performance_table import groups_of, rows_of
+from swarm_logistics_env.studies.indicator_table import findings_of
+from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.results import StudyResults
 
 from .answer import Answer, answer
@@ -138,5 +139,5 @@ def _verdicts(results: StudyResults) -> Iterator[Section]:
     for (policy, indicator), tests in families:
         yield Section(
             f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(sentence(results, test) for test in rows_of(tests)),
+            sentences=tuple(sentence(results, test) for test in findings_of(tests)),
         )

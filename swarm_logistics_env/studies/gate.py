@@ -27,9 +27,10 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 
+from .indicator_table import findings_of
 from .judged_comparisons import estimate_of, same_runs
 from .matching import Match, match
-from .performance_table import played, rows_of
+from .performance_table import played
 from .results import StudyResults
 from .runs import seeds_in_words
 
@@ -156,7 +157,7 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
     # A comparison tested against several thresholds answers once.
     comparisons = dict.fromkeys(
         replace(test.compared, threshold=gate.number)
-        for test in rows_of(new.indicators)
+        for test in findings_of(new.indicators)
         if test.indicator == gate.subject
     )
     labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)

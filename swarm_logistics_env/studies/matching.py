@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from .performance_table import Row, rows_of
+from .performance_table import Cell, cells_of
 from .results import StudyResults
 from .runs import seeds_in_words
 
 _Content = tuple[object, ...]  # everything about a condition but its policy
-_Judged = dict[str, dict[_Content, Row]]  # keyed by the policy's label
+_Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class Match:
     """
 
     name: str
-    before: Row
-    after: Row
+    before: Cell
+    after: Cell
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _judged(results: StudyResults) -> _Judged:
         if comparison.definition.compares == "policy"
     }
     found: _Judged = {}
-    for cell in rows_of(results.performance):
+    for cell in cells_of(results.performance):
         if (cell.policy, cell.table, cell.arm) in second:
             continue
         condition = cell.arm.condition
@@ -117,7 +117,7 @@ def _judged(results: StudyResults) -> _Judged:
     return found
 
 
-def _name(policy: str, cell: Row) -> str:
+def _name(policy: str, cell: Cell) -> str:
     return f"{policy}: change, {cell.arm.setting} ({cell.table})"
 
 
@@ -135,7 +135,7 @@ def _without_partner(
 
 
 def _only_in(
-    study: str, policy: str, own: Mapping[_Content, Row], others: Mapping[_Content, Row]
+    study: str, policy: str, own: Mapping[_Content, Cell], others: Mapping[_Content, Cell]
 ) -> Iterator[str]:
     lacking = [cell for content, cell in own.items() if content not in others]
     if lacking:
