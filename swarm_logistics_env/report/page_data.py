@@ -20,8 +20,8 @@ from swarm_logistics_env.studies.indicator_table import Finding, findings_of
 from swarm_logistics_env.studies.performance_table import Cell, cells_of, groups_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.tasks.policy_choice import runs_code
-from swarm_logistics_env.tasks.replay import Recording, record_run
 from swarm_logistics_env.tasks.task import DEFAULT
+from swarm_logistics_env.tasks.warehouse_task import Recording, record_run
 
 from . import wording
 from .verdict_matrix import VerdictMatrix

@@ -101,7 +101,7 @@ def counted_as(test: Finding, verdict: str | None) -> str:
 
     A count is a headline: a verdict that assumes normal differences does not stand in it.
     """
-    if verdict in DECIDED and "assumes_normal" in (test.flags or ""):
+    if verdict in DECIDED and "assumes_normal" in test.flags:
         return _NOT_COUNTED
     return said(verdict)
 
@@ -174,9 +174,9 @@ def _parts(results: StudyResults, test: Finding) -> Iterator[str]:
         yield from _what_it_takes(test)
     if is_known(test.pairing_correlation):
         yield f"Pairing correlation {test.pairing_correlation:.2f}."
-    if "assumes_normal" in (test.flags or ""):
+    if "assumes_normal" in test.flags:
         yield "The verdict assumes normal differences."
-    if "skewed" in (test.flags or ""):
+    if "skewed" in test.flags:
         yield "Skewed: at so few seeds the verdict errs more often than its level."
     if results.plan.specification.until_clear:
         where = "Open after" if test.stopped_at is None else "Clear at"

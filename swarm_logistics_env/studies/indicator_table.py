@@ -61,10 +61,7 @@ class Finding:
         "number of seeds at which it was clear; None: open, or seeds are fixed",
     ]
     pairing_correlation: Annotated[float, "correlation of the two performances over seeds"]
-    flags: Annotated[
-        str | None,
-        "marks on the verdict, see `Estimate`, with blanks between; None: blocked",
-    ]
+    flags: Annotated[str, "marks on the verdict, see `Estimate`, with blanks between"]
     saturated: Annotated[bool, "whether it rests on a P that is capped"]
     claim: Annotated[str | None, "what is claimed, e.g. not tolerant; None: nothing"]
     published: Annotated[float, "the reference's value of the indicator"]
@@ -206,7 +203,7 @@ def _estimated(
     known = reference.estimate(comparison) if reference else None
     published = known.value if known else None
     if isinstance(estimate, str):
-        return {"published": published}
+        return {"published": published, "flags": ""}
     needed = least = None
     if published is not None:
         needed = spi.seeds_for_power(estimate, published, POWER)
