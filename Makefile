@@ -20,15 +20,17 @@ TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test check soak mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist absolute-links format clean
+.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
 	@echo "make tables          play the studies behind docs/results.md (half an hour), write its tables, the README's numbers and the score cards"
 	@echo "make test            the gate: lint, types, tests with coverage"
+	@echo "make quick           lint, types and the fastest tests, within a minute: for every commit"
 	@echo "make check           lint and types only"
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
-	@echo "make mutants         ten faults made on purpose, and the tests that catch each"
+	@echo "make combined-faults  2,000 small worlds whose faults meet, against a slow reference"
+	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
 	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"
@@ -51,6 +53,17 @@ test: check
 		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends)"
 	$(DEV)/bin/python -m coverage report --fail-under=92
 
+# For every commit, within a minute: types beside the tests of rules and statistics, kernels interpreted.
+quick: $(DEV)/installed
+	$(DEV)/bin/ruff check .
+	$(DEV)/bin/ruff format --check .
+	$(DEV)/bin/mypy & types=$$!; \
+	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -q -p verification.interpreted $(QUICK) && wait $$types
+
+QUICK := tests/warehouse/test_kinematics.py tests/studies/test_plan.py tests/verification/test_mutants.py \
+	$(addprefix tests/spi/test_,definitions.py indicators.py multiplicity.py paper_tables.py) \
+	$(addprefix tests/test_,imports.py records.py scenario.py streams.py fault_text.py size_of_functions.py)
+
 # What reaches every line of the kernels in seconds, without the compiler.
 KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py kinematics.py layout.py grid.py) \
 	$(addprefix tests/policies/test_,swarm_dt.py routes.py) tests/motion
@@ -62,6 +75,9 @@ check: $(DEV)/installed
 
 soak: $(DEV)/installed
 	$(DEV)/bin/python -m verification.soak --minutes $(MINUTES)
+
+combined-faults: $(DEV)/installed
+	HYPOTHESIS_PROFILE=nightly $(DEV)/bin/python -m pytest tests/verification/test_combined_faults.py
 
 mutants: $(DEV)/installed
 	$(DEV)/bin/python -m verification.mutants

@@ -15,7 +15,12 @@ from benchmarks.instructions import instructions_of_a_step
 from benchmarks.recording import record
 from benchmarks.results import as_json, save, show
 from benchmarks.rivals import rivals
-from benchmarks.start_up import bytes_per_robot, first_step_seconds, import_seconds
+from benchmarks.start_up import (
+    bytes_per_robot,
+    compile_seconds,
+    first_step_seconds,
+    import_seconds,
+)
 from benchmarks.timing import Contestant, in_turns
 from swarm_logistics_env import Scenario
 
@@ -60,6 +65,7 @@ def main() -> None:
 
     package, needed = import_seconds(5)
     first_step, memory = first_step_seconds(3), bytes_per_robot()
+    compiling = compile_seconds()
     counts = instructions_of_a_step()
     console.print(
         f"import swarm_logistics_env: {package:.2f} s, {package / needed:.2f} times pettingzoo, "
@@ -67,12 +73,15 @@ def main() -> None:
         f"second process, warm cache: first step after {first_step:.2f} s of wall time\n"
         f"memory: {'unknown' if memory is None else f'{memory:,.0f} bytes'} a robot at N = 10,000"
     )
+    for what, seconds in compiling.items():
+        console.print(f"{what}: {seconds:.1f} s of the processor")
     if counts is None:
         console.print("valgrind is not installed: no instructions counted")
     for name, count in (counts or {}).items():
         console.print(f"{name}: {count:,.0f} instructions a control step")
     if given.out:
         start_up = {"import": package, "import_of_needed": needed, "first_step": first_step}
+        start_up |= compiling
         save(
             given.out,
             as_json(

@@ -21,7 +21,7 @@ from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no p
 from benchmarks.recording import Recording
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.native import call_at, store_at
+from swarm_logistics_env.warehouse.packing import call_at, store_at
 
 
 def space_of(recording: Recording, iterations: int) -> pymunk.Space:

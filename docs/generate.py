@@ -10,9 +10,9 @@ import numpy as np
 from record_tables import summary, table
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
-from swarm_logistics_env.environment.central_state import ITEM_FEATURES, ROBOT_FEATURES
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
+from swarm_logistics_env.environment.spaces import ITEM_FEATURES, ROBOT_FEATURES
 from swarm_logistics_env.observations import columns, n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SOURCES
 from swarm_logistics_env.warehouse.warehouse import COMMAND_COLUMNS

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from record_tables import fields, summary
 
-from swarm_logistics_env.policies.card import Network
+from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,

@@ -16,7 +16,7 @@ from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import film_colours
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web import recorded_page
+from swarm_logistics_env.watch.messages import recorded_page
 from verification.browser import Browser
 
 MEDIA = Path(__file__).parent / "media"

@@ -10,7 +10,9 @@ import importlib.metadata
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.environment.registration import register
+import gymnasium
+import pettingzoo
+
 from swarm_logistics_env.episode import Episode, run_episode
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
@@ -45,12 +47,31 @@ __all__ = [
     "wrappers",
 ]
 
+GYMNASIUM_ID = "SwarmLogistics-v0"
+PETTINGZOO_ID = "swarm_logistics_v0"
+
 # Imported when first asked for, so that a training script does not pay for a study's machinery.
 _LAZY = frozenset(
     {"adapters", "policies", "spi", "studies", "swarm_logistics_v0", "testing", "wrappers"}
 )
 
-register()
+
+def _register() -> None:
+    """Register the names; modules are imported when an environment is made."""
+    if GYMNASIUM_ID not in gymnasium.registry:
+        gymnasium.register(GYMNASIUM_ID, "swarm_logistics_env.adapters.central_env:CentralEnv")
+    if not hasattr(pettingzoo, "register"):
+        return  # PettingZoo has a registry since 1.27
+    module = "swarm_logistics_env.swarm_logistics_v0"
+    for form, registry, maker in (
+        ("aec", pettingzoo.aec_registry, "env"),
+        ("parallel", pettingzoo.parallel_registry, "parallel_env"),
+    ):
+        if PETTINGZOO_ID.replace("_v", "-v") not in registry:
+            pettingzoo.register(form, PETTINGZOO_ID, entry_point=f"{module}:{maker}")
+
+
+_register()
 
 
 def __getattr__(name: str) -> ModuleType | str:

@@ -25,7 +25,7 @@ from numba.core import config, event, types
 from numba.core.compiler_lock import global_compiler_lock
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.progress_bar import ProgressBar
+    from rich.progress import Progress
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -141,7 +141,7 @@ class _Report(event.Listener):
     seconds, n_done = 0.0, 0  # of compiling, and kernels that are compiled, in this process
 
     def __enter__(self) -> None:
-        self._bar: ProgressBar | None = None
+        self._bar: Progress | None = None
         self._last = time.monotonic()
         _Report.current = self
         _events.register("numba:compile", self)
@@ -150,7 +150,7 @@ class _Report(event.Listener):
         _Report.current = None
         _events.unregister("numba:compile", self)
         if self._bar is not None:
-            self._bar.__exit__()
+            self._bar.stop()
 
     def on_start(self, event: Any) -> None:
         """Begin to count the time, as nothing could be loaded."""
@@ -171,12 +171,14 @@ class _Report(event.Listener):
             left = self.seconds / self.n_done * (total - self.n_done)
             sys.stderr.write(f"Compiling for this processor, once: about {left:.0f} s.\n")
         if self._bar is None and sys.stderr.isatty():
-            from swarm_logistics_env.progress_bar import ProgressBar
+            from rich.console import Console
+            from rich.progress import Progress
 
-            self._bar = ProgressBar("compiling", total, "kernels", done=self.n_done)
-            self._bar.__enter__()
+            self._bar = Progress(console=Console(stderr=True), transient=True)
+            self._task = self._bar.add_task("Compiling", total=total)
+            self._bar.start()
         if self._bar is not None:
-            self._bar.reach(self.n_done)
+            self._bar.update(self._task, completed=self.n_done)
 
 
 @functools.cache

@@ -1,4 +1,7 @@
-"""The base of every validated record: frozen, no unknown fields, errors in one sentence."""
+"""The base of every validated record, and files that are written whole or not at all.
+
+A record is frozen, has no unknown fields, and says in one sentence what is wrong.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -20,6 +24,32 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import SwarmLogisticsError, suggest
+
+
+@contextmanager
+def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path]:
+    """Give a path beside `path`, of the same ending; the file written there takes its place.
+
+    If the block fails, an older file at `path` stays as it was, and nothing is left beside it. What
+    is no plain file, as /dev/stdout, is written itself.
+
+    Raises:
+        The `error_type`: the file cannot be written; names it and the reason.
+    """
+    path = Path(path)
+    is_plain = path.is_file() or not path.exists()
+    whole = path.resolve()  # a link stays a link
+    part = whole.with_name(f".{path.stem[:80]}.part{path.suffix}") if is_plain else path
+    try:
+        yield part
+        if is_plain:
+            part.replace(whole)
+    except OSError as error:
+        raise error_type(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        if is_plain:
+            part.unlink(missing_ok=True)
+
 
 _OTHER_KIND = ("int_type", "tuple_type")
 _LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system

@@ -7,11 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
 settings.register_profile("default", max_examples=200, derandomize=True, deadline=None)
 settings.register_profile("nightly", max_examples=2000, deadline=None)
+# Only whether there is an example that fails, not the simplest: see verification.mutants.
+settings.register_profile(
+    "mutants", parent=settings.get_profile("default"), phases=(Phase.explicit, Phase.generate)
+)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
 # Beside an installed package (`make test-lowest`) there is no source tree to read.

@@ -15,7 +15,7 @@ import pytest
 PACKAGE = "swarm_logistics_env"
 ROOT = Path(__file__).parents[1]
 
-FOUNDATION = {"errors", "records", "streams", "kernels", "scenario", "writing"}
+FOUNDATION = {"errors", "records", "streams", "kernels", "scenario"}
 WORLD = FOUNDATION | {"warehouse", "observations"}
 RUNS = WORLD | {"motion", "policies", "episode"}
 ENVIRONMENT = WORLD | {"environment", "rendering", "swarm_logistics_v0"}
@@ -28,7 +28,6 @@ MAY_IMPORT: dict[str, set[str]] = {
     "progress_bar": set(),
     "kernels": {"errors"},
     "records": {"errors"},
-    "writing": {"errors"},
     "scenario": {"errors", "records", "streams"},
     "observations": FOUNDATION,
     "warehouse": FOUNDATION | {"observations"},
@@ -44,9 +43,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
-    "studies": {"errors", "records", "writing", "streams", "spi", "tasks"},
-    "report": {"errors", "records", "writing", "fault_text", "spi", "tasks", "studies"},
-    "fault_analysis": RUNS | {"spi", "tasks", "studies"},
+    "studies": {"errors", "records", "streams", "kernels", "spi", "tasks"},
+    "report": {"errors", "records", "fault_text", "spi", "tasks", "studies"},
+    "attack": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS
     | ENVIRONMENT
     | {"progress_bar", "wrappers", "adapters", "spi", "tasks", "studies"},

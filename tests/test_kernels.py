@@ -91,7 +91,7 @@ def test_compiling_tells_a_person_once_and_never_from_a_worker(
         ("warehouse/grid.py", "_FEW = 80", "_FEW = 81", True),
         ("observations.py", "N_BEAMS = 16", "N_BEAMS = 18", True),
         ("warehouse/structs.py", "    step: Annotated[", "    steps: Annotated[", True),
-        ("warehouse/radio.py", "aged = robots.heard[robot] + period", "aged = period", True),
+        ("warehouse/surroundings.py", "aged = robots.heard[robot] + period", "aged = period", True),
         ("policies/homing.py", "AVOID_GAIN", "AVOID_GAINS", False),  # no world calls it
         ("warehouse/warehouse.py", "self.n_removed += 1", "self.n_removed += 2", False),
         ("warehouse/layout.py", '"""The places', '"""Places', False),

@@ -231,11 +231,11 @@ def files_of(recipe: str, **names: str) -> set[str]:
 def test_a_policy(copy: Copy) -> None:
     copy.write("policies/circles.py", POLICY)
     copy.insert(
-        "policies/loading.py",
+        "policies/spec.py",
         "from swarm_logistics_env.policies.homing",
         "from swarm_logistics_env.policies.circles import Circles",
     )
-    copy.insert("policies/loading.py", '    "homing": ', '    "circles": Circles,')
+    copy.insert("policies/spec.py", '    "homing": ', '    "circles": Circles,')
     assert "with circles, seed 0" in copy.command("run", "--policy", "circles")
     assert copy.changed == files_of("A policy", NAME="circles")
     script = "from swarm_logistics_env import policies as p; print(p.identity(p.load('swarm-dt')))"
@@ -285,12 +285,12 @@ def test_a_scenario_parameter_that_a_kernel_reads(copy: Copy) -> None:
     copy.insert("scenario.py", "    item_radius: ", field)
     copy.insert("warehouse/structs.py", "    n_substeps: ", "    odometry_scale: float")
     copy.insert(
-        "warehouse/own_state.py",
+        "warehouse/sensing.py",
         "    limit = parameters.max_speed",
         "    forward *= parameters.odometry_scale\n    left *= parameters.odometry_scale",
     )
     copy.interpret(SCALED)
-    files = files_of("A scenario parameter", READER="warehouse/own_state")
+    files = files_of("A scenario parameter", READER="warehouse/sensing")
     assert copy.changed == files | {"warehouse/structs.py"}
     assert "`warehouse/structs.py`" in PAGE
 
@@ -301,10 +301,10 @@ def test_an_observation_column(copy: Copy) -> None:
     column = '        Column("speed", "m/s", _run(SPEED, 1), 0, speed, "without direction"),'
     copy.insert("observations.py", "        *(messages if ", column)
     line = "    out[row.SPEED] = math.hypot(out[row.VELOCITY], out[row.VELOCITY + 1])"
-    copy.insert("warehouse/own_state.py", "    out[row.CONTACT] = ", line)
+    copy.insert("warehouse/sensing.py", "    out[row.CONTACT] = ", line)
     copy.interpret(SPEEDS)
     assert "| 140 | `speed` | m/s | [0, 2] | without direction |" in copy.page()
-    assert copy.changed == files_of("An observation column", SENSE="own_state")
+    assert copy.changed == files_of("An observation column", SENSE="sensing")
 
 
 def test_an_indicator(copy: Copy) -> None:

@@ -62,7 +62,7 @@ def called() -> set[str]:
 
 def test_every_target_that_a_workflow_calls_exists() -> None:
     assert called() - TARGETS == set()
-    wanted = {"test", "paper", "docs", "soak", "mutants", "interop", "dist"}
+    wanted = {"test", "paper", "docs", "soak", "combined-faults", "mutants", "interop", "dist"}
     assert wanted | {"test-lowest", "test-newest"} <= called()
 
 

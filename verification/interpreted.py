@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env.warehouse import building, engine, stepping, thread_pool
+from swarm_logistics_env.warehouse import physics, stepping, thread_pool
 from swarm_logistics_env.warehouse.packing import field_kinds
 
 
@@ -110,9 +110,8 @@ def interpret_kernels() -> None:
     """
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise pytest.UsageError("verification.interpreted needs NUMBA_DISABLE_JIT=1")
-    for module in (building, engine):
-        vars(module).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
-    for module in (building, stepping, thread_pool):
+    vars(physics).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
+    for module in (physics, stepping, thread_pool):
         vars(module).update(unpacked_at=_unpacked_at)
     vars(thread_pool).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
     # A look takes a thousand times as long.

@@ -20,6 +20,7 @@ from scipy import stats
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.swarm_dt import SwarmDTParameters
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.streams import generator, key
@@ -29,7 +30,7 @@ from swarm_logistics_env.studies.plan import make_plan
 from swarm_logistics_env.studies.presets import PAPER, load_preset
 from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
 from swarm_logistics_env.studies.store import Store
-from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_identity, policy_label
+from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from verification.paper_model import Model, fitted
 
@@ -169,7 +170,7 @@ class Players:
                 parameters[name] = value
         # The defaults' runs have the keys that they have in the paper's study.
         own = candidate == defaults()
-        source = "swarm-dt" if own else PolicyChoice(name="swarm-dt", parameters=parameters)
+        source = "swarm-dt" if own else PolicySpec(name="swarm-dt", parameters=parameters)
         identity = policy_identity(source, WAREHOUSE.policies)
         policy = StudiedPolicy(policy_label(source), identity, source)
         scenario = known.scenario.replace(**changes)

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from swarm_logistics_env import Fault, Scenario, policies, run_episode
-from swarm_logistics_env.fault_analysis.fault_search import random_search, search
+from swarm_logistics_env.attack import random_search, search
 
 SCENARIO = Scenario(
     n_robots=6,

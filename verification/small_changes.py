@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from verification.mutants import scratch_copy
+from verification.mutants.mutation import scratch_copy
 
 CPU_SECONDS = 120  # a change that never ends is caught
 

@@ -1,7 +1,8 @@
 """How often verdicts are wrong, over simulated studies: `python -m verification.verdict_errors`.
 
 It prints the errors of studies that run until they are clear, of a family of twelve of them, and of
-equivalence at the edge of its margin, with the power at the planned seeds.
+equivalence at the edge of its margin, with the power at the planned seeds; then the same where some
+runs stall, with the errors that only the runs seen would make, and what plans from pilots hold.
 """
 
 from __future__ import annotations
@@ -15,14 +16,18 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.ratio import paired_ratio
+from swarm_logistics_env.spi.ratio import RatioTest, paired_ratio
+from swarm_logistics_env.spi.stalls import at_stake
 from swarm_logistics_env.studies.specification import looks_up_to
 from swarm_logistics_env.studies.until_clear import SPENDING
 
 STUDIES = 10_000
+STALL_STUDIES = 3_000
 P_O, P_F = 39.0, 34.0  # true means [items]
 FAMILY = 12
 EDGE = 0.1
+STALL_SHARES = (0.0, 0.03, 0.05, 0.1)
+PILOTS, PILOT_SEEDS = 40, 20
 _CHUNK = 300  # studies whose resamples fit into memory at once
 
 Floats = NDArray[Any]
@@ -49,11 +54,49 @@ def geometric(
     return rng.binomial(60, P_O / 60, shape) * 1.0, rng.geometric(1 / (1 + p_f), shape) - 1.0
 
 
-MODELS: Mapping[str, tuple[Draw, float]] = {
-    "poisson": (poisson, P_F),
-    "overdispersed": (overdispersed, P_F),
-    "geometric": (geometric, 10.0),
+def stalling(share: float) -> Draw:
+    """Return counts of a policy that learned, of which a share of the runs with faults stalls.
+
+    A stall costs some ten standard deviations of the other differences, as in the shipped networks.
+    `p_f` is the mean over all runs.
+    """
+
+    def draw(rng: np.random.Generator, shape: tuple[int, ...], p_f: float) -> tuple[Floats, Floats]:
+        near_nothing = rng.integers(0, 4, shape)
+        working = (p_f - share * 1.5) / (1.0 - share)
+        p_o, p_new = (rng.normal(mean, 20.0, shape).round() for mean in (_LEARNED_P, working))
+        return p_o, np.where(rng.random(shape) < share, near_nothing, p_new)
+
+    return draw
+
+
+class Model(NamedTuple):
+    """Counts without and with a fault, and their true means [items]."""
+
+    draw: Draw
+    p_o: float
+    p_f: float
+
+
+_LEARNED_P = 300.0
+MODELS: Mapping[str, Model] = {
+    "poisson": Model(poisson, P_O, P_F),
+    "overdispersed": Model(overdispersed, P_O, P_F),
+    "geometric": Model(geometric, P_O, 10.0),
 }
+STALLS: Mapping[str, Model] = {
+    f"{share:.0%} stall": Model(stalling(share), _LEARNED_P, 0.9 * _LEARNED_P)
+    for share in STALL_SHARES
+}
+_ALL = {**MODELS, **STALLS}
+
+
+def judged(p_o: Floats, p_new: Floats, threshold: float, confidence: float = 0.95) -> RatioTest:
+    """Return the test of the relative change of P, as studies make it."""
+    stakes = at_stake([(1.0, p_new), (-1.0 - threshold, p_o)])
+    return paired_ratio(
+        p_new - p_o, p_o, threshold=threshold, confidence=confidence, at_stake=stakes
+    )
 
 
 class Wrong(NamedTuple):
@@ -65,59 +108,92 @@ class Wrong(NamedTuple):
 
 
 def wrong_verdicts(
-    model: str, looks: Sequence[int], studies: int = STUDIES, alpha: float = 0.05
+    model: str,
+    looks: Sequence[int],
+    studies: int = STUDIES,
+    alpha: float = 0.05,
+    *,
+    only_seen: bool = False,
 ) -> Wrong:
     """Return how often a study that runs until it is clear decides, where nothing is to decide.
 
     Args:
-        model: a name in `MODELS`; the threshold is the true value.
-        looks: numbers of seeds at which it may stop.
+        model: a name in `MODELS` or `STALLS`; the threshold is the true value.
+        looks: numbers of seeds at which it may stop; one: a study of so many seeds.
         studies: number of simulated studies.
         alpha: of the comparison, over all looks.
+        only_seen: whether stalls that no run showed are left out of account.
     """
-    draw, p_f = MODELS[model]
-    truth = p_f / P_O - 1
-    p_o, p_new = draw(np.random.default_rng(len(looks)), (studies, looks[-1]), p_f)
-    difference = p_new - p_o - truth * p_o
+    draw, mean_o, mean_f = _ALL[model]
+    truth = mean_f / mean_o - 1
+    p_o, p_new = draw(np.random.default_rng(len(looks)), (studies, looks[-1]), mean_f)
     running = np.ones(studies, dtype=bool)
     above = below = 0
     for n, level in zip(looks, spi.look_alphas(looks, alpha, spending=SPENDING)):
-        seen = difference[:, :n]
-        t = seen.mean(axis=1) / (seen.std(axis=1, ddof=1) / math.sqrt(n))
-        # p is the larger of two, so the bootstrap is asked only where the t test rejects.
+        t = _t_statistic(p_o[:, :n], p_new[:, :n], truth)
+        # p is the largest of several, so that the others are asked only where the t test rejects.
         asked = np.flatnonzero(running & (2 * stdtr(n - 1, -np.abs(t)) < level))
         for some in np.split(asked, range(_CHUNK, asked.size, _CHUNK)):
-            old, new = p_o[some, :n], p_new[some, :n]
-            p_value = paired_ratio(new - old, old, threshold=truth).p_value
-            stopped = some[p_value < level]
+            test = judged(p_o[some, :n], p_new[some, :n], truth)
+            stopped = some[(test.p_seen if only_seen else test.p_value) < level]
             running[stopped] = False
             above += int((t[stopped] > 0).sum())
             below += int((t[stopped] < 0).sum())
     return Wrong((above + below) / studies, above / studies, below / studies)
 
 
-def share_equivalent(model: str, n: int, change: float, studies: int = STUDIES) -> float:
+def share_equivalent(
+    model: str, n: int, change: float, studies: int = STUDIES, *, only_seen: bool = False
+) -> float:
     """Return the share of studies of n seeds that are called equivalent, at a true change of P."""
-    draw, _ = MODELS[model]
-    p_o, p_new = draw(np.random.default_rng(n), (studies, n), P_O * (1 + change))
+    draw, mean_o, _ = _ALL[model]
+    p_o, p_new = draw(np.random.default_rng(n), (studies, n), mean_o * (1 + change))
+    above, below = (_t_statistic(p_o, p_new, edge) for edge in (-EDGE, EDGE))
+    asked = np.flatnonzero(np.maximum(stdtr(n - 1, -above), stdtr(n - 1, below)) < 0.05)
     found = 0
-    for start in range(0, studies, _CHUNK):
-        old, new = p_o[start : start + _CHUNK], p_new[start : start + _CHUNK]
-        above, below = (
-            paired_ratio(new - old, old, threshold=edge, confidence=0.9) for edge in (-EDGE, EDGE)
-        )
-        found += int(((1 - above.probability < 0.05) & (below.probability < 0.05)).sum())
+    for some in np.split(asked, range(_CHUNK, asked.size, _CHUNK)):
+        tests = [judged(p_o[some], p_new[some], edge, confidence=0.9) for edge in (-EDGE, EDGE)]
+        p_values = [test.p_seen if only_seen else test.p_value for test in tests]
+        found += int((np.maximum(*p_values) < 0.1).sum())
     return found / studies
+
+
+def _t_statistic(p_o: Floats, p_new: Floats, threshold: float) -> Floats:
+    difference = p_new - p_o - threshold * p_o
+    spread = difference.std(axis=1, ddof=1) / math.sqrt(difference.shape[1])
+    return np.asarray(difference.mean(axis=1) / spread)
 
 
 def planned_seeds(model: str) -> int:
     """Return the seeds planned for a power of 80 % at no change, from a pilot of 4,000."""
-    draw, _ = MODELS[model]
-    seeds = spi.seeds_for_equivalence(
-        spi.equivalence(*draw(np.random.default_rng(0), (4_000,), P_O))
-    )
-    assert seeds is not None
-    return seeds
+    draw, mean_o, _ = _ALL[model]
+    pilot = draw(np.random.default_rng(0), (4_000,), mean_o)
+    return spi.seeds_for_equivalence(spi.equivalence(*pilot)) or 0
+
+
+def planned_power(
+    model: str, distance: float, pilot_seeds: int, pilots: int = PILOTS
+) -> tuple[float, float]:
+    """Return the seeds that pilots plan for a verdict on the change, and the power of these.
+
+    Args:
+        model: a name in `MODELS` or `STALLS`.
+        distance: from the threshold to the true change; below 0: the verdict is "refuted".
+        pilot_seeds: seeds of each pilot.
+        pilots: number of pilots; 25 studies follow each.
+    """
+    draw, mean_o, mean_f = _ALL[model]
+    rng, truth = np.random.default_rng(pilot_seeds), mean_f / mean_o - 1
+    threshold = truth - distance
+    planned, found = [], []
+    for _ in range(pilots):
+        pilot = spi.relative_change(*draw(rng, (pilot_seeds,), mean_f), threshold=threshold)
+        n = spi.seeds_for_power(pilot, truth) or 0
+        test = judged(*draw(rng, (25, n), mean_f), threshold)
+        planned.append(n)
+        is_right = (test.probability > 0.5) == (distance > 0.0)
+        found.append(float(((test.p_value < 0.05) & is_right).mean()))
+    return float(np.median(planned)), float(np.mean(found))
 
 
 def until_clear_table(studies: int = STUDIES) -> str:
@@ -149,6 +225,52 @@ def equivalence_table(studies: int = STUDIES) -> str:
     return "\n".join(lines)
 
 
+def stall_table(studies: int = STALL_STUDIES) -> str:
+    """Return the errors at the true value where some runs stall, as Markdown.
+
+    In brackets those that the runs seen alone would make. What is called wrong above the truth, and
+    equivalent though P falls by a tenth, is the harm that stalls do.
+    """
+    lines = [
+        "| runs | seeds | wrong above | wrong below | wrongly equivalent |",
+        "| --- " * 5 + "|",
+    ]
+    for model in STALLS:
+        for n in (10, 20, 30, 50, 100):
+            one, seen = (
+                wrong_verdicts(model, [n], studies, only_seen=only) for only in (False, True)
+            )
+            equal, equal_seen = (
+                share_equivalent(model, n, -EDGE, studies, only_seen=only) for only in (False, True)
+            )
+            lines.append(
+                f"| {model} | {n} | {one.above:.3f} ({seen.above:.3f}) | {one.below:.3f} "
+                f"({seen.below:.3f}) | {equal:.3f} ({equal_seen:.3f}) |"
+            )
+        for most in (60, 200):
+            one, seen = (
+                wrong_verdicts(model, looks_up_to(most), studies, only_seen=only)
+                for only in (False, True)
+            )
+            lines.append(
+                f"| {model} | until clear, {most} | {one.above:.3f} ({seen.above:.3f}) | "
+                f"{one.below:.3f} ({seen.below:.3f}) | |"
+            )
+    return "\n".join(lines)
+
+
+def planned_table(pilots: int = PILOTS) -> str:
+    """Return the power of the seeds that pilots plan for 80 %, as Markdown."""
+    lines = ["| runs | pilot | planned seeds | their power |", "| --- " * 4 + "|"]
+    for model, distance in {**dict.fromkeys(MODELS, -0.1), **dict.fromkeys(STALLS, 0.1)}.items():
+        for pilot_seeds in (10, 20, 100):
+            seeds, power = planned_power(model, distance, pilot_seeds, pilots)
+            lines.append(f"| {model} | {pilot_seeds} | {seeds:.0f} | {power:.2f} |")
+    return "\n".join(lines)
+
+
 if __name__ == "__main__":
     print(f"Until clear, {STUDIES:,} studies:\n\n{until_clear_table()}\n")
-    print(f"Equivalence, {STUDIES:,} studies:\n\n{equivalence_table()}")
+    print(f"Equivalence, {STUDIES:,} studies:\n\n{equivalence_table()}\n")
+    print(f"Where runs stall, {STALL_STUDIES:,} studies:\n\n{stall_table()}\n")
+    print(f"Planned for 80 %, {PILOTS} pilots of each size:\n\n{planned_table()}")

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from .central_env import CentralEnv
 
 if TYPE_CHECKING:
-    from .normalize import SwarmVecNormalize
-    from .sb3 import SwarmVecEnv
+    from .sb3 import SwarmVecEnv, SwarmVecNormalize
 
 __all__ = ["CentralEnv", "SwarmVecEnv", "SwarmVecNormalize"]
 
@@ -20,7 +19,7 @@ def __getattr__(name: str) -> type[SwarmVecEnv | SwarmVecNormalize]:
 
         return SwarmVecEnv
     if name == "SwarmVecNormalize":
-        from .normalize import SwarmVecNormalize
+        from .sb3 import SwarmVecNormalize
 
         return SwarmVecNormalize
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

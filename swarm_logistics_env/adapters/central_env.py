@@ -9,9 +9,8 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.environment.commands import as_array
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.reset_options import checked_seed
+from swarm_logistics_env.environment.requests import as_array, checked_seed
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.policies.policy import mask_unreachable_commands
 from swarm_logistics_env.wrappers import FixedAgents, Wrapper

@@ -1,4 +1,7 @@
-"""Stable-baselines3's VecEnv over the array methods: every robot of every world is a row."""
+"""Stable-baselines3's VecEnv over the array methods: every robot of every world is a row.
+
+Its VecNormalize as well, with statistics of robots alone.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.environment.reset_options import checked_count, checked_seed
+from swarm_logistics_env.environment.requests import checked_count, checked_seed
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
@@ -16,7 +19,8 @@ from swarm_logistics_env.streams import key
 from .worlds import RowsStep, World, Worlds, layers_of, maker
 
 try:
-    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.running_mean_std import RunningMeanStd
+    from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
         f"SwarmVecEnv needs stable-baselines3 ({error}): pip install 'swarm-logistics-env[train]'"
@@ -301,3 +305,51 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
 def _each(indices: int | Iterable[int]) -> Iterable[int]:
     return indices if isinstance(indices, Iterable) else (indices,)
+
+
+class SwarmVecNormalize(VecNormalize):  # type: ignore[misc]  # not in the environment of the type check
+    """`VecNormalize` around a `SwarmVecEnv` whose rows are partly padding.
+
+    `VecNormalize` itself counts rows of padding, which are zeros: with sizes drawn from 3 and 25
+    that is 44 % of all rows, so that its means and deviations are not those of what robots sense.
+    Here rows that are no robot's count neither among observations nor among returns.
+
+    Args:
+        venv: a `SwarmVecEnv`, or wrappers of stable-baselines3 around one.
+        **arguments: those of `VecNormalize`.
+
+    Raises:
+        SetupError: `venv` is something else.
+
+    Example:
+        >>> env = SwarmVecNormalize(SwarmVecEnv(n_worlds=2, n_robots=3))
+        >>> env.reset().shape
+        (6, 140)
+    """
+
+    returns: NDArray[np.float64]
+
+    def __init__(self, venv: Any, **arguments: Any) -> None:
+        if not isinstance(getattr(venv, "unwrapped", None), SwarmVecEnv):
+            raise SetupError(f"venv = {venv!r}: should be a SwarmVecEnv or wrappers around one")
+        super().__init__(venv, **arguments)
+        if self.norm_obs:
+            self.obs_rms = _OfRobots(shape=self.observation_space.shape)
+
+    def step_async(self, actions: ArrayLike) -> None:
+        """Take the commands of the step that `step_wait` makes."""
+        self._acting = self.venv.present
+        super().step_async(actions)
+
+    def _update_reward(self, reward: NDArray[np.float32]) -> None:
+        self.returns = self.returns * self.gamma + reward
+        if self._acting.any():
+            self.ret_rms.update(self.returns[self._acting])
+
+
+class _OfRobots(RunningMeanStd):  # type: ignore[misc]  # as above
+    def update(self, arr: NDArray[np.float32]) -> None:
+        """Count the rows of robots, who always sense something; padding is zeros."""
+        robots = arr[arr.any(axis=1)]
+        if len(robots):
+            super().update(robots)

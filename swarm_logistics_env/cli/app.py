@@ -1,15 +1,21 @@
-"""`swarm-logistics run` and `scenario`; the other commands are added here."""
+"""`swarm-logistics run`, `scenario`, `attack` and `train`; the other commands are added here."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .application import Application
-from .fault_commands import attack_command
-from .judging import judge_command
-from .options import (
+from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.train.training import preset_names
+
+from .application import (
+    Application,
     FaultOption,
     PolicyOption,
     PresetOption,
@@ -20,9 +26,192 @@ from .options import (
     faults_of,
     scenario_of,
 )
-from .study_commands import study
-from .train import train_command
+from .judging import judge_command
+from .study_commands import ProcessesOption, study
 from .watch import film_command, watch_command
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.attack import AttackResult
+    from swarm_logistics_env.warehouse import Fault
+
+PolicyArgument = Annotated[
+    str, typer.Argument(metavar="POLICY", help="Name, path of a file, or package.module:Class.")
+]
+
+
+def attack_command(
+    policy: PolicyArgument,
+    robots: Annotated[int, typer.Option(min=1, help="How many robots fail.")] = 2,
+    modes: Annotated[
+        list[str] | None,
+        typer.Option("--mode", help="Mode to search; may be repeated."),
+    ] = None,
+    budget: Annotated[int, typer.Option(min=10, help="Runs of faults in the search.")] = 200,
+    fresh: Annotated[int, typer.Option(min=3, help="Other seeds, for the estimates.")] = 30,
+    seed: Annotated[int, typer.Option(help="Of the search's own choices.")] = 0,
+    preset: PresetOption = "paper",
+    file: ScenarioOption = None,
+    changes: SetOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; results/attack-POLICY if not given.")
+    ] = None,
+    processes: ProcessesOption = None,
+) -> None:
+    """Search for the fault that costs most: mode, role at the onset, time and duration.
+
+    What it finds bounds the worst fault from one side: there may be worse ones.
+    """
+    from swarm_logistics_env.attack import MODES, Attack, attack
+    from swarm_logistics_env.studies.engines import engine_named
+
+    asked = Attack(
+        policy=policy,
+        scenario=scenario_of(preset, file, changes),
+        robots=robots,
+        modes=tuple(modes) if modes else MODES,
+        budget=budget,
+        fresh=fresh,
+        seed=seed,
+    )
+    engine = engine_named("local" if processes == 1 else "process", processes)
+    place = out or Path("results") / f"attack-{Path(policy).stem}"
+    try:
+        found = attack(asked, engine, place)
+    except KeyboardInterrupt:
+        _stopped(place)
+    _show_attack(found, policy, robots, fresh)
+
+
+def _stopped(place: Path) -> None:
+    typer.echo(
+        f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
+    )
+    raise typer.Exit(130) from None
+
+
+def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
+    from swarm_logistics_env.fault_text import text_of
+    from swarm_logistics_env.report.wording import bracketed
+
+    from .terminal_tables import show_table
+
+    rows = [
+        (
+            found.by,
+            _in_words(found.fault),
+            bracketed(found.robustness, 3),
+            str(found.runs),
+        )
+        for found in result.found
+    ]
+    worst = min(result.found, key=lambda found: found.robustness.value)
+    text = text_of(worst.fault)
+    played = f" `run` and `watch` play it with --fault {shlex.quote(text)}." if text else ""
+    capped = (
+        "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
+        "shown. --set restock=true has no cap."
+    )
+    show_table(
+        f"{policy}: worst faults found",
+        ("found by", "fault", "R [95 %]", "runs"),
+        rows,
+        f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
+        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.{played}",
+        f"{result.tried} of {result.searched} faults were tried. What is found bounds "
+        "the worst from one side: it proves no other fault harmless.",
+        *([capped] if result.is_capped else ()),
+    )
+
+
+def _in_words(fault: Fault) -> str:
+    who = "by the seed" if fault.role is None else fault.role.replace("_", " ")
+    until = "" if fault.duration is None else f" for {fault.duration:g} s"
+    return f"{fault.mode} of {fault.robots} ({who}) from {fault.onset:g} s{until}"
+
+
+def train_command(
+    context: typer.Context,
+    preset: Annotated[
+        str,
+        typer.Argument(
+            metavar="PRESET|FILE",
+            help=f"Training preset ({', '.join(preset_names())}), or TOML file of one.",
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; results/train/NAME if not given.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of everything random.")] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Agent-steps to learn from.")] = None,
+    device: Annotated[
+        str | None, typer.Option(help="cpu or cuda; the GPU where there is one if not given.")
+    ] = None,
+) -> None:
+    """Train a policy; the same command goes on where it was stopped."""
+    changed = {"seed": seed, "agent_steps": steps}
+    fields = {name: value for name, value in changed.items() if value is not None}
+    try:
+        path = _train(preset, out, str(context.obj), device, fields)
+    except KeyboardInterrupt:
+        typer.echo("\nStopped. The same command goes on.", err=True)
+        raise typer.Exit(130) from None
+    typer.echo(f"Written: {path}")
+
+
+def _train(
+    asked: str, out: Path | None, command: str, device: str | None, fields: dict[str, Any]
+) -> Path:
+    """Train a preset, or what a TOML file describes, and show it; return the policy file's path."""
+    from swarm_logistics_env.train.training import load_training
+
+    training = load_training(asked, **fields)
+    with _explained():
+        import_module("tensorboard")  # missed before anything is written
+        from swarm_logistics_env.train.trainer import train
+    path = train(
+        training, out or Path("results/train", training.name), command=command, device=device
+    )
+    _show_training(path)
+    return path
+
+
+def _show_training(path: Path) -> None:
+    from swarm_logistics_env.policies import read_card
+    from swarm_logistics_env.train.curve import BEST, PICTURE
+
+    from .terminal_tables import show_table
+
+    card = read_card(path)
+    rows = tuple(
+        (
+            score.measure,
+            score.condition,
+            f"{score.value:.3g}",
+            *("-" if limit is None else f"{limit:.3g}" for limit in (score.low, score.high)),
+            str(score.seeds),
+        )
+        for score in card.scores
+    )
+    if rows:
+        show_table(
+            f"{card.name}: scores on seeds it was not trained on",
+            ("measure", "condition", "value", "low", "high", "seeds"),
+            rows,
+            "low, high: limits of the 95 % interval",
+        )
+    typer.echo(f"Curve: {path.parent / PICTURE}")
+    typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise TrainingError(
+            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
+        ) from error
+
 
 app = Application(
     name="swarm-logistics",

@@ -11,7 +11,7 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 
-from .options import TrustPolicyOption
+from .application import TrustPolicyOption
 from .study_commands import (
     FullOption,
     PolicyOption,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import (
+from .application import (
     FaultOption,
     PolicyOption,
     PresetOption,
@@ -55,9 +55,10 @@ def watch_command(
 
     from swarm_logistics_env import policies
     from swarm_logistics_env.errors import SetupError
+    from swarm_logistics_env.records import becoming
     from swarm_logistics_env.watch import Session
-    from swarm_logistics_env.watch.web import recorded_page, serve
-    from swarm_logistics_env.writing import becoming
+    from swarm_logistics_env.watch.messages import recorded_page
+    from swarm_logistics_env.watch.server import serve
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
@@ -126,8 +127,7 @@ def film_command(
 
     from swarm_logistics_env.errors import SetupError
     from swarm_logistics_env.policies import load
-    from swarm_logistics_env.rendering.renderer import load_pygame
-    from swarm_logistics_env.rendering.video import check_film, write_film
+    from swarm_logistics_env.rendering.renderer import check_film, load_pygame, write_film
 
     scenario = scenario_of(preset, scenario_file, changes)
     scheduled = faults_of(faults, scenario)

@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse import Warehouse
 
-from .commands import gathered
+from .requests import gathered
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, float]]

@@ -15,11 +15,10 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Fault, Warehouse
 
-from .central_state import global_state
-from .commands import as_array
 from .dict_view import ArrayStep, DictView, agent_names
-from .reset_options import (
+from .requests import (
     OPTIONS,
+    as_array,
     check_somebody_is_there,
     checked_faults,
     checked_options,
@@ -28,7 +27,7 @@ from .reset_options import (
     scenario_fields,
 )
 from .rewards import RewardTerms
-from .spaces import Spaces
+from .spaces import Spaces, global_state
 
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer

@@ -9,12 +9,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.policies.card import PolicyCard
-    from swarm_logistics_env.policies.code_identity import identity
-    from swarm_logistics_env.policies.files import read_card
-    from swarm_logistics_env.policies.loading import NAMES, SUFFIXES, called, known_policies, load
-    from swarm_logistics_env.policies.onnx_export import write_onnx
-    from swarm_logistics_env.policies.policy import Policy
+    from swarm_logistics_env.policies.files import read_card, write_onnx
+    from swarm_logistics_env.policies.learned import PolicyCard
+    from swarm_logistics_env.policies.policy import Policy, identity
+    from swarm_logistics_env.policies.spec import (
+        NAMES,
+        SUFFIXES,
+        PolicySpec,
+        called,
+        known_policies,
+        load,
+    )
     from swarm_logistics_env.policies.swarm_dt import SwarmDT, SwarmDTParameters
 
 __all__ = [
@@ -22,6 +27,7 @@ __all__ = [
     "SUFFIXES",
     "Policy",
     "PolicyCard",
+    "PolicySpec",
     "SwarmDT",
     "SwarmDTParameters",
     "called",
@@ -34,22 +40,16 @@ __all__ = [
 
 # Imported when first asked for: an environment needs no policy.
 _HOMES = {
-    "PolicyCard": "card",
-    "identity": "code_identity",
-    "read_card": "files",
-    "NAMES": "loading",
-    "SUFFIXES": "loading",
-    "called": "loading",
-    "known_policies": "loading",
-    "load": "loading",
-    "write_onnx": "onnx_export",
-    "Policy": "policy",
-    "SwarmDT": "swarm_dt",
-    "SwarmDTParameters": "swarm_dt",
+    "files": {"read_card", "write_onnx"},
+    "learned": {"PolicyCard"},
+    "policy": {"Policy", "identity"},
+    "spec": {"NAMES", "SUFFIXES", "PolicySpec", "called", "known_policies", "load"},
+    "swarm_dt": {"SwarmDT", "SwarmDTParameters"},
 }
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,22 +1,242 @@
-"""A trained policy, played without the library that it was trained with."""
+"""A trained policy, its network in compiled loops without torch, and its card.
+
+The card says how the policy decides, how it was made, and how good it is.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+)
 
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import MotionFrame
-from swarm_logistics_env.policies.card import Network, PolicyCard
-from swarm_logistics_env.policies.network import FeedForward
+from swarm_logistics_env.motion.frame import INPUT_COUNTS, INPUTS, OUTPUTS, MotionFrame
+from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
+
+Width = Annotated[int, Field(ge=1, le=4096)]
+
+
+class _Part(Record):
+    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+
+
+class Network(_Part):
+    """The inputs, layers and outputs of a trained policy.
+
+    Args:
+        inputs: the names of its inputs in order, see `motion.INPUTS`; or their number, for the
+            first of them.
+        outputs: the names of its outputs in order, see `motion.OUTPUTS`.
+        listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
+        hidden: widths of the hidden layers.
+        activation: the activation function between layers.
+        exploration: the training's noise, times this factor, is added to the outputs, from each
+            robot's own stream; 0 means none.
+
+    Raises:
+        PolicyError: the inputs or outputs are not those that this version knows.
+    """
+
+    inputs: tuple[str, ...] = INPUTS
+    outputs: tuple[str, ...] = OUTPUTS
+    listens: bool = True
+    hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
+    activation: Literal["tanh", "relu"] = "tanh"
+    exploration: NonNegativeFloat = 0.0
+
+    @field_validator("inputs", mode="before")
+    @classmethod
+    def _named(cls, inputs: Any) -> Any:
+        if not isinstance(inputs, int):
+            return inputs
+        if inputs not in INPUT_COUNTS:
+            raise ValueError(f"should be one of {', '.join(map(str, INPUT_COUNTS))}")
+        return INPUTS[:inputs]
+
+    @field_validator("inputs", "outputs")
+    @classmethod
+    def _known(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
+        right = INPUTS if about.field_name == "inputs" else OUTPUTS
+        for place, (name, wanted) in enumerate(zip(names, right)):
+            if name != wanted:
+                raise ValueError(f"column {place} is {name!r}: should be {wanted!r}")
+        allowed = INPUT_COUNTS if right is INPUTS else (len(right),)
+        if len(names) not in allowed:
+            counts = " or ".join(map(str, allowed))
+            raise ValueError(f"has {len(names)} columns: should have {counts}")
+        return names
+
+
+class Score(_Part):
+    """One measured value with its 95 % interval; a limit that is infinite becomes None.
+
+    Args:
+        measure: "P", or an indicator: "R", "FT", "S", "A".
+        condition: in words, e.g. "N = 25, FM4, m = 2".
+        seeds: how many, 0, 1, ...: none of them was trained on.
+    """
+
+    measure: str
+    condition: str
+    value: float
+    low: float | None
+    high: float | None
+    seeds: PositiveInt
+
+    @field_validator("low", "high", mode="before")
+    @classmethod
+    def _finite(cls, limit: Any) -> Any:
+        return None if isinstance(limit, float) and math.isinf(limit) else limit
+
+
+class PolicyCard(_Part):
+    """Everything in a policy file beside the weights.
+
+    Args:
+        format: the version of the file's format.
+        name: the policy's name.
+        about: a sentence or two about the policy.
+        network: the network that decides.
+        command: the command line that trained it.
+        versions: the versions of the packages that trained it; "simulation" is the digest of the
+            world's code (`tasks.code_version`) at that time.
+        scored_with: the version of this package, and the digest, with which it was scored.
+        scenario: what it was trained in, fields that differ from the defaults, and always
+            `heading_drift`: cards from before there was one read it as 0.
+        training: the specification of the training.
+        seed: the training's seed.
+        agent_steps: decisions of single robots that it learned from.
+        scores: measured after the training, on seeds held out.
+    """
+
+    format: Literal[1] = 1
+    name: str
+    about: str = ""
+    network: Network
+    command: str = ""
+    versions: dict[str, str] = Field(default_factory=dict)
+    scenario: dict[str, Any] = Field(default_factory=dict)
+    training: dict[str, Any] = Field(default_factory=dict)
+    seed: int = 0
+    agent_steps: NonNegativeInt = 0
+    scores: tuple[Score, ...] = ()
+    scored_with: dict[str, str] = Field(default_factory=dict)
+
+    @field_validator("scenario")
+    @classmethod
+    def _with_drift(cls, scenario: dict[str, Any]) -> dict[str, Any]:
+        return {"heading_drift": 0.0, **scenario}
+
+
+class FeedForward:
+    """Dense layers with `tanh` or ReLU between them, in float32.
+
+    Loops rather than numpy's matrix product, whose bits differ with the number of rows: here a
+    robot's command does not depend on how many others there are.
+
+    Args:
+        weights: one (outputs, inputs) array per layer, as torch has them.
+        biases: one (outputs,) array per layer.
+        rectify: ReLU instead of tanh.
+    """
+
+    def __init__(
+        self,
+        weights: Sequence[NDArray[np.float32]],
+        biases: Sequence[NDArray[np.float32]],
+        *,
+        rectify: bool,
+    ) -> None:
+        # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
+        self._weights = np.concatenate([np.ascontiguousarray(w.T).ravel() for w in weights])
+        self._biases = np.concatenate(list(biases))
+        self._widths = np.array([weights[0].shape[1], *(len(bias) for bias in biases)])
+        self._rectify = rectify
+
+    def __call__(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the outputs (N, outputs) for rows of at least `inputs` columns; it reads these."""
+        outputs = np.empty((inputs.shape[0], self._widths[-1]), np.float32)
+        run_network(inputs, self._weights, self._biases, self._widths, self._rectify, outputs)
+        return outputs
+
+
+@kernel
+def hyperbolic_tangent(x: np.float32) -> np.float32:
+    """Return tanh(x) to 3e-7: the rational function of Eigen's `ptanh` (float, [13/6]).
+
+    Several at once, and the same bits on every machine, which a C library does not promise.
+    """
+    x = min(max(x, np.float32(-7.9053111)), np.float32(7.9053111))
+    x2 = x * x
+    over = np.float32(-2.76076847742355e-16)
+    over = over * x2 + np.float32(2.00018790482477e-13)
+    over = over * x2 + np.float32(-8.60467152213735e-11)
+    over = over * x2 + np.float32(5.12229709037114e-08)
+    over = over * x2 + np.float32(1.48572235717979e-05)
+    over = over * x2 + np.float32(6.37261928875436e-04)
+    over = over * x2 + np.float32(4.89352455891786e-03)
+    under = np.float32(1.19825839466702e-06)
+    under = under * x2 + np.float32(1.18534705686654e-04)
+    under = under * x2 + np.float32(2.26843463243900e-03)
+    under = under * x2 + np.float32(4.89352518554385e-03)
+    return x * over / under
+
+
+@kernel
+def run_network(
+    inputs: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    biases: NDArray[np.float32],
+    widths: NDArray[np.int64],
+    rectify: bool,
+    outputs: NDArray[np.float32],
+) -> None:
+    """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs."""
+    n_layers = len(widths) - 1
+    widest = widths.max()
+    here, there = np.empty(widest, np.float32), np.empty(widest, np.float32)
+    for row in range(inputs.shape[0]):
+        here[: widths[0]] = inputs[row, : widths[0]]
+        weight, bias = 0, 0
+        for layer in range(n_layers):
+            n_in, n_out = widths[layer], widths[layer + 1]
+            total = there[:n_out]
+            total[:] = biases[bias : bias + n_out]
+            for place in range(n_in):
+                value = here[place]
+                # Most inputs are zero, because most things are not in view.
+                if value != np.float32(0.0):
+                    column = weights[weight : weight + n_out]
+                    for out in range(n_out):
+                        total[out] += value * column[out]
+                weight += n_out
+            bias += n_out
+            if layer < n_layers - 1:
+                if rectify:
+                    for place in range(n_out):
+                        total[place] = max(total[place], np.float32(0.0))
+                else:
+                    for place in range(n_out):
+                        total[place] = hyperbolic_tangent(total[place])
+            here, there = there, here
+        outputs[row] = here[: widths[n_layers]]
+
 
 STREAM = "trained policy"
 

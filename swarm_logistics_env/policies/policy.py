@@ -1,13 +1,22 @@
-"""The interface between a policy and the warehouse."""
+"""What a policy is, what names its behaviour, and mixtures of several in one swarm."""
 
 from __future__ import annotations
 
+import ast
+import functools
+import hashlib
+import inspect
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -82,3 +91,223 @@ def mask_unreachable_commands(commands: NDArray[Any], state: WarehouseState) -> 
     if masked.shape[:1] == deaf.shape:
         masked[deaf] = 0.0
     return masked
+
+
+OWN_PACKAGE = __name__.partition(".")[0]
+# These hold messages and validation, so that they decide nothing that a policy does. The package
+# itself imports all that it offers, whatever a policy uses of it.
+WITHOUT_BEHAVIOUR = frozenset({OWN_PACKAGE, f"{OWN_PACKAGE}.errors", f"{OWN_PACKAGE}.records"})
+
+
+def identity(policy: Policy) -> str:
+    """Return text that changes whenever the policy's behaviour may have changed.
+
+    It is the policy's own attribute `identity` if it has one. Otherwise it names the class, its
+    `parameters`, and a digest of the code (see `code_digest`).
+    """
+    own = getattr(policy, "identity", None)
+    if own is not None:
+        return str(own)
+    kind = type(policy)
+    parameters: Any = getattr(policy, "parameters", {})
+    if isinstance(parameters, Record):
+        parameters = parameters.model_dump(mode="json")
+    return json.dumps(
+        {
+            "class": f"{kind.__module__}:{kind.__qualname__}",
+            "parameters": parameters,
+            "source": code_digest(kind),
+        },
+        sort_keys=True,
+        default=repr,
+    )
+
+
+@functools.cache
+def code_digest(*kinds: type) -> str:
+    """Return 16 hexadecimal digits that change with the code which classes use.
+
+    That code is the modules of `modules_used`. Docstrings, lines that only comment and blank lines
+    do not count. The digest is empty if the source of no class can be found.
+    """
+    return _digest(modules_used(*kinds))
+
+
+def modules_used(*kinds: type) -> dict[str, Path]:
+    """Return name and file of the modules of classes and of their base classes.
+
+    Whatever these import from their own package and from this one, directly or not, is among them.
+    """
+    used: dict[str, Path] = {}
+    for kind in kinds:
+        packages = {OWN_PACKAGE, kind.__module__.partition(".")[0]}
+        for base in kind.__mro__:
+            if base.__module__.partition(".")[0] in packages:
+                try:
+                    _follow(base.__module__, Path(inspect.getfile(base)), packages, used)
+                except (TypeError, OSError):  # typed into an interpreter
+                    continue
+    return used
+
+
+def function_digest(function: object) -> str:
+    """Return 16 hexadecimal digits that change with the module of a function.
+
+    Whatever that module imports from its own package counts as well, unless this is the package.
+    An object that is no function has the module of its class. Empty if there is no source.
+    """
+    function = getattr(function, "func", function)  # functools.partial
+    if not (inspect.isroutine(function) or inspect.isclass(function)):
+        function = type(function)
+    name = str(getattr(function, "__module__", ""))
+    used: dict[str, Path] = {}
+    try:
+        _follow(
+            name, Path(inspect.getfile(function)), {name.partition(".")[0]} - {OWN_PACKAGE}, used
+        )
+    except (TypeError, OSError):  # typed into an interpreter
+        return ""
+    return _digest(used)
+
+
+def _digest(used: dict[str, Path]) -> str:
+    digest = hashlib.sha256()
+    for name, path in sorted(used.items()):
+        digest.update(name.encode() + b"\0" + _content(path) + b"\0")
+    return digest.hexdigest()[:16] if used else ""
+
+
+def without_prose(source: str) -> str:
+    """Return Python source without docstrings, lines that only comment, and blank lines."""
+    prose: set[int] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            first = node.body[0] if node.body else None
+            if isinstance(first, ast.Expr) and ast.get_docstring(node, clean=False) is not None:
+                prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
+    lines = enumerate(source.splitlines(), start=1)
+    return "\n".join(
+        line.rstrip()
+        for number, line in lines
+        if number not in prose and line.strip() and not line.lstrip().startswith("#")
+    )
+
+
+def _content(path: Path) -> bytes:
+    if path.suffix != ".py":
+        return path.read_bytes()
+    return without_prose(path.read_text(encoding="utf-8")).encode()
+
+
+def _follow(name: str, path: Path, packages: set[str], used: dict[str, Path]) -> None:
+    """Add a module to `used`, and those of `packages` that it imports."""
+    used[name] = path
+    if path.suffix != ".py":
+        return
+    parent = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    for imported in _imported(ast.parse(path.read_text(encoding="utf-8")), parent):
+        # What is imported may be a module, or something in the module that is named before it.
+        for module in (imported, imported.rpartition(".")[0]):
+            found = _file_of(module) if module.partition(".")[0] in packages else None
+            if found is not None:
+                if module not in used and module not in WITHOUT_BEHAVIOUR:
+                    _follow(module, found, packages, used)
+                break
+
+
+def _imported(tree: ast.AST, parent: str) -> Iterator[str]:
+    """Return the full name of everything that is imported anywhere in a module of `parent`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = parent.split(".")[: 1 - node.level or None] if node.level else []
+            base = ".".join([*above, node.module] if node.module else above)
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _file_of(module: str) -> Path | None:
+    """Return the file of a module whose package is loaded; None if there is none."""
+    package, *rest = module.split(".")
+    for folder in getattr(sys.modules.get(package), "__path__", ()):
+        place = Path(folder, *rest)
+        for file in (place / "__init__.py", place.with_suffix(".py")):
+            if file.is_file():
+                return file
+    return None
+
+
+class Mixed:
+    """Plays the first robots with one policy, the next ones with another, and so on.
+
+    A robot does what it would do upon the same observations in a swarm of its policy alone. A swarm
+    of another size than all parts together is shared out in their proportion.
+
+    Args:
+        parts: policies, and how many robots play each.
+
+    Raises:
+        PolicyError: a part has no robots, or needs the state of the whole swarm.
+
+    Example:
+        >>> from swarm_logistics_env import policies
+        >>> mixed = policies.load("swarm-dt=20,ppo-delivery=5")
+        >>> mixed.rows(25), mixed.rows(10)
+        ([slice(0, 20, None), slice(20, 25, None)], [slice(0, 8, None), slice(8, 10, None)])
+    """
+
+    def __init__(self, parts: Sequence[tuple[Policy, int]]) -> None:
+        for policy, count in parts:
+            if count < 1:
+                raise PolicyError(
+                    f"{count} robots with {type(policy).__name__}: should be at least 1"
+                )
+            if getattr(policy, "needs_state", False):
+                raise PolicyError(
+                    f"{type(policy).__name__} commands the whole swarm: should be a policy that "
+                    "decides for each robot from its own observations"
+                )
+        self._policies = [policy for policy, _ in parts]
+        self._counts = [count for _, count in parts]
+
+    @property
+    def identity(self) -> str:
+        """What names its behaviour: that of each part, and how many robots play it."""
+        parts = [[count, identity(policy)] for policy, count in zip(self._policies, self._counts)]
+        kind: type = type(self)
+        return json.dumps({"mixed": parts, "source": code_digest(kind)})
+
+    def rows(self, n_robots: int) -> list[slice]:
+        """Return the rows that each part plays in a swarm of this size."""
+        shares = np.cumsum(self._counts) / sum(self._counts)
+        ends = np.rint(shares * n_robots).astype(int).tolist()
+        return [slice(start, end) for start, end in zip([0, *ends], ends)]
+
+    def configure(self, scenario: Scenario) -> None:
+        """Tell every part what a robot's maker knows."""
+        for policy in self._policies:
+            configure = getattr(policy, "configure", None)
+            if configure is not None:
+                configure(scenario)
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode."""
+        # Each part has all rows, so that a robot's stream is that of its row.
+        for policy in self._policies:
+            policy.reset(n_robots, seed)
+        self._rows = self.rows(n_robots)
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return commands (N, 4), or (N, 4 + M) if a part broadcasts messages."""
+        answers = [np.asarray(policy.act(observations)) for policy in self._policies]
+        for policy, answer in zip(self._policies, answers):
+            if answer.ndim != 2 or len(answer) != len(observations):
+                raise PolicyError(
+                    f"{type(policy).__name__} gave commands of shape {answer.shape}: should be "
+                    f"({len(observations)}, 4)"
+                )
+        width = max(answer.shape[1] for answer in answers)
+        commands = np.zeros((len(observations), width))
+        for rows, answer in zip(self._rows, answers):
+            commands[rows, : answer.shape[1]] = answer[rows]
+        return commands

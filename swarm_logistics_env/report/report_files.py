@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import plain
+from swarm_logistics_env.records import becoming, plain
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import write_csv
-from swarm_logistics_env.writing import becoming
 
 from .answer import digest
 from .document import Document, document

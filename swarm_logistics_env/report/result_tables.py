@@ -28,6 +28,8 @@ _FLAGS = {
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
     "degenerate": "The seeds show no spread, so there is no interval and no verdict",
     "capped": "P is capped on the side that the verdict leans to, so the verdict is inconclusive",
+    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
+    "so it is inconclusive",
     "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
     "the verdict comes from the test",
     "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
@@ -209,9 +211,15 @@ def warnings(results: StudyResults) -> Iterator[str]:
     if results.performance["saturated"].any():
         yield (
             f"{wording.SATURATED} marks a P that is capped, because every item was delivered in at "
-            "least one run, and the indicators that rest on it. A capped reference cannot support "
-            "that an indicator lies above its threshold, and a capped changed condition cannot "
-            "refute it."
+            "least one run, and the indicators that rest on it. A verdict that a larger P could "
+            "turn is inconclusive."
+        )
+    stalls = [cell for cell in cells_of(results.performance) if cell.stalled > 0.0]
+    if stalls:
+        told = (f"{c.policy}, {c.cell} ({c.stalled:.0%} of {c.n_seeds})" for c in stalls)
+        yield (
+            "Runs stalled: they have less than a quarter of the median P of their condition: "
+            f"{'; '.join(dict.fromkeys(told))}."
         )
     if results.exploratory:
         yield (

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeGuard
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.indicator_table import POWER, Finding
@@ -176,6 +177,11 @@ def _parts(results: StudyResults, test: Finding) -> Iterator[str]:
         yield f"Pairing correlation {test.pairing_correlation:.2f}."
     if "assumes_normal" in test.flags:
         yield "The verdict assumes normal differences."
+    if test.estimate is not None and "hidden_stalls" in test.flags:
+        yield (
+            "No verdict, as stalled runs that these seeds did not show could turn it: it needs at "
+            f"least {spi.seeds_against_stalls(test.estimate)} seeds."
+        )
     if "skewed" in test.flags:
         yield "Skewed: at so few seeds the verdict errs more often than its level."
     if results.plan.specification.until_clear:

@@ -14,12 +14,14 @@ from .power import (
     lower_decile_of_power,
     minimum_detectable_effect,
     no_plan_because,
+    seeds_against_stalls,
     seeds_for_equivalence,
     seeds_for_power,
 )
 from .removed import refuse
 from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
 from .sequential import Spending, look_alphas
+from .stalls import share_stalled
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -66,8 +68,10 @@ __all__ = [
     "resilience_index",
     "robustness",
     "scalability",
+    "seeds_against_stalls",
     "seeds_for_equivalence",
     "seeds_for_power",
+    "share_stalled",
     "worst_decile",
 ]
 

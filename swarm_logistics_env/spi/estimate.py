@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypedDict
 
@@ -21,6 +21,7 @@ from .inputs import (
     same_seeds,
 )
 from .ratio import RatioTest, paired_ratio
+from .stalls import at_stake
 from .summaries import pairing_correlation
 from .unpaired import Term, unpaired_ratio
 from .verdict_signs import SIGNS
@@ -53,15 +54,19 @@ class Estimate:
         pairing_correlation: Pearson correlation of the two performances compared (P_F and P_S for
             FT); None where unpaired, below three seeds, or where one of them is constant.
         difference_sd: Standard deviation of D over seeds, in items; where unpaired se(D) sqrt(n).
+        difference_skewness: Skewness of D over paired seeds; None where D shows no spread.
+        at_stake: What stalls of all runs would take from mean(D), and add to it, in items, where
+            none was seen: that a share of them may be hidden is part of p.
         mean_denominator: mean(den), in items.
         degrees_of_freedom: Degrees of freedom of the t-test: n - 1, or Welch's if unpaired.
         flags: Some of "single_seed", "too_few_seeds" (two: counts agree by chance, so p = 1),
             "degenerate" (se(D) = 0: no limits, p = 1), "identical" (the runs compared are the same
             runs: the value is exact, and no evidence), "capped" (a capped P blocks the verdict on
-            the side that it leans to: p = 1), "unbounded" (the mean denominator is not
-            distinguishable from 0), "assumes_normal" (below ten paired seeds, or unpaired: the
-            verdict rests on normal differences), "skewed" (D is so skewed that the verdict errs
-            more often than it promises at this n).
+            the side that it leans to: p = 1), "hidden_stalls" (stalled runs that these seeds did
+            not show could turn the verdict: it needs `seeds_against_stalls`), "unbounded" (the mean
+            denominator is not distinguishable from 0), "assumes_normal" (below ten paired seeds, or
+            unpaired: the verdict rests on normal differences), "skewed" (D is so skewed that the
+            verdict errs more often than it promises at this n).
     """
 
     indicator: str
@@ -77,6 +82,8 @@ class Estimate:
     paired: bool
     pairing_correlation: float | None = None
     difference_sd: float | None = None
+    difference_skewness: float | None = None
+    at_stake: tuple[float, float] = (0.0, 0.0)
     mean_denominator: float
     degrees_of_freedom: float | None = None
     flags: tuple[str, ...] = ()
@@ -140,8 +147,8 @@ class Options(TypedDict, total=False):
         paired: Whether row i of every sample is the same seed; False for results that come without
             seeds; True if not given.
         saturated: Names of the performances that are capped (every item delivered in a run). The
-            true P is then larger: a reference that is capped blocks "supported", a changed
-            condition that is capped blocks "refuted".
+            true P is then larger: that blocks the verdict which a larger P could turn, in most
+            cases "supported" for the reference and "refuted" for a changed condition.
         identical: Whether the runs compared are the same runs, seed by seed: the value is then
             exact.
     """
@@ -199,20 +206,19 @@ def judge(
         return replace(untested, low=value, high=value, flags=("identical",))
     if n_seeds == 1:
         return replace(untested, flags=("single_seed",))
-    test, flags = _tested(untested, weighted, offset)
+    weights = {name: term.weight(threshold - offset) for name, term in weighted.items()}
+    taken, added = at_stake([(weights[name], term.sample) for name, term in weighted.items()])
+    stakes = (float(taken), float(added)) if paired else (0.0, 0.0)
+    test, flags, skewness = _tested(untested, weighted, offset, stakes)
     p_value, probability = float(test.p_value), float(test.probability)
-    # The true P of one that is capped is larger, so that it may have brought about this verdict.
-    capped = {"refuted" if weighted[name].in_num > 0.0 else "supported" for name in saturated}
-    if n_seeds < LEAST_SEEDS:
-        flags.append("too_few_seeds")
-    if test.degenerate:
-        flags.append("degenerate")
-    if ("supported" if test.probability > 0.5 else "refuted") in capped:
-        flags.append("capped")
-    if not {"too_few_seeds", "degenerate", "capped"}.isdisjoint(flags):
+    blocks = _blocks(untested, test, [weights[name] for name in saturated])
+    flags += blocks
+    if blocks:
         p_value, probability = 1.0, 0.5
     elif not paired or n_seeds < MIN_SEEDS:
         flags.append("assumes_normal")
+    elif test.p_seen < 1.0 - confidence <= test.p_value:
+        flags.append("hidden_stalls")
     if test.unbounded:
         flags.append("unbounded")
     return replace(
@@ -225,30 +231,50 @@ def judge(
         p_value=p_value,
         pairing_correlation=pairing_correlation(*samples[:2]) if paired else None,
         difference_sd=float(test.difference_sd),
+        difference_skewness=skewness,
+        at_stake=stakes,
         mean_denominator=float(test.mean_denominator),
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flags),
     )
 
 
+def _blocks(asked: Estimate, test: RatioTest, capped: Sequence[float]) -> list[str]:
+    """Return what leaves no verdict at all; `capped`: weights in D of the P that are capped."""
+    flags = []
+    if asked.n_seeds < LEAST_SEEDS:
+        flags.append("too_few_seeds")
+    if test.degenerate:
+        flags.append("degenerate")
+    # The true P of one that is capped is larger, and moves D by the sign of its weight.
+    if any(weight * (float(test.value) - asked.threshold) < 0.0 for weight in capped):
+        flags.append("capped")
+    return flags
+
+
 def _tested(
-    asked: Estimate, weighted: Mapping[str, Term], offset: float
-) -> tuple[RatioTest, list[str]]:
-    """Return the test that the data allow, and what to say of it."""
+    asked: Estimate,
+    weighted: Mapping[str, Term],
+    offset: float,
+    stakes: tuple[float, float],
+) -> tuple[RatioTest, list[str], float | None]:
+    """Return the test that the data allow, what to say of it, and the skewness of D."""
     asking = {
         "offset": offset,
         "threshold": asked.threshold,
         "confidence": asked.confidence,
     }
     if not asked.paired:
-        return unpaired_ratio(list(weighted.values()), **asking), []
+        return unpaired_ratio(list(weighted.values()), **asking), [], None
     *_, reference = weighted.values()
     num = np.asarray(sum(term.in_num * term.sample for term in weighted.values()))
     den = reference.sample
-    test = paired_ratio(num, den, **asking)
+    test = paired_ratio(num, den, **asking, at_stake=stakes)
     # Without spread the skewness of D would be one of rounding errors.
-    skewed = not test.degenerate and _skewed(num - (asked.threshold - offset) * den)
-    return test, ["skewed"] if skewed else []
+    if test.degenerate or asked.n_seeds < LEAST_SEEDS:
+        return test, [], None
+    skewness = _skewness(num - (asked.threshold - offset) * den)
+    return test, ["skewed"] if _skewed(skewness, asked.n_seeds) else [], skewness
 
 
 def _checked(
@@ -280,17 +306,19 @@ def _checked(
     return weighted
 
 
-def _skewed(difference: Numbers) -> bool:
+def _skewness(difference: Numbers) -> float:
+    """Skewness g of the population, from a sample (n,) with spread, n >= 3."""
+    n = difference.size
+    deviation = difference - difference.mean()
+    spread = math.sqrt(float(np.mean(deviation**2)))
+    return float(np.mean((deviation / spread) ** 3)) * math.sqrt(n * (n - 1)) / (n - 2)
+
+
+def _skewed(g: float, n: int) -> bool:
     """Whether n is too small for the skewness of D: Cochran's n > 25 g^2 fails, beyond chance.
 
     Cochran (1977, Sampling Techniques, 2.15) gives the rule for the population's g. That of a few
     seeds scatters, so it must also exceed twice its standard error under a normal D.
     """
-    n = difference.size
-    deviation = difference - difference.mean()
-    spread = math.sqrt(float(np.mean(deviation**2)))
-    if n < 3 or spread == 0.0:
-        return False
-    g = float(np.mean((deviation / spread) ** 3)) * math.sqrt(n * (n - 1)) / (n - 2)
     standard_error = math.sqrt(6 * n * (n - 1) / ((n - 2) * (n + 1) * (n + 3)))
     return abs(g) > max(math.sqrt(n / 25), 2.0 * standard_error)

@@ -3,7 +3,8 @@
 Fieller's pivot mean(D)/se(D), D = num - (theta - offset) den, is judged by Student's distribution
 and, from ten seeds on, by its studentised bootstrap too: p is the larger of the two, always, and
 the interval holds every theta that this test keeps. A bootstrap only where the differences look
-skewed would be a pretest, and err.
+skewed would be a pretest, and err. Stalled runs that these seeds may hide raise p further; the
+interval is that of the runs seen.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from .bootstrap import MIN_SEEDS, critical_value, resampled_pivots, upper_p
 from .inputs import Numbers
+from .stalls import p_with_hidden
 
 # Differences this far below the numbers they are taken from are rounding, not spread between seeds.
 ROUNDING = 1e-12
@@ -33,6 +35,7 @@ class RatioTest(NamedTuple):
     degrees_of_freedom: float
     degenerate: NDArray[np.bool_]
     unbounded: NDArray[np.bool_]
+    p_seen: Numbers  # p if no stalled run is hidden
 
 
 def paired_ratio(
@@ -42,6 +45,7 @@ def paired_ratio(
     offset: float = 0.0,
     threshold: float = 0.0,
     confidence: float = 0.95,
+    at_stake: tuple[Numbers | float, Numbers | float] = (0.0, 0.0),
 ) -> RatioTest:
     """Interval and test of theta over paired seeds, for one study or many at once.
 
@@ -51,11 +55,13 @@ def paired_ratio(
         offset: Added to the ratio of means.
         threshold: The theta that the test compares with.
         confidence: Of the Fieller interval, in (0, 1).
+        at_stake: What stalls would take from mean(D) and add to it, shape (...), as
+            `stalls.at_stake` gives it; from ten seeds on p holds for stalls that no run showed.
 
     Returns:
-        Arrays of shape (...). The interval inverts the test: it excludes `threshold` exactly where
-        p_value < 1 - confidence, but where it is unbounded (limits -inf, inf). Differences without
-        spread (`degenerate`) have p = 1 and no limits.
+        Arrays of shape (...). The interval inverts the test of the runs seen: it excludes
+        `threshold` exactly where p_seen < 1 - confidence, but where it is unbounded (limits -inf,
+        inf). Differences without spread (`degenerate`) have p = 1 and no limits.
     """
     from scipy.special import stdtr, stdtrit
 
@@ -69,19 +75,31 @@ def paired_ratio(
     sd = difference.std(axis=-1, ddof=1)
     rounding = ROUNDING * (np.abs(num).max(axis=-1) + abs(null) * np.abs(den).max(axis=-1))
     degenerate = np.ptp(difference, axis=-1) <= rounding
-    statistic = mean_difference / (np.where(degenerate, 1.0, sd) / np.sqrt(n))
-    above, below = stdtr(df, -statistic), stdtr(df, statistic)
+    standard_error = np.where(degenerate, 1.0, sd) / np.sqrt(n)
+    statistic = mean_difference / standard_error
+    above, below = hidden_above, hidden_below = stdtr(df, -statistic), stdtr(df, statistic)
     t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + confidence / 2)))
     if n >= MIN_SEEDS:
         pivots = resampled_pivots(num - value[..., np.newaxis] * den)
         mirrored = -pivots[::-1]
-        above = np.maximum(above, upper_p(pivots, statistic))
-        below = np.maximum(below, upper_p(mirrored, -statistic))
+
+        def larger_p(statistic: Numbers, pivots: Numbers) -> Numbers:
+            return np.asarray(np.maximum(stdtr(df, -statistic), upper_p(pivots, statistic)))
+
+        above, below = larger_p(statistic, pivots), larger_p(-statistic, mirrored)
+        hidden_above, hidden_below = above, below
+        if any(np.any(items) for items in at_stake):
+            taken, added = (np.asarray(items) / standard_error for items in at_stake)
+            hidden_above = p_with_hidden(lambda x: larger_p(x, pivots), statistic, taken, n)
+            hidden_below = p_with_hidden(lambda x: larger_p(x, mirrored), -statistic, added, n)
         t_low = np.maximum(t_low, critical_value(pivots, alpha))
         t_high = np.maximum(t_high, critical_value(mirrored, alpha))
     low, high, unbounded = fieller_limits(num, den, t_low, t_high)
     # Seeds without spread between them are no evidence: equal counts come about by chance.
-    p_value = np.where(degenerate, 1.0, np.minimum(1.0, 2.0 * np.minimum(above, below)))
+    p_seen, p_value = (
+        np.where(degenerate, 1.0, np.minimum(1.0, 2.0 * np.minimum(*sides)))
+        for sides in ((above, below), (hidden_above, hidden_below))
+    )
     return RatioTest(
         value=value + offset,
         low=np.where(degenerate, -np.inf, low + offset),
@@ -93,6 +111,7 @@ def paired_ratio(
         degrees_of_freedom=float(df),
         degenerate=degenerate,
         unbounded=unbounded & ~degenerate,
+        p_seen=p_seen,
     )
 
 

@@ -19,6 +19,11 @@ class Term(NamedTuple):
     in_num: float
     in_den: float
 
+    def weight(self, theta: float) -> float:
+        """Weight of the sample in D = num - theta den; what is but rounding counts as 0."""
+        weight = self.in_num - theta * self.in_den
+        return 0.0 if abs(weight) <= ROUNDING * (1.0 + abs(self.in_num)) else weight
+
 
 class _Difference(NamedTuple):
     """mean(D), its squared standard error and Welch's degrees of freedom at one value of theta."""
@@ -68,13 +73,14 @@ def unpaired_ratio(
         degrees_of_freedom=df,
         degenerate=np.asarray(degenerate),
         unbounded=np.asarray(math.isinf(low) and not degenerate),
+        p_seen=np.asarray(p_value),
     )
 
 
 def _difference(terms: Sequence[Term], theta: float) -> _Difference:
     mean, variance, welch = 0.0, 0.0, 0.0
-    for sample, in_num, in_den in terms:
-        weight = in_num - theta * in_den
+    for term in terms:
+        sample, weight = term.sample, term.weight(theta)
         share = weight**2 * float(sample.var(ddof=1)) / sample.size
         mean += weight * float(sample.mean())
         variance += share

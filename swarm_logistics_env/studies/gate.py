@@ -29,7 +29,7 @@ from swarm_logistics_env.spi.estimate import Estimate, Verdict
 
 from .indicator_table import findings_of
 from .judged_comparisons import estimate_of, same_runs
-from .performance_table import Cell, cells_of, played
+from .performance_table import Cell, Row, cells_of, played
 from .results import StudyResults
 from .runs import seeds_in_words
 
@@ -330,7 +330,9 @@ def _change(
     problem: str | None = before.problem or after.problem
     if problem:
         return problem
-    p_o, p_new = before.by_seed, after.by_seed
+    # Over shared seeds the runs of these alone tell whether P is capped.
+    one: Row = before
+    other: Row = after
     if seeds is not None:
         if not seeds:
             return (
@@ -344,17 +346,14 @@ def _change(
         )
         if same_runs(one.digests, other.digests):
             return 0.0
-        p_o, p_new = one.by_seed, other.by_seed
     try:
         return spi.relative_change(
-            p_o,
-            p_new,
+            one.by_seed,
+            other.by_seed,
             threshold=gate.number,
             confidence=new.confidence,
             paired=seeds is not None,
-            saturated=[
-                name for name, cell in (("p_o", before), ("p_new", after)) if cell.saturated
-            ],
+            saturated=[name for name, cell in (("p_o", one), ("p_new", other)) if cell.saturated],
         )
     except spi.IndicatorError as error:
         return str(error)

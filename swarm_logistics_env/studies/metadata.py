@@ -63,6 +63,7 @@ class StoredSpecification(BaseModel):
         declared = self.read(place, task=asked.played)
         free = ("name", "seeds", "first_seed", "looks", "until_clear", "margin", "reference")
         mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
+        theirs["task"] = self.task
         return [name for name in mine if name not in free and mine[name] != theirs[name]]
 
 

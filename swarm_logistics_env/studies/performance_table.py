@@ -58,6 +58,7 @@ class Cell:
         "whether the published P lies in the interval of one run; None: unknown",
     ]
     saturated: Annotated[bool, "whether a run delivered every item, so that P is capped"]
+    stalled: Annotated[float, "share of runs with less than a quarter of the cell's median P"]
     problem: Annotated[str | None, "why runs are missing; None: they are complete"]
     arm: Annotated[Arm, "the setting and the condition"]
     by_seed: Annotated[NDArray[np.float64], "P seed by seed, shape (n_seeds,)"]
@@ -194,6 +195,7 @@ def _row(
         "prediction_low": one_run.low,
         "prediction_high": one_run.high,
         "published_inside": inside,
+        "stalled": spi.share_stalled(p) if p.size else None,
         "arm": arm,
         **runs._asdict(),
     }

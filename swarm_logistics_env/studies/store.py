@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import becoming
 from swarm_logistics_env.tasks.task import Outcome
-from swarm_logistics_env.writing import becoming
 
 from .database import Database, FullDiskError
 from .runs import Run

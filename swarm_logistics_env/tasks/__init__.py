@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swarm_logistics_env.policies.sb3_policy import StableBaselinesModel
+from swarm_logistics_env.policies.files import StableBaselinesModel
 
 from .failing_robots import FailingRobots, RobotFault
 from .parallel_policies import RandomActions

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.policies.code_identity import code_digest, function_digest, without_prose
+from swarm_logistics_env.policies.policy import code_digest, function_digest, without_prose
 from swarm_logistics_env.warehouse import Warehouse
 
 # These files decide what a run in somebody else's environment gives.

@@ -9,44 +9,19 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, JsonValue, PlainSerializer, field_validator
+from pydantic import BeforeValidator, PlainSerializer
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.errors import PolicyError, suggest
 from swarm_logistics_env.policies import Policy
-from swarm_logistics_env.policies.sb3_policy import SUFFIX as SB3_SUFFIX
-from swarm_logistics_env.policies.sb3_policy import StableBaselinesModel
-from swarm_logistics_env.records import Record, canonical_json
+from swarm_logistics_env.policies import PolicySpec as PolicyChoice
+from swarm_logistics_env.policies.files import SB3_SUFFIX, StableBaselinesModel
+from swarm_logistics_env.records import canonical_json
 
 Known = Mapping[str, Callable[..., Policy]]
 NONE: Known = MappingProxyType({})
-
-
-class PolicyChoice(Record):
-    """A policy by name, with parameters of its own.
-
-    Args:
-        name: for `policies.load`.
-        parameters: handed to the policy; whatever TOML and JSON both hold.
-        label: how the report calls it; empty: made from name and parameters.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    name: str
-    parameters: dict[str, JsonValue] = Field(default_factory=dict)
-    label: str = ""
-
-    @field_validator("parameters")
-    @classmethod
-    def _policys_own(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
-        # These are `policies.load`'s: whether to trust code is not for a file to say.
-        for name in ("name", "trust_code"):
-            if name in parameters:
-                raise ValueError(f"{name!r} is no parameter of a policy")
-        return parameters
 
 
 def policy_name(source: object) -> str:
@@ -56,15 +31,14 @@ def policy_name(source: object) -> str:
 
 def runs_code(source: object) -> bool:
     """Return whether to load a policy by its name runs code that the name leads to."""
-    name = policy_name(source)
-    return isinstance(source, str | PolicyChoice) and (":" in name or name.endswith(SB3_SUFFIX))
+    source = PolicyChoice(name=source) if isinstance(source, str) else source
+    return isinstance(source, PolicyChoice) and source.runs_code
 
 
 def policy_label(source: object) -> str:
     """Return how a study calls a policy: its label, the name it was asked for, or its class's."""
     if isinstance(source, PolicyChoice):
-        given = ", ".join(f"{name} = {value}" for name, value in source.parameters.items())
-        return source.label or f"{source.name} ({given})"
+        return source.title
     return source if isinstance(source, str) else type(source).__name__
 
 
@@ -117,11 +91,10 @@ def policy_of(source: object, known: Known = NONE) -> Policy:
 
 def policy_identity(source: object, known: Known = NONE) -> str:
     """Return text that changes whenever the policy's behaviour may have changed."""
-    identity = policies.identity(policy_of(source, known))
-    if not (isinstance(source, PolicyChoice) and source.parameters):
-        return identity
-    # A class of one's own need not tell its parameters.
-    return canonical_json({"given": source.parameters, "policy": identity})
+    policy = policy_of(source, known)
+    if isinstance(source, PolicyChoice):
+        return source.identity_of(policy)
+    return policies.identity(policy)
 
 
 def _chosen(value: object) -> object:

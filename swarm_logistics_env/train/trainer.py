@@ -17,13 +17,20 @@ from stable_baselines3.common.logger import configure
 
 from swarm_logistics_env.errors import PolicyError, TrainingError
 from swarm_logistics_env.policies import load
-from swarm_logistics_env.policies.card import PolicyCard
 from swarm_logistics_env.policies.files import write_policy
-from swarm_logistics_env.policies.learned import LearnedPolicy, check_tensors
+from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.train.curve import BEST, PICTURE, TrainingLog
-from swarm_logistics_env.train.evaluation import evaluate, reference_means, score
+from swarm_logistics_env.train.curve import BEST, PICTURE, LiveTable, TrainingLog
+from swarm_logistics_env.train.evaluation import (
+    enter,
+    evaluate,
+    reference_means,
+    score,
+    simulation,
+    versions,
+)
 from swarm_logistics_env.train.learner import (
+    NetworkView,
     device_of,
     linears,
     make_learner,
@@ -34,11 +41,7 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
     view_of,
 )
-from swarm_logistics_env.train.live_table import LiveTable
-from swarm_logistics_env.train.network_view import NetworkView
-from swarm_logistics_env.train.run_record import enter, simulation, versions
-from swarm_logistics_env.train.training import Training
-from swarm_logistics_env.train.training_worlds import follow_progress, make_worlds
+from swarm_logistics_env.train.training import Training, follow_progress, make_worlds
 
 CHECKPOINT_EVERY = 20.0  # seconds
 

@@ -1,11 +1,11 @@
-"""Faults: which robots fail in which mode, from when and for how long."""
+"""Faults: which robots, by seed or by role, fail in which mode, from when and for how long."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,58 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
 
 from .failure_modes import FAILURE_MODES, LOST_AS_A_WHOLE, failure_mode
-from .roles import ROLES, robots_in_role
 from .state import WarehouseState
+from .structs import NOBODY
+
+if TYPE_CHECKING:
+    from .state import WarehouseState
+
+ROLES = {
+    "carrier": "carries the requested item",
+    "neighbour": "the carrier sees it with its cameras",
+    "in_area": "in the delivery area",
+    "shuffling": "carries an item that is not requested",
+    "searching": "empty, anywhere else",
+}
+
+
+def roles_of(state: WarehouseState) -> NDArray[np.str_]:
+    """Return the role of each robot now, a key of `ROLES`, shape (N,); "" for an absent robot.
+
+    A robot that fits several roles has the first of them.
+    """
+    roles = np.full(state.n_robots, "searching", dtype="<U9")
+    roles[state.robot_item != NOBODY] = "shuffling"
+    roles[state.robot_in_delivery] = "in_area"
+    carrier = _carrier(state)
+    if carrier != NOBODY:
+        to_carrier = state.robot_position - state.robot_position[carrier]
+        is_near = np.hypot(*to_carrier.T) <= state.view_range[carrier]
+        roles[is_near] = "neighbour"
+        roles[carrier] = "carrier"
+    roles[~state.robot_present] = ""
+    return roles
+
+
+def robots_in_role(state: WarehouseState, role: str, count: int) -> NDArray[np.int64]:
+    """Return the numbers of `count` robots, ascending: those in the role first.
+
+    Among robots alike, those nearest to the requested item come first; so the sets of 1, 2, 3
+    robots are nested.
+    """
+    distance = np.zeros(state.n_robots)
+    if state.requested != NOBODY:
+        away = state.robot_position - state.item_position[state.requested]
+        distance = np.hypot(*away.T)
+    is_other = roles_of(state) != role
+    order = np.lexsort((distance, is_other, ~state.robot_present))
+    return np.sort(order[:count]).astype(np.int64)
+
+
+def _carrier(state: WarehouseState) -> int:
+    asked = state.requested
+    return int(state.item_carrier[asked]) if asked != NOBODY else NOBODY
+
 
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
@@ -207,10 +257,8 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
     """Return the numbers of the robots that `fault` affects, ascending.
 
     Raises:
-        FaultError: it is no fault, of more robots than there are, or of one that is not there.
+        FaultError: it is of more robots than there are, or of one that is not there.
     """
-    if not isinstance(fault, Fault):
-        raise FaultError(f'faults hold {fault!r}: should be a list of faults, as [Fault("FM1", 2)]')
     if isinstance(fault.robots, tuple):
         if max(fault.robots) >= n_robots:  # before numpy, whose integers end at 2**63
             raise FaultError(

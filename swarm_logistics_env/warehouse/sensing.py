@@ -1,22 +1,189 @@
 """What every robot senses, one sense after the other: the observation rows.
 
 Compiled, and over cell grids, so that the cost is linear in the number of robots.
+
+It has what a robot knows of itself and touches, and the errors of sensors: noise, rangers that
+fail, and what else turns a true row into a measured one. The rest stands in `surroundings`.
 """
 
 from __future__ import annotations
 
 import math
 
-from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import kernel
+import numpy as np
 
-from . import contact, rangers
-from .cameras import choose_neighbours, see_items, tell_of_neighbours
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, uniform
+
 from .grid import look_around
-from .own_state import feel_itself
-from .radio import listen, lowest_timer_heard
-from .rangers import Pose
-from .structs import NOBODY, Sensed, World
+from .structs import NOBODY, Parameters, Sensed, World
+from .surroundings import (
+    Pose,
+    choose_neighbours,
+    in_frame,
+    listen,
+    lowest_timer_heard,
+    scan_discs,
+    scan_solids,
+    see_items,
+    tell_of_neighbours,
+)
+
+
+@inlined_kernel
+def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
+    """Fill the end of a row: load, delivery area, timer, velocity and contact."""
+    robots, parameters = world.robots, world.parameters
+    velocity_x, velocity_y = robots.velocity[me, 0], robots.velocity[me, 1]
+    forward = velocity_x * pose.cosine + velocity_y * pose.sine
+    left = velocity_y * pose.cosine - velocity_x * pose.sine
+    limit = parameters.max_speed
+    carried, timer, requested = robots.item[me], robots.timer[me], world.progress.requested[0]
+    runs = not math.isnan(timer)
+    out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
+    out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and carried == requested else 0.0
+    out[row.IN_DELIVERY_AREA] = 1.0 if robots.in_delivery[me] else 0.0
+    out[row.TIMER_RUNS] = 1.0 if runs else 0.0
+    out[row.TIMER] = timer if runs else parameters.timer_limit
+    out[row.VELOCITY] = min(max(forward, -limit), limit)
+    out[row.VELOCITY + 1] = min(max(left, -limit), limit)
+    out[row.CONTACT] = 1.0 if robots.contact[me] else 0.0
+
+
+GAP = 0.01  # [m], gap below which two things touch
+
+
+@inlined_kernel
+def touches_solid(pose: Pose, world: World) -> bool:
+    """Return whether a robot touches a wall or an obstacle."""
+    parameters, obstacles = world.parameters, world.obstacles
+    reach = parameters.robot_radius + GAP
+    away_x = min(pose.x, parameters.warehouse_width - pose.x)
+    away_y = min(pose.y, parameters.warehouse_height - pose.y)
+    touches = min(away_x, away_y) < reach
+    limit = (reach + parameters.obstacle_radius) ** 2
+    for obstacle in range(len(obstacles)):
+        dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y
+        touches |= dx * dx + dy * dy < limit
+    return touches
+
+
+@inlined_kernel
+def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
+    """Return whether `me` touches a robot, and whether it is sound and touches one that failed."""
+    limit = (2.0 * world.parameters.robot_radius + GAP) ** 2
+    failed = world.robots.failed
+    touches = is_anchored = False
+    for index in range(n_found):
+        if world.nearby.square[index] < limit:
+            other = world.robot_grid.members[world.nearby.place[index]]
+            touches = True
+            is_anchored |= failed[other] and not failed[me]
+    return touches, is_anchored
+
+
+@inlined_kernel
+def touches_items(world: World, n_found: int) -> bool:
+    """Return whether a laden robot touches an item that is in its way."""
+    limit = (world.parameters.robot_radius + GAP + world.parameters.item_radius) ** 2
+    touches = False
+    for index in range(n_found):
+        if world.nearby.square[index] < limit:
+            item = world.item_grid.members[world.nearby.place[index]]
+            touches |= world.items.covered[item] == 0
+    return touches
+
+
+_N_RANGES = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
+_ITEM_WIDTH, _NEIGHBOUR_WIDTH = len(row.ITEM_FEATURES), len(row.NEIGHBOUR_FEATURES)
+# Things with a place: items, neighbours, and the teller of the lowest timer.
+_N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
+# A robot draws in a step: an error for every beam, whether each is dropped, then errors of places.
+_DROPPED, _PLACES, _DRAWS = _N_RANGES, 2 * _N_RANGES, 2 * _N_RANGES + 2 * _N_THINGS
+
+
+@kernel
+def disturb(world: World, rows: Sensed) -> None:
+    """Add the scenario's noise to rows (N, D) and drop beams, in place.
+
+    What is measured stays within the column's range.
+    """
+    robots, able, parameters = world.robots, world.able, world.parameters
+    is_exact = parameters.ranger_noise == 0.0 and parameters.position_noise == 0.0
+    if is_exact and parameters.sensor_dropout == 0.0:
+        return
+    for robot in range(len(rows)):
+        if robots.present[robot]:
+            key, first = robots.sensor_key[robot], world.progress.step[0] * _DRAWS
+            own_range = able.ranger_range[robot]
+            reach = own_range if own_range > 0.0 else parameters.ranger_range
+            disturb_beams(key, first, reach, parameters, rows[robot])
+            if parameters.position_noise > 0.0:
+                disturb_places(key, first + _PLACES, parameters, rows[robot])
+
+
+@kernel
+def disturb_beams(
+    key: np.uint64, first: int, reach: float, parameters: Parameters, out: Sensed
+) -> None:
+    """Add noise to the beams of a row, from number `first` of the stream, and drop some.
+
+    A beam that is dropped reports what one does that meets nothing within `reach` [m].
+    """
+    dropout, noise = parameters.sensor_dropout, parameters.ranger_noise
+    for beam in range(_N_RANGES):
+        if dropout > 0.0 and uniform(key, 2 * (first + _DROPPED + beam)) < dropout:
+            out[beam] = reach
+        elif noise > 0.0 and out[beam] < np.float32(reach):
+            noisy = out[beam] + noise * gaussian(key, first + beam)
+            out[beam] = min(max(noisy, 0.0), reach)
+
+
+@kernel
+def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sensed) -> None:
+    """Add noise to the places of what is there in a row, from number `first` of the stream."""
+    far = max(parameters.view_range, parameters.radio_range)
+    for thing in range(_N_THINGS):
+        if thing < row.N_ITEMS_IN_VIEW:
+            column, limit = row.ITEMS + _ITEM_WIDTH * thing, parameters.view_range
+        else:
+            column = row.NEIGHBOURS + _NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
+            limit = far
+        if out[column] > 0.5:
+            for axis in range(2):
+                error = parameters.position_noise * gaussian(key, first + 2 * thing + axis)
+                out[column + 1 + axis] = min(max(out[column + 1 + axis] + error, -limit), limit)
+
+
+@kernel
+def fail_rangers(world: World, rows: Sensed) -> None:
+    """Make of the beams in rows (N, D) what rangers that have failed report, in place."""
+    robots, able = world.robots, world.able
+    for robot in range(len(rows)):
+        if not robots.present[robot]:
+            continue
+        beams, frozen = rows[robot, :_N_RANGES], robots.frozen_beams[robot]
+        if able.ranger_bias[robot] != 0.0:
+            own = able.ranger_range[robot]
+            reach = own if own > 0.0 else world.parameters.ranger_range
+            add_bias(beams, able.ranger_bias[robot], reach)
+        if able.rangers_refresh[robot]:
+            frozen[0] = math.nan
+        elif math.isnan(frozen[0]):
+            for beam in range(_N_RANGES):
+                frozen[beam] = beams[beam]
+        else:
+            for beam in range(_N_RANGES):
+                beams[beam] = frozen[beam]
+
+
+@kernel
+def add_bias(beams: Sensed, bias: float, reach: float) -> None:
+    """Lengthen the beams that meet something by `bias` [m], at most to `reach` [m]."""
+    for beam in range(len(beams)):
+        if beams[beam] < np.float32(reach):
+            beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
+
 
 _N_BEAMS = row.N_BEAMS
 _ROBOTS, _WALLS, _ITEMS, _LOWEST = (
@@ -46,10 +213,10 @@ def sense(world: World, rows: Sensed) -> int:
         scans[:] = reach if reach > 0.0 else world.parameters.ranger_range
         if reach > 0.0:
             scan = rows[me, _WALLS : _WALLS + _N_BEAMS]
-            rangers.scan_solids(pose, reach, world, scan)
+            scan_solids(pose, reach, world, scan)
         n_anchored += int(sense_robots(me, pose, world, rows[me]))
         sense_items(me, pose, world, rows[me])
-        if contact.touches_solid(pose, world):
+        if touches_solid(pose, world):
             robots.contact[me] = True
         feel_itself(me, pose, world, rows[me])
     return n_anchored
@@ -64,22 +231,18 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     robots, able, parameters = world.robots, world.able, world.parameters
     grid, nearby, radius = world.robot_grid, world.nearby, world.parameters.robot_radius
     ranger_range, view_range = able.ranger_range[me], able.view_range[me]
-    reach = max(
-        ranger_range + radius, view_range, parameters.radio_range, 2.0 * radius + contact.GAP
-    )
+    reach = max(ranger_range + radius, view_range, parameters.radio_range, 2.0 * radius + GAP)
     n_found = look_around(grid, pose.x, pose.y, reach, me, nearby)
-    touches, is_anchored = contact.touches_robots(me, world, n_found)
+    touches, is_anchored = touches_robots(me, world, n_found)
     robots.contact[me] |= touches
     if ranger_range > 0.0:
         scan = out[_ROBOTS : _ROBOTS + _N_BEAMS]
-        rangers.scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
+        scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     listen(me, world, n_found)
     lowest, timer = lowest_timer_heard(world, n_found)
     if lowest != NOBODY:
         robots.heard[me] = timer
-        forward, left = rangers.in_frame(
-            pose, robots.position[lowest, 0], robots.position[lowest, 1]
-        )
+        forward, left = in_frame(pose, robots.position[lowest, 0], robots.position[lowest, 1])
         out[_LOWEST] = 1.0
         out[_LOWEST + 1] = forward
         out[_LOWEST + 2] = left
@@ -95,12 +258,12 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     parameters, grid, nearby = world.parameters, world.item_grid, world.nearby
     radius = parameters.item_radius
     ranger_range, view_range = world.able.ranger_range[me], world.able.view_range[me]
-    touch = parameters.robot_radius + contact.GAP + radius
+    touch = parameters.robot_radius + GAP + radius
     reach = max(ranger_range + radius, view_range, touch)
     n_found = look_around(grid, pose.x, pose.y, reach, NOBODY, nearby)
     if ranger_range > 0.0:
         scan = out[_ITEMS : _ITEMS + _N_BEAMS]
-        rangers.scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
+        scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     if world.robots.item[me] != NOBODY:
-        world.robots.contact[me] |= contact.touches_items(world, n_found)
+        world.robots.contact[me] |= touches_items(world, n_found)
     see_items(me, pose, world, n_found, out)

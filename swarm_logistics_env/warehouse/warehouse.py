@@ -114,7 +114,7 @@ class Warehouse:
             commands = self._checked(commands)
         self._world.commands.now[...] = commands
         rows = self._blank_rows()
-        self.take(rows, self._advance(rows))
+        self.take(rows, stepping.step(self._address, rows))
         return rows
 
     def take(self, rows: Sensed, is_eventful: bool) -> None:
@@ -226,9 +226,6 @@ class Warehouse:
         if self._seed is None:
             raise SetupError(f"{asked} before reset: call reset(seed) first")
         return self._seed
-
-    def _advance(self, rows: Sensed) -> bool:
-        return stepping.step(self._address, rows)
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
         """Place everything, give it its random streams, and ask for the first item."""
@@ -396,5 +393,5 @@ def _scenario(given: Scenario | None, otherwise: Scenario) -> Scenario:
 
 def _faults(given: Sequence[Fault]) -> Sequence[Fault]:
     if not isinstance(given, Sequence) or not all(isinstance(each, Fault) for each in given):
-        raise FaultError(f"faults = {given!r}: should be a list of Fault")
+        raise FaultError(f'faults = {given!r}: should be a list of Fault, as [Fault("FM1", 2)]')
     return given

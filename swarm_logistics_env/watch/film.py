@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering.canvas import new_canvas, to_array
+from swarm_logistics_env.rendering.caption import draw_strip
 from swarm_logistics_env.rendering.palette import INK, SURROUNDINGS
 from swarm_logistics_env.rendering.picture import Picture
-from swarm_logistics_env.rendering.projection import LARGEST_SIZE, LEAST_SIZE
-from swarm_logistics_env.rendering.readings import Curve, Event
-from swarm_logistics_env.rendering.sprites import words
-from swarm_logistics_env.rendering.strip import draw_strip
+from swarm_logistics_env.rendering.readings import LARGEST_SIZE, LEAST_SIZE, Curve, Event
+from swarm_logistics_env.rendering.sprites import new_canvas, to_array, words
 from swarm_logistics_env.warehouse.faults import failed_robots
 
 MOST_TAKES = 4

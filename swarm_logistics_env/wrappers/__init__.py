@@ -6,16 +6,12 @@ outermost. The seed of an episode decides what a wrapper draws for it. If severa
 thing, the options of the reset win, then the outer wrapper, then the inner one; faults add up.
 """
 
-from .condition import Condition
-from .discrete_actions import DiscreteActions
-from .fault_injection import FaultInjection
-from .fixed_agents import FixedAgents
+from .action_forms import DiscreteActions, MotionFrame
+from .disturbances import FaultInjection, ParameterChange
+from .indicator_payments import RunningMeans
 from .indicator_reward import IndicatorReward
-from .motion_frame import MotionFrame
-from .parameter_change import ParameterChange
-from .reference_performances import RunningMeans
-from .swarm_size import SwarmSize
-from .wrapper import Wrapper
+from .swarm_size import FixedAgents, SwarmSize
+from .wrapper import Condition, Wrapper
 
 __all__ = [
     "Condition",

@@ -14,17 +14,17 @@ from swarm_logistics_env.environment.rewards import carrier_of_requested, finite
 from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.warehouse.state import NOBODY
 
-from .condition import Condition, changes_of, condition_of
 from .indicator_payments import (
     INDICATORS,
     PERFORMANCES,
     EpisodeIndicator,
+    GivenPerformances,
     Payment,
+    RunningMeans,
     derivative_of,
     indicator_of,
 )
-from .reference_performances import GivenPerformances, RunningMeans
-from .wrapper import Wrapper
+from .wrapper import Condition, Wrapper, changes_of, condition_of
 
 CREDITS = ("team", "deliverer", "carriers")
 

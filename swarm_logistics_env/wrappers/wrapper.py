@@ -1,8 +1,11 @@
-"""The base of all wrappers."""
+"""The base of all wrappers; the condition of an episode, which indicators tell episodes apart by;
+and quantities of an episode that are fixed, one of a list, or drawn from a distribution.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,9 +14,137 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_logistics_env.environment.dict_view import ArrayStep, DictView
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.reset_options import checked_options, checked_seed
+from swarm_logistics_env.environment.requests import checked_options, checked_seed
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse import Warehouse
+from swarm_logistics_env.warehouse.faults import failed_robots
+
+
+@dataclass(frozen=True)
+class Condition:
+    """The difference of an episode from its reference: size, faults, a changed parameter.
+
+    The onset of a fault is no part of it: if onsets are drawn, P_F is the mean over them.
+
+    Args:
+        n_robots: the swarm size N.
+        modes: failure modes of its faults, sorted; "removed" is none of them.
+        n_failed: how many robots these affect (m of R and FT).
+        n_removed: how many robots are removed.
+        changes: (field, value) of the scenario where it is not the environment's own, sorted.
+
+    Raises:
+        SetupError: more robots fail or are removed than there are, or faults without a mode.
+
+    Example:
+        >>> Condition(25, ("FM1",), n_failed=2)
+        Condition(n_robots=25, modes=('FM1',), n_failed=2, n_removed=0, changes=())
+    """
+
+    n_robots: int
+    modes: tuple[str, ...] = ()
+    n_failed: int = 0
+    n_removed: int = 0
+    changes: tuple[tuple[str, Any], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("n_failed", "n_removed"):
+            if not 0 <= getattr(self, name) <= self.n_robots:
+                raise SetupError(
+                    f"Condition.{name} = {getattr(self, name)}: should be at least 0 and at most "
+                    f"n_robots = {self.n_robots}"
+                )
+        if bool(self.modes) != bool(self.n_failed):
+            raise SetupError(
+                f"Condition.modes = {self.modes}, n_failed = {self.n_failed}: should both be given "
+                "or neither"
+            )
+
+
+def condition_of(world: Warehouse, seed: int, own: Scenario) -> Condition:
+    """Return the condition of the episode of `seed` in `world`, relative to the scenario `own`."""
+    n_robots = world.scenario.n_robots
+    modes, failed, removed = set[str](), set[int](), set[int]()
+    for fault in world.faults:
+        robots = failed_robots(fault, seed, n_robots).tolist()
+        if fault.mode == "removed":
+            removed.update(robots)
+        else:
+            modes.add(fault.mode)
+            failed.update(robots)
+    changes = changes_of(world.scenario, own)
+    return Condition(n_robots, tuple(sorted(modes)), len(failed), len(removed), changes)
+
+
+def changes_of(scenario: Scenario, own: Scenario) -> tuple[tuple[str, Any], ...]:
+    """Return the fields of `scenario`, but for the size, that differ from `own`, with values."""
+    return tuple(
+        (name, getattr(scenario, name))
+        for name in sorted(type(own).model_fields)
+        if name != "n_robots" and getattr(scenario, name) != getattr(own, name)
+    )
+
+
+Distribution = Callable[[np.random.Generator], Any]
+
+
+class Sampler:
+    """Samples a value for each episode.
+
+    Args:
+        name: the name of the quantity, for errors.
+        given: one value for all episodes; a list or array to draw from, each value equally
+            likely; or a function of a numpy Generator.
+        within: (least, greatest) value that the function returns; required with a function.
+
+    Raises:
+        SetupError: the list is empty, or a function comes without `within`.
+    """
+
+    def __init__(self, name: str, given: Any, within: tuple[Any, Any] | None = None) -> None:
+        self._name, self._given, self._within = name, given, within
+        self.ends: tuple[Any, ...]  # the values that are least and greatest are among these
+        if callable(given):
+            if not isinstance(within, tuple | list) or len(within) != 2:
+                raise SetupError(
+                    f"within = {within!r}: should be (least, greatest), the bounds of what the "
+                    f"distribution of {name} gives"
+                )
+            self.ends = tuple(within)
+        elif isinstance(given, list | np.ndarray):
+            self.ends = tuple(_plain(value) for value in given)
+        else:
+            self.ends = (_plain(given),)
+        if not self.ends:
+            raise SetupError(f"{name} = []: should list at least one value")
+        if within is not None and not callable(given):
+            raise SetupError(f"within = {within!r}: should be None but for a distribution")
+
+    def sample(self, rng: np.random.Generator) -> Any:
+        """Return the value of an episode.
+
+        Raises:
+            SetupError: the function returned a value that is not within its bounds.
+        """
+        if not callable(self._given):
+            return self.ends[int(rng.integers(len(self.ends)))]
+        value = _plain(self._given(rng))
+        least, greatest = self.ends
+        try:
+            is_within = bool(least <= value <= greatest)
+        except (TypeError, ValueError):
+            is_within = False
+        if not is_within:
+            raise SetupError(
+                f"{self._name} = {value!r}: the distribution should give numbers within "
+                f"{self._within}"
+            )
+        return value
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
 
 
 class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo ships no types

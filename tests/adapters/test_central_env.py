@@ -109,6 +109,20 @@ def test_the_reward_is_one_per_delivery_and_all_delivered_terminates() -> None:
     assert info["delivered"] == 2
 
 
+def test_the_reward_is_the_mean_over_those_who_are_there() -> None:
+    faults = [Fault("removed", 2, onset=0.1)]
+    env = CentralEnv(n_robots=3, n_items=1, pickup_range=14.0, duration=60.0, faults=faults)
+    env.reset(seed=0)
+    state, rewards, ended = env.env.warehouse.state, [], False
+    while not ended:
+        east = np.stack([np.cos(state.robot_heading), -np.sin(state.robot_heading)], axis=1)
+        action = np.hstack([east, np.zeros((3, 1)), np.ones((3, 1))])
+        _, reward, ended, cut, _ = env.step(action)
+        assert not cut
+        rewards.append(reward)
+    assert rewards[-1] == 1.0
+
+
 def test_it_terminates_when_nobody_is_left() -> None:
     env = CentralEnv(n_robots=2, faults=[Fault("removed", 2, onset=0.2)], duration=9.0)
     env.reset(seed=0)

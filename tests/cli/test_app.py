@@ -39,6 +39,7 @@ SMALL = [
         (["run", "--policy", "ppo"], "did you mean 'ppo-delivery', 'ppo-"),
         (["run", "--fault", "fm4"], "did you mean 'FM4' or 'FM4_jam'?"),
         (["run", "--scenario", "none.toml"], "--scenario none.toml: No such file"),
+        (["run", "--scenario", "n\x1b]0;x\x07"], r"--scenario n\x1b]0;x\x07: No such file"),
         (["run", "--policy", "swarm-td"], "did you mean 'swarm-dt'?"),
         (["run", "--fault", "FM9"], "did you mean 'FM1', 'FM2', 'FM3' or 'FM4'?"),
         (["run", "--fault", "FM1:x"], "MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]]"),

@@ -16,7 +16,7 @@ import pytest
 
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.policies import read_card
-from swarm_logistics_env.policies.loading import WEIGHTS
+from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.store import FILE_NAME, Store

@@ -504,3 +504,10 @@ def test_a_command_that_is_no_row_of_real_numbers_is_refused(command: Any, sente
         env.step({"robot_0": command})
     with pytest.raises(CommandError, match="should be"):
         env.step_arrays([command])
+
+
+def test_the_state_of_a_robot_that_is_shoved_lies_in_its_space() -> None:
+    env = SwarmLogisticsEnv(n_robots=2)
+    env.reset(seed=0)
+    env.warehouse.state.robot_velocity[:] = [[9.0, -9.0], [0.0, 9.0]]
+    assert env.state_space.contains(env.state())

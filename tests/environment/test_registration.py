@@ -11,7 +11,7 @@ import numpy as np
 import pettingzoo
 import pytest
 
-from swarm_logistics_env.environment import registration
+import swarm_logistics_env
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
@@ -88,6 +88,6 @@ def test_pettingzoo_makes_both_forms_by_name() -> None:
 
 
 def test_registering_twice_is_harmless() -> None:
-    before = gymnasium.registry[registration.GYMNASIUM_ID]
-    registration.register()
-    assert gymnasium.registry[registration.GYMNASIUM_ID] is before
+    before = gymnasium.registry[swarm_logistics_env.GYMNASIUM_ID]
+    swarm_logistics_env._register()
+    assert gymnasium.registry[swarm_logistics_env.GYMNASIUM_ID] is before

@@ -112,6 +112,14 @@ def test_approach_pays_metres_towards_the_delivery_area(world: Warehouse) -> Non
     assert terms.pay(world) == pytest.approx([0.0] * 4)
 
 
+def test_the_way_inside_the_delivery_area_pays_nothing(world: Warehouse) -> None:
+    give(world, 1, 2)
+    world.state.robot_position[1] = [STORAGE + 0.2, 5.0]
+    terms = started(world, carried_way=1.0, approach=1.0, discount=1.0)
+    world.state.robot_position[1] = [STORAGE + 1.5, 5.0]
+    assert terms.pay(world).tolist() == [0.0] * 4
+
+
 def test_approach_pays_nothing_for_a_change_of_item_or_carrier(world: Warehouse) -> None:
     give(world, 1, 2)
     terms = started(world, approach=1.0)

@@ -11,9 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env.observations import bounds
-from swarm_logistics_env.policies.card import Network, PolicyCard
 from swarm_logistics_env.policies.files import write_policy
-from swarm_logistics_env.policies.learned import tensor_shapes
+from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
 from swarm_logistics_env.scenario import Scenario
 
 Tensors = dict[str, NDArray[np.float32]]

@@ -10,8 +10,8 @@ import pytest
 from swarm_logistics_env import Fault, Scenario, Warehouse, run_episode
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.central import WaitingPlaces
 from swarm_logistics_env.policies.policy import decide, start
-from swarm_logistics_env.policies.waiting import WaitingPlaces
 
 SMALL = Scenario(
     n_robots=6, n_items=20, warehouse_width=6.0, warehouse_height=4.0, duration=60.0, restock=True

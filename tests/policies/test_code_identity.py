@@ -12,7 +12,7 @@ import pytest
 import swarm_logistics_env
 from swarm_logistics_env import Scenario, run_episode
 from swarm_logistics_env.policies import SwarmDT, identity, load
-from swarm_logistics_env.policies.code_identity import code_digest
+from swarm_logistics_env.policies.policy import code_digest
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 
@@ -22,7 +22,7 @@ import json, sys
 from pathlib import Path
 import swarm_logistics_env
 from swarm_logistics_env.policies.central import Central
-from swarm_logistics_env.policies.code_identity import code_digest
+from swarm_logistics_env.policies.policy import code_digest
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
@@ -98,7 +98,7 @@ def test_only_code_that_a_policy_uses_changes_its_identity(tmp_path: Path) -> No
     everybody = ["Central", "Homing", "LearnedPolicy", "SwarmDT"]
     expected = {
         ("policies/another.py", "", "GAIN = 1.0\n"): [],
-        ("policies/loading.py", "SCRIPTED: dict", "MORE = 1\nSCRIPTED: dict"): [],
+        ("policies/spec.py", "SCRIPTED: dict", "MORE = 1\nSCRIPTED: dict"): [],
         ("policies/swarm_dt.py", "# It turns towards", "# Turns towards"): [],
         ("errors.py", "class ", "MORE = 1\n\n\nclass "): [],
         ("policies/swarm_dt.py", "2.0 * drawn - 1.0", "1.9 * drawn - 1.0"): ["SwarmDT"],

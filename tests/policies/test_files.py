@@ -13,7 +13,7 @@ from safetensors.numpy import load_file, save_file
 from swarm_logistics_env import observations as row
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.policies import PolicyCard, identity, read_card
+from swarm_logistics_env.policies import PolicyCard, files, identity, read_card
 from swarm_logistics_env.policies.files import CARD, write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy
 
@@ -72,6 +72,13 @@ def test_a_pickle_is_refused_and_not_executed(file: Path, tmp_path: Path, wrap: 
             archive.writestr("data.pkl", pickle.dumps(Bomb()))
     refused(file, "carries a pickle, which executes code")
     assert not (tmp_path / "executed").exists()
+
+
+def test_a_file_that_is_too_large_is_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "LARGEST_FILE", file.stat().st_size)
+    policies.load(str(file))
+    monkeypatch.setattr(files, "LARGEST_FILE", file.stat().st_size - 1)
+    refused(file, "bytes: a policy file should have at most")
 
 
 def test_a_tensor_of_another_shape_is_refused(
@@ -148,7 +155,7 @@ def test_an_unknown_format_is_refused(card: PolicyCard, tensors: Tensors, file: 
 def test_a_missing_file_and_one_of_another_kind_are_refused(tmp_path: Path) -> None:
     refused(tmp_path / "none.safetensors", "cannot read the policy file .*No such file")
     (tmp_path / "weights.pt").write_bytes(b"weights")
-    refused(tmp_path / "weights.pt", "is no policy file: should end in .safetensors, .json or .zip")
+    refused(tmp_path / "weights.pt", "is no policy file: should end in .safetensors or .zip")
 
 
 def test_a_model_of_stable_baselines3_asks_to_be_trusted(tmp_path: Path) -> None:
@@ -158,7 +165,7 @@ def test_a_model_of_stable_baselines3_asks_to_be_trusted(tmp_path: Path) -> None
 
 
 def test_shipped_policies_are_small() -> None:
-    from swarm_logistics_env.policies.loading import WEIGHTS
+    from swarm_logistics_env.policies.spec import WEIGHTS
 
     sizes = {path.name: path.stat().st_size for path in WEIGHTS.glob("*.safetensors")}
     assert all(size < 1_000_000 for size in sizes.values()), sizes

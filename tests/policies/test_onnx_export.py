@@ -15,9 +15,8 @@ from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame, memory
 from swarm_logistics_env.policies import PolicyCard
-from swarm_logistics_env.policies.files import CARD
+from swarm_logistics_env.policies.files import CARD, DEVIATIONS, write_onnx
 from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy, explore
-from swarm_logistics_env.policies.onnx_export import DEVIATIONS, write_onnx
 from swarm_logistics_env.streams import row_keys
 
 PAGE = Path(__file__).parents[2] / "docs" / "onnx.md"
@@ -110,6 +109,23 @@ def test_one_that_does_not_listen_ignores_timers(tmp_path: Path) -> None:
     lead = [place for place, name in enumerate(INPUTS) if name.startswith("lead_")]
     told[:, lead] = rng.normal(size=(5, len(lead)))
     np.testing.assert_array_equal(*(session.run(None, {"inputs": x})[0] for x in (inputs, told)))
+
+
+def test_the_deviations_beside_it_make_the_commands_of_one_that_explores(
+    card: PolicyCard,
+    tensors: dict[str, NDArray[np.float32]],
+    rows: NDArray[np.float32],
+    tmp_path: Path,
+) -> None:
+    policy = LearnedPolicy(card, tensors)
+    said = session_of(policy, tmp_path / "p.onnx").get_modelmeta().custom_metadata_map
+    deviations = np.array(said[DEVIATIONS].split(), np.float32)
+    policy.reset(len(rows), 3)
+    frame, keys = MotionFrame(Scenario(), card.network.listens), row_keys(3, STREAM, len(rows))
+    frame.begin(keys)
+    outputs = policy._network(frame.read(rows))
+    explore(keys, 0, deviations, outputs)
+    np.testing.assert_array_equal(frame.command(outputs), policy.act(rows))
 
 
 def test_the_card_travels_along(tmp_path: Path) -> None:

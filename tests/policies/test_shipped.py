@@ -7,7 +7,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.policies.learned import LearnedPolicy
-from swarm_logistics_env.policies.loading import WEIGHTS
+from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.train.training import load_training, preset_names
 from swarm_logistics_env.warehouse import Fault
 

@@ -26,7 +26,7 @@ from swarm_logistics_env.rendering.palette import (
     SHUFFLING,
     TIMER,
 )
-from swarm_logistics_env.rendering.projection import Projection
+from swarm_logistics_env.rendering.readings import Projection
 from swarm_logistics_env.warehouse import FAILURE_MODES, WarehouseState
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering import video
+from swarm_logistics_env.rendering import renderer as video
 from swarm_logistics_env.rendering.palette import film_colours
 
 Frame = NDArray[np.uint8]

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import base64
+import html
 import json
 import re
 import shlex
+import shutil
+import subprocess
 import zlib
+from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +19,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.report import page_data as page_data_module
 from swarm_logistics_env.report.page_data import page_data, watch_command
 from swarm_logistics_env.report.verdict_matrix import verdict_matrix
 from swarm_logistics_env.studies import Study
@@ -148,6 +154,33 @@ def test_runs_of_another_version_of_the_code_are_not_replayed(
     task = type(found.plan.conditions[0].task)
     monkeypatch.setattr(task, "code", lambda self: "another")
     assert page_data(found, verdict_matrix(found))["replays"] == []
+
+
+def test_a_replay_is_of_the_very_run_that_was_judged(found: StudyResults) -> None:
+    other = {key: replace(one, digest="0" * 32) for key, one in found.outcomes.items()}
+    changed = replace(found, outcomes=other)
+    assert page_data(changed, verdict_matrix(changed))["replays"] == []
+
+
+def test_a_report_runs_no_code_that_a_store_names(
+    found: StudyResults, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    played: list[object] = []
+    monkeypatch.setattr(page_data_module, "runs_code", lambda source: True)
+    monkeypatch.setattr(page_data_module, "record_run", lambda *given: played.append(given))
+    assert page_data(found, verdict_matrix(found))["replays"] == []
+    assert played == []
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="runs a line of the page's script")
+def test_the_pages_script_escapes_what_it_draws() -> None:
+    script = resources.files("swarm_logistics_env.report").joinpath("page.js").read_text()
+    (line,) = re.findall(r"^const escaped = .*$", script, re.MULTILINE)
+    hostile = """</text><img src=x onerror="alert(1)">&amp;"""
+    program = f"{line}\nprocess.stdout.write(escaped({json.dumps(hostile)}))"
+    done = subprocess.run(["node", "-e", program], capture_output=True, text=True, check=True)
+    assert not set(done.stdout) & set('<>"')
+    assert html.unescape(done.stdout) == hostile
 
 
 def test_text_of_a_study_cannot_end_the_script(tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.report_files import write_report
-from swarm_logistics_env.report.wording import sentence
+from swarm_logistics_env.report.report_files import latex_tables, section_markdown, write_report
+from swarm_logistics_env.report.result_tables import Section
+from swarm_logistics_env.report.wording import counted_as, sentence
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparisons import Setting
 from swarm_logistics_env.studies.performance_table import rows_of
@@ -43,6 +44,28 @@ def results(
         capped = level == NARROW and run.seed == 0
         outcomes[run.key] = Outcome(run.key, times, all_delivered=capped)
     return judge(plan, outcomes)
+
+
+def test_no_headline_counts_a_verdict_that_assumes_normal_differences(
+    found: StudyResults,
+) -> None:
+    assumed = [row for row in rows_of(found.indicators) if "assumes_normal" in row.flags]
+    decided = {counted_as(row, "supported") for row in assumed}
+    assert len(decided) == 1
+    assert decided.isdisjoint({"supported", "refuted", "equivalent"})
+    assert {counted_as(row, "inconclusive") for row in assumed} == {"inconclusive"}
+
+
+def test_no_name_breaks_a_table() -> None:
+    hostile = ("a|b", r"50 % of \a_{b}", "[x]", "~^&#$")
+    table = Section("t_1", hostile, (hostile,))
+    head, _, row = section_markdown(table).splitlines()[2:]
+    assert head == row == r"| a\|b | 50 % of \a_{b} | [x] | ~^&#$ |"
+    latex = latex_tables([table])
+    cells = (r"a|b", r"50 \% of \textbackslash{}a\_\{b\}", "[x]",
+             r"\textasciitilde{}\textasciicircum{}\&\#\$")  # fmt: skip
+    assert latex.count(" & ".join(f"{{{cell}}}" for cell in cells)) == 2
+    assert r"\caption{t\_1}" in latex
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,8 @@ def poisson(rng: np.random.Generator, n: int, change: float) -> tuple[np.ndarray
 @pytest.mark.parametrize("model", ["poisson", "overdispersed"])
 @pytest.mark.parametrize("change", [-0.1, 0.1])
 def test_at_the_edge_of_the_margin_at_most_5_percent_are_wrong(model: str, change: float) -> None:
-    assert 0.02 < share_equivalent(model, 30, change, 1_500) <= 0.055
+    assert 0.02 < share_equivalent(model, 30, change, 1_500, only_seen=True) <= 0.055
+    assert share_equivalent(model, 30, change, 1_500) <= 0.055
 
 
 @pytest.mark.parametrize("model", ["poisson", "overdispersed"])
@@ -31,7 +32,8 @@ def test_the_planned_seeds_have_the_promised_power(model: str) -> None:
 
 
 def test_it_is_the_two_tests_of_the_indicators() -> None:
-    p_o, p_f = poisson(np.random.default_rng(3), 40, -0.02)
+    # Of so many seeds no share of hidden stalls matters, so that verdict and interval agree.
+    p_o, p_f = poisson(np.random.default_rng(3), 400, -0.02)
     found = spi.equivalence(p_o, p_f)
     above, below = (
         spi.relative_change(p_o, p_f, threshold=edge, confidence=0.9) for edge in (-0.1, 0.1)

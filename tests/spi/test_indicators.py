@@ -220,14 +220,22 @@ def test_skewed_differences_are_flagged() -> None:
     assert spi.robustness([60.1] * 20, [60.1] * 20, n=25, m=3).flags == ("degenerate",)
 
 
-@pytest.mark.parametrize(("outlier", "flags"), [(4.1, ()), (4.3, ("skewed",))])
+@pytest.mark.parametrize(("outlier", "skewed"), [(4.1, False), (4.3, True)])
 def test_ten_differences_are_skewed_beyond_twice_the_standard_error_of_g(
-    outlier: float, flags: tuple[str, ...]
+    outlier: float, skewed: bool
 ) -> None:
     # g = 1.341 and 1.439; the standard error of ten is .687 (Cramer), and Cochran's limit .632.
     p_o = np.full(10, 40.0)
     p_f = p_o + np.array([-1, 1, -1, 1, -1, 1, -1, 1, 0, outlier])
-    assert spi.robustness(p_o, p_f, n=25, m=1).flags == flags
+    assert ("skewed" in spi.robustness(p_o, p_f, n=25, m=1).flags) == skewed
+
+
+@pytest.mark.parametrize(("n", "skewed"), [(60, True), (200, False)])
+def test_many_seeds_make_up_for_skewness(n: int, skewed: bool) -> None:
+    # g of exponential differences is nearly 2, far beyond chance; 25 g^2 is about 90.
+    waits = -np.log((np.arange(n) + 0.5) / n)
+    found = spi.robustness(np.full(n, 40.0), 40.0 - waits, n=25, m=1)
+    assert ("skewed" in found.flags) == skewed
 
 
 counts = st.lists(st.integers(0, 60), min_size=2, max_size=8)
@@ -287,6 +295,41 @@ def test_capped_removed_runs_cannot_show_tolerance() -> None:
     assert spi.fault_tolerance(P_O, HALF, P_O, saturated=["p_s"]).verdict == "refuted"
     with pytest.raises(IndicatorError, match="saturated = 'p_new': should be among p_f, p_s, p_o"):
         spi.fault_tolerance(P_O, HALF, P_O, saturated=["p_new"])
+
+
+NEAR_CAP = np.array([59.9, 60.0, 59.8, 60.0, 59.8])
+FEWER = np.array([40.0, 40.3, 39.7, 40.1, 39.9])
+GREATER = np.array([47.1, 46.9, 47.0, 47.2, 46.8])
+
+
+@pytest.mark.parametrize(
+    ("p_f", "p_s", "threshold", "saturated", "verdict"),
+    [
+        (FEWER, GREATER, -0.1, "p_o", "inconclusive"),  # of a true P_o of 80 the loss is but .086
+        (FEWER, GREATER, -0.1, "p_s", "refuted"),  # of a larger P_S the loss is larger still
+        (FEWER, GREATER, -0.1, "p_f", "inconclusive"),
+        (FEWER, GREATER, 0.0, "p_o", "refuted"),  # the sign of FT does not depend on P_o
+        (GREATER, FEWER, 0.0, "p_o", "supported"),
+        (GREATER, FEWER, 0.1, "p_o", "inconclusive"),
+        (FEWER, GREATER, 0.1, "p_o", "refuted"),
+        (GREATER, FEWER, -0.1, "p_o", "supported"),
+    ],
+)
+def test_a_cap_blocks_the_side_on_which_it_can_move_the_indicator(
+    p_f: np.ndarray, p_s: np.ndarray, threshold: float, saturated: str, verdict: str
+) -> None:
+    ft = spi.fault_tolerance(NEAR_CAP, p_f, p_s, threshold=threshold, saturated=[saturated])
+    assert ft.verdict == verdict
+    assert ("capped" in ft.flags) == (verdict == "inconclusive")
+
+
+def test_a_capped_reference_of_a_large_change_of_a_parameter_blocks_no_gain() -> None:
+    # x trebles, so that A = (P_new/P_o - 1)/2 + 1 is above 0 whatever P_o is.
+    a = spi.adaptability(NEAR_CAP, FEWER, x_o=5.0, x_new=15.0, saturated=["p_o"])
+    assert a.verdict == "supported"
+    assert spi.adaptability(
+        FEWER, NEAR_CAP, x_o=5.0, x_new=15.0, threshold=1.0, saturated=["p_o"]
+    ).flags == ("capped",)
 
 
 def test_the_same_runs_have_an_exact_value_that_is_no_evidence() -> None:

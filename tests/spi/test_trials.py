@@ -97,6 +97,13 @@ def test_an_event_log_counts_deliveries_and_keeps_their_times(tmp_path: Path) ->
     assert trials.rows[2].onset == 20.0
 
 
+def test_without_a_fault_an_onset_tells_no_conditions_apart(tmp_path: Path) -> None:
+    text = "robots,fault,faulty,onset,p\n8,none,,,9\n8,none,,20,8\n8,jam,1,20,7\n8,jam,1,30,6\n"
+    rows = spi.read_trials(written(tmp_path, text)).rows
+    assert [row.onset for row in rows] == [0.0, 0.0, 20.0, 30.0]
+    assert len({row.condition for row in rows}) == 3
+
+
 HEAD = "trial,robots,fault,faulty,delivered\n"
 GOOD = "1,8,none,,10\n"
 
@@ -137,6 +144,10 @@ GOOD = "1,8,none,,10\n"
         ("robots,seed,p\n4,0,1\n8,,2\n", "line 3: has no seed"),
         ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
         ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n", "line 4: its condition has no run of seed 1"),
+        (
+            "robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n8,2,4\n",
+            "line 2: its condition has no run of",
+        ),
         ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: has duration 90, line 2 60"),
         ("robots,time\n4,1\n", "has no column trial or seed"),
         ("trial,robots,time,p\n1,4,1,1\n", "has a column of times and one of performance"),

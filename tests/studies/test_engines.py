@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import os
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -178,6 +183,31 @@ def test_other_behaviour_meets_the_same_worlds() -> None:
     first, other_first, second, other_second = Recording.seeds
     assert (first, second) == (0, 1)
     assert len({first, second, other_first, other_second}) == 4
+
+
+def test_workers_end_with_a_parent_that_is_killed() -> None:
+    script = (
+        "import os, signal\n"
+        "from swarm_logistics_env.studies.engines import workers\n"
+        "if __name__ == '__main__':\n"
+        "    with workers(2) as pool:\n"
+        "        print(len({pool.submit(os.getpid).result() for _ in range(20)}), flush=True)\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    killed = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        # Its workers write there as well, so that it ends only once they have ended.
+        said, _ = killed.communicate(timeout=30)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(killed.pid, signal.SIGKILL)
+    assert int(said) >= 1
+    assert killed.returncode == -signal.SIGKILL
 
 
 class Broken:

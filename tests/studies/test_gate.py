@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.gate import Gate, answers, match
@@ -96,6 +98,77 @@ def test_regression_is_found_and_nothing_else() -> None:
     assert fails("change < -0.1 at FM1", well, worse)
     assert not fails("change < -0.1 at N = 20", well, worse)
     assert not fails("possibly change < -0.1", well, well)
+
+
+@pytest.mark.parametrize("gate", ["change < 0", "R > 0", "FT > 0"])
+def test_a_gate_over_several_comparisons_keeps_its_error_over_all_of_them(gate: str) -> None:
+    softened = 0
+    for number in range(8):
+        rng = np.random.default_rng(number)
+
+        def some(mean: float, rng: np.random.Generator = rng) -> StudyResults:
+            asked = {"modes": ["FM1", "FM2", "FM4"], "robots": [1, 2]}
+            plan = Study(seeds=8, scenario={"n_robots": 10}, faults=[asked]).plan()
+            counts = ((run.key, float(rng.poisson(mean))) for run in plan.runs())
+            return judge(plan, {k: Outcome(k, np.arange(p), digest=k + str(p)) for k, p in counts})
+
+        said = answers(Gate.parse(gate), some(42), some(38))
+        estimates = [one.estimate for one in said if one.estimate]
+        assert len(estimates) == len(said) >= 6
+        assert tuple(one.verdict for one in said) == spi.adjust(estimates)
+        softened += tuple(one.verdict for one in estimates) != spi.adjust(estimates)
+    assert softened
+
+
+@pytest.mark.parametrize("capped", ["neither", "old", "new"])
+def test_a_capped_p_decides_no_gate_on_its_side(capped: str) -> None:
+    def reached(found: StudyResults, name: str) -> StudyResults:
+        outcomes = {k: replace(o, all_delivered=name == capped) for k, o in found.outcomes.items()}
+        return judge(found.plan, outcomes)
+
+    well, worse = results(WELL), results(WORSE)
+    assert fails("change < -0.1", reached(well, "old"), reached(worse, "new")) == (capped != "new")
+    assert fails("change > 0.1", reached(worse, "old"), reached(well, "new")) == (capped != "old")
+
+
+def test_a_capped_p_is_never_called_equivalent() -> None:
+    same = results({**WELL, (10, 1): 60}, margin=0.9)
+    outcomes = {key: replace(one, all_delivered=True) for key, one in same.outcomes.items()}
+
+    def said(found: StudyResults) -> set[str]:
+        rows = found.indicators[found.indicators["indicator"] == "R"]
+        return {test.verdict for test in rows["equivalence_test"]}
+
+    assert said(same) == {"equivalent"}
+    assert said(judge(same.plan, outcomes)) == {"inconclusive"}
+
+
+def capped(found: StudyResults, m: int, seed: int) -> StudyResults:
+    """Return the same study with every item delivered in one run at m faulty robots of ten."""
+    changed = dict(found.outcomes)
+    for run in found.plan.runs():
+        modes = [fault.mode for fault in run.condition.faults]
+        size = run.condition.scenario.n_robots
+        if (size, modes, run.seed) == (10, ["FM1"] * m, seed):
+            changed[run.key] = replace(changed[run.key], all_delivered=True)
+    return judge(found.plan, changed)
+
+
+def test_a_capped_p_fails_a_change_gate_only_where_a_larger_p_would_too() -> None:
+    well, worse = results(WELL), results(WORSE)
+    assert fails("change < -0.1 at FM1", well, worse)
+    # The true P of the new study may be as large as that of the old one.
+    assert not fails("change < -0.1 at FM1", well, capped(worse, 1, seed=2))
+    # A larger P of the old one only makes the fall larger.
+    assert fails("change < -0.1 at FM1", capped(well, 1, seed=2), worse)
+    assert fails("change > 0.1 at FM1", worse, well)
+    assert not fails("change > 0.1 at FM1", capped(worse, 1, seed=2), well)
+
+
+def test_a_cap_counts_in_the_seeds_that_are_compared() -> None:
+    more = capped(results(WORSE, seeds=8), 1, seed=7)
+    assert fails("change < -0.1 at FM1", results(WELL), more)
+    assert not fails("change < -0.1 at FM1", results(WELL, seeds=8), more)
 
 
 def test_every_shared_condition_is_compared_once() -> None:

@@ -124,7 +124,11 @@ def test_claims_are_judged_in_their_own_direction(published: StudyResults) -> No
         for j in rows_of(published.indicators)
     }
     assert verdicts["FT", "FM4, m = 3", 0.0] == "supported"  # claimed: not tolerant
-    assert verdicts["S", "N 100 -> 150", 0.0] == "supported"  # claimed: not scalable
+    # Claimed: not scalable. P falls by 7 %, less than stalls that ten seeds may hide.
+    assert verdicts["S", "N 100 -> 150", 0.0] == "inconclusive"
+    assert "that these seeds did not show could turn it: it needs at least" in markdown(
+        document(published)
+    )
     assert verdicts["S", "N 10 -> 20", 1.0] == "supported"  # claimed: not superlinear
     assert verdicts["S", "N 5 -> 10", 0.0] == "supported"
     assert verdicts["FT", "FM2, m = 2", 0.0] == "supported"
@@ -142,7 +146,7 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
     assert "threshold" in str(at_threshold.no_plan)
     needed = power["FT", "FM4, m = 3"].seeds_for_power_80
     assert needed is not None
-    assert needed < 10
+    assert needed == 10
     text = markdown(document(published))
     assert "undefined: an effect of 0 lies at the threshold" in text
     assert "| undefined |" in text
@@ -181,7 +185,7 @@ def test_ablation_that_falls_is_supported(published: StudyResults) -> None:
 
 
 def test_a_fault_without_harm_is_equivalent_where_its_threshold_is_open() -> None:
-    tests = list(rows_of(results(as_published).indicators))
+    tests = list(rows_of(results(as_published, seeds=100).indicators))
     faults = {(t.indicator, t.comparison): t for t in tests if t.kind == "fault"}
     # FM2, m = 1: P_F is 38 and P_S 37 of 39 items.
     small = faults["FT", "FM2, m = 1"]

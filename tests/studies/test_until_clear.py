@@ -98,6 +98,33 @@ def test_a_comparison_is_judged_by_its_own_seeds_and_its_repeated_interval() -> 
         assert (test.low, test.high, test.p_value) == (alone.low, alone.high, alone.p_value)
 
 
+def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
+    looks, softened = looks_up_to(30), 0
+    for number in range(10):
+
+        def engine(runs: Iterable[Run], number: int = number) -> Generator[tuple[Run, Outcome]]:
+            for run in runs:
+                fault = "".join(fault.mode for fault in run.condition.faults)
+                rng = np.random.default_rng([number, run.seed, *map(ord, fault)])
+                yield run, Outcome(run.key, np.arange(float(rng.poisson(35 if fault else 40))))
+
+        study = until_clear(30)
+        study.run(engine)
+        rows = sorted(rows_of(study.indicators()), key=lambda test: (test.n_seeds, test.p_value))
+        n_open = len(rows)
+        for test in rows:
+            look = looks.index(test.n_seeds)
+            alone, level = (
+                spi.look_alphas(looks, alpha, spending=SPENDING)[look]
+                for alpha in (0.05, 0.05 / n_open)
+            )
+            is_clear = test.verdict_holm != "inconclusive"
+            assert is_clear == (test.p_value < level)
+            softened += level <= test.p_value < alone
+            n_open -= is_clear
+    assert softened
+
+
 def test_killed_at_any_moment_it_goes_on_to_the_same_result(tmp_path: Path) -> None:
     whole, engine = until_clear(60), Engine()
     whole.run(engine)
@@ -206,4 +233,6 @@ def test_shards_and_missing_looks_are_refused() -> None:
 def test_wrong_verdicts_over_all_looks_are_bounded(model: str) -> None:
     most = 0.08 if model == "geometric" else 0.055
     # 1,500 studies tell 0.05 to 0.011; `python -m verification.verdict_errors` plays 10,000.
-    assert 0.02 < wrong_verdicts(model, looks_up_to(100), studies=1_500).share < most
+    assert wrong_verdicts(model, looks_up_to(100), studies=1_500).share < most
+    seen = wrong_verdicts(model, looks_up_to(100), studies=1_500, only_seen=True).share
+    assert 0.02 < seen < most

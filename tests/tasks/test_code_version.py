@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.policies.code_identity import modules_used, without_prose
+from swarm_logistics_env.policies.policy import modules_used, without_prose
 from swarm_logistics_env.warehouse import Warehouse
 
 

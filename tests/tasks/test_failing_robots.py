@@ -63,6 +63,9 @@ def test_blind_and_noisy_robots() -> None:
     shifts = np.array([noisy[t][f"robot_{row}"][1] - 6 for t in range(11)])
     assert noisy[0][f"robot_{row}"].dtype == np.float32
     assert 0.2 < shifts.std() < 1.0
+    env = FailingRobots(Lane(3), [RobotFault(mode="noisy", robots=3)], FAILURES)
+    errors = [value[1] - 6 for value in env.reset(seed=3)[0].values()]
+    assert len(set(errors)) == 3, "each robot errs on its own"
     again = played("noisy")[1]
     assert all((again[t][f"robot_{row}"] == noisy[t][f"robot_{row}"]).all() for t in range(11))
 

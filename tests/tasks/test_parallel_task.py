@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -19,7 +20,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.engines import execute
 from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.tasks import ParallelTask, SumOfInfos
+from swarm_logistics_env.tasks import ParallelTask, SumOfInfos, SumOfRewards
 from tests.tasks.killing import run_killed_and_resumed
 from tests.tasks.lane import ACTIONS, FAILURES, LANE, OBSERVATIONS, STAY, WALK, Lane, Walker
 
@@ -89,6 +90,37 @@ def test_whole_rewards_are_events_with_times(file: Path) -> None:
     outcomes = study.findings().outcomes.values()
     assert all(len(o.delivery_times) == o.delivered for o in outcomes)
     assert all(o.ended_at == 40 and o.untimed is None for o in outcomes)
+
+
+@pytest.mark.parametrize(("shared", "wanted"), [(False, 6.0), (True, 2.0)])
+def test_what_the_team_shares_counts_once(shared: bool, wanted: float) -> None:
+    told = {"a": 2.0, "b": 2.0, "c": 2.0}
+    infos = {agent: {"done": value} for agent, value in told.items()}
+    assert SumOfRewards(shared)(None, told, {}) == wanted
+    assert SumOfInfos("done", shared)(None, {}, {**infos, "d": {}}) == wanted
+    assert SumOfRewards(shared)(None, {}, {}) == 0.0
+
+
+def test_an_event_is_at_the_end_of_its_step() -> None:
+    class Counting(Lane):
+        count = 0
+
+        def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+            self.count += 1
+            return super().step(actions)
+
+    gains = {1: 1.0, 3: 2.0, 5: 1.0}
+    task = ParallelTask(
+        lambda n_robots: Counting(n_robots),
+        name="counting",
+        n_robots=2,
+        steps=5,
+        period=0.5,
+        performance=lambda env, *_: gains.get(env.count, 0.0),
+    )
+    run = task.play("random", SimpleNamespace(scenario=task.default, faults=()), 0, 0)
+    assert run.delivery_times.tolist() == [0.5, 1.5, 1.5, 2.5]
+    assert run.ended_at == 2.5
 
 
 def test_equal_seeds_give_equal_bits_in_another_process(file: Path) -> None:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.tasks.policy_choice import PolicyChoice, policy_of
+from swarm_logistics_env.tasks.policy_choice import policy_of
 
 FILE = """
 seeds = 1
@@ -62,7 +63,7 @@ def test_parameters_are_part_of_what_a_run_is_and_are_told(study: Study) -> None
 
 
 def test_parameters_reach_the_policy() -> None:
-    chosen = PolicyChoice(name="swarm-dt", parameters={"taxis_gain": 0.0})
+    chosen = PolicySpec(name="swarm-dt", parameters={"taxis_gain": 0.0})
     # Swarm D-T without its taxis is the random walk.
     assert policies.identity(policy_of(chosen)) == policies.identity(policies.load("random-walk"))
 
@@ -108,13 +109,13 @@ def test_specification_survives_json_and_its_store(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("policy", "words"),
     [
-        ({"nam": "swarm-dt"}, "PolicyChoice has no field 'nam'; did you mean 'name'?"),
-        ({"parameters": {"taxis_gain": 1}}, "PolicyChoice.name"),
+        ({"nam": "swarm-dt"}, "PolicySpec has no field 'nam'; did you mean 'name'?"),
+        ({"parameters": {"taxis_gain": 1}}, "PolicySpec.name"),
         ({"name": "swarm-dt", "parameters": {"taxis_gian": 1.0}}, "did you mean 'taxis_gain'?"),
         ({"name": "swarm-dt", "parameters": {"taxis_gain": "x"}}, "taxis_gain = 'x'"),
         ({"name": "swarm-dt", "parameters": {"trust_code": True}}, "'trust_code' is no parameter"),
         ({"name": "swarm-dt", "parameters": {"name": "x"}}, "'name' is no parameter"),
-        ({"name": "swarm-dt", "parameters": 3}, "PolicyChoice.parameters = 3"),
+        ({"name": "swarm-dt", "parameters": 3}, "PolicySpec.parameters = 3"),
         ({"name": "swarm-td", "parameters": {"taxis_gain": 1.0}}, "did you mean 'swarm-dt'?"),
         (3, "a table of name and parameters"),
     ],

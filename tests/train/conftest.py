@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.policies.card import Network
+from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.train import Training
 from swarm_logistics_env.train.settings import Evaluation, PPOSettings, Scores
 

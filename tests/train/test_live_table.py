@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from swarm_logistics_env.train.live_table import LiveTable
+from swarm_logistics_env.train.curve import LiveTable
 
 REFERENCES = {"swarm-dt": {"P": 36.75}, "homing": {"P": 146.0}}
 

@@ -19,12 +19,11 @@ from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS
-from swarm_logistics_env.policies.loading import WEIGHTS
+from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.tasks.code_version import code_version
-from swarm_logistics_env.train import Training, run_record, trainer
-from swarm_logistics_env.train.learner import make_learner, tensors_of
-from swarm_logistics_env.train.network_view import KNOWN
-from swarm_logistics_env.train.run_record import simulation
+from swarm_logistics_env.train import Training, evaluation, trainer
+from swarm_logistics_env.train.evaluation import simulation
+from swarm_logistics_env.train.learner import KNOWN, make_learner, tensors_of
 from swarm_logistics_env.train.settings import Conditions, Indicators, Scores
 from swarm_logistics_env.train.trainer import train
 
@@ -72,7 +71,7 @@ def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_cal
             train(training, tmp_path)
     card = policies.read_card(tmp_path / "small.safetensors")
     assert (card.scores, card.scored_with) == ((), {})
-    monkeypatch.setattr(run_record, "code_version", lambda: "a later one")
+    monkeypatch.setattr(evaluation, "code_version", lambda: "a later one")
     later = policies.read_card(train(training, tmp_path))
     assert later.scores
     assert later.scored_with["simulation"] == "a later one"
@@ -90,8 +89,7 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
     inputs = (
         np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(KNOWN))).astype(np.float32)
     )
-    from swarm_logistics_env.policies.card import PolicyCard
-    from swarm_logistics_env.policies.learned import LearnedPolicy
+    from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 
     policy = LearnedPolicy(PolicyCard(name="x", network=training.network), tensors)
     with torch.no_grad():

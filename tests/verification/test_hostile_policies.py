@@ -17,9 +17,8 @@ from hypothesis import strategies as st
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.observations import N_COLUMNS
-from swarm_logistics_env.policies.card import Network, PolicyCard
 from swarm_logistics_env.policies.files import write_policy
-from swarm_logistics_env.policies.learned import tensor_shapes
+from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
 
 pytest.importorskip("safetensors")
 

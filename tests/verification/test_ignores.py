@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from verification.mutants import ROOT
+from verification.mutants.mutation import ROOT
 
 IGNORED = re.compile(r"# (type: ignore\[[a-z, -]+\]|noqa: [A-Z0-9, ]+)(?P<reason> *(#|-) \w.*)?$")
 FOLDERS = ("swarm_logistics_env", "verification", "benchmarks", "interop", "examples")

@@ -66,7 +66,7 @@ def test_named_robots_fail_and_no_others() -> None:
     [
         (Fault("FM1", 9), "robots = 9: should be at most n_robots = 8"),
         (Fault("FM1", (0, 8)), r"\(0, 8\): robots are numbered 0 to 7"),
-        ("FM1", "faults hold 'FM1': should be a list of faults"),
+        ("FM1", r"faults = \['FM1'\]: should be a list of Fault"),
     ],
 )
 def test_faults_that_cannot_be_are_refused_at_the_reset(fault: Any, complaint: str) -> None:
@@ -224,15 +224,14 @@ def beams(rows: NDArray[np.float32], robot: int = 0) -> NDArray[np.float32]:
 def test_frozen_rangers_repeat_what_they_read_at_the_onset_until_they_recover(
     build: Build,
 ) -> None:
-    fault = Fault("rangers_frozen", (0,), onset=0.3, duration=0.5)
-    world = build([(2.0, 5.0), (9.0, 1.0)], [FAR], [fault], ranger_noise=0.01)
+    # Twice, so that the second time it is what they read then.
+    faults = [Fault("rangers_frozen", (0,), onset=at, duration=0.5) for at in (0.3, 0.9)]
+    world = build([(2.0, 5.0), (9.0, 1.0)], [FAR], faults, ranger_noise=0.01)
     sound = build([(2.0, 5.0), (9.0, 1.0)], [FAR], ranger_noise=0.01)
-    seen = [(beams(world.step([WEST, STAY])), beams(sound.step([WEST, STAY]))) for _ in range(12)]
+    seen = [(beams(world.step([WEST, STAY])), beams(sound.step([WEST, STAY]))) for _ in range(15)]
     for step, (failed, true) in enumerate(seen, start=1):
-        if 3 <= step < 8:
-            np.testing.assert_array_equal(failed, seen[2][1])
-        else:
-            np.testing.assert_array_equal(failed, true)
+        begun = 3 if 3 <= step < 8 else 9 if 9 <= step < 14 else step
+        np.testing.assert_array_equal(failed, true if begun == step else seen[begun - 1][1])
     assert not np.array_equal(seen[3][1], seen[6][1])
 
 
@@ -295,6 +294,17 @@ def test_a_worn_motor_slows_down_linearly_until_the_end(build: Build, factor: fl
     np.testing.assert_allclose(worn, expected, atol=1e-9)
     assert (sound == 2.0).all()
     assert world.state.max_turn_rate[0] == pytest.approx(6.0 * left)
+
+
+@pytest.mark.parametrize(("failed", "held_up"), [((), 0), ((0,), 1), ((0, 1), 0), ((1, 2), 1)])
+def test_sound_robots_that_touch_failed_ones_are_held_up(
+    build: Build, failed: tuple[int, ...], held_up: int
+) -> None:
+    places = [(2.0, 5.0), (2.255, 5.0), (8.0, 1.0)]
+    world = build(places, [FAR], [Fault("FM1", failed)] if failed else [])
+    for _ in range(10):
+        world.step([STAY] * 3)
+    assert world.state.anchoring_seconds == pytest.approx(held_up * 1.0)
 
 
 def test_faults_of_one_robot_add_up() -> None:

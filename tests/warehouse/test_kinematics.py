@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.warehouse.kinematics import drive, refused_command
+from swarm_logistics_env.warehouse.logistics import drive, refused_command
 from swarm_logistics_env.warehouse.packing import blank
 from swarm_logistics_env.warehouse.structs import (
     NOBODY,

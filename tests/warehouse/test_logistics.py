@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from swarm_logistics_env import Fault, Warehouse
+from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
@@ -413,6 +413,22 @@ def test_when_restock_is_switched_what_is_there_is_asked_for(
     # One came back and goes on coming back; or all three were there and left for good.
     assert state.delivered == (12 if restock[1] else 5)
     assert world.all_delivered is restock[0]
+
+
+def test_with_restock_each_cycle_of_requests_has_an_order_of_its_own() -> None:
+    world = Warehouse(Scenario(n_robots=1, n_items=5, pickup_range=20.0, restock=True))
+    world.reset(0)
+    world.change(delivery_width=9.5)
+    state, asked = world.state, []
+    while state.delivered < 25:
+        asked.append(state.requested)
+        heading = float(state.robot_heading[0])
+        world.step([[np.cos(heading), -np.sin(heading), 0.0, 1.0]])
+        asked = asked[: state.delivered]
+        assert state.step < 200
+    cycles = np.reshape(asked, (5, 5)).tolist()
+    assert all(sorted(cycle) == list(range(5)) for cycle in cycles)
+    assert len({tuple(cycle) for cycle in cycles}) > 2
 
 
 def test_an_fm4_carrier_blocks_the_request_until_it_lets_go(build: Build) -> None:

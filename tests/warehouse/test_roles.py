@@ -6,7 +6,7 @@ import pytest
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies, run_episode
 from swarm_logistics_env.errors import FaultError
 from swarm_logistics_env.warehouse.failure_modes import failure_mode, lost_capabilities
-from swarm_logistics_env.warehouse.roles import ROLES, robots_in_role, roles_of
+from swarm_logistics_env.warehouse.faults import ROLES, robots_in_role, roles_of
 
 
 def world_in_roles() -> Warehouse:

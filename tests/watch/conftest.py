@@ -11,7 +11,7 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web import WatchServer
+from swarm_logistics_env.watch.server import WatchServer
 from verification.browser import Browser
 
 SMALL = Scenario(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from swarm_logistics_env import Fault
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web import recorded_page
+from swarm_logistics_env.watch.messages import recorded_page
 from tests.watch.conftest import SMALL, Served
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import http.client
 import json
 import random
@@ -15,10 +16,10 @@ from typing import Any
 import aiohttp
 import pytest
 
+from swarm_logistics_env import Fault, policies, run_episode, spi
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web import WatchServer
-from swarm_logistics_env.watch.web.server import kept_token
+from swarm_logistics_env.watch.server import WatchServer, indicators, kept_token
 from tests.watch.conftest import SMALL, Served
 
 
@@ -57,7 +58,11 @@ def test_page_and_scripts_come_with_a_content_policy(served: Served) -> None:
         assert status == 200
         assert body
         assert "default-src 'none'; script-src 'self'" in headers["Content-Security-Policy"]
+        assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
         assert headers["Cache-Control"] == "no-store"
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert headers["X-Content-Type-Options"] == "nosniff"
 
 
 @pytest.mark.parametrize(
@@ -143,6 +148,40 @@ def test_order_that_cannot_be_is_refused_in_a_sentence(
     assert words in messages(served, [order], 10)[-1]["problem"]
 
 
+def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
+    async def talk() -> tuple[int | None, Any]:
+        address = f"{served.server.address}live"
+        async with (
+            aiohttp.ClientSession() as client,
+            client.ws_connect(address) as page,
+            client.ws_connect(address) as other,
+        ):
+            await page.send_str('{"do":"select","robot":' + " " * 5000 + "3}")
+            for _ in range(60):  # frames that are under way
+                if (await page.receive(30)).type is not aiohttp.WSMsgType.TEXT:
+                    break
+            return page.close_code, (await other.receive(30)).type
+
+    assert asyncio.run(talk()) == (aiohttp.WSCloseCode.MESSAGE_TOO_BIG, aiohttp.WSMsgType.TEXT)
+    assert served.server.session.selected is None
+
+
+def test_more_pages_than_there_may_be_are_refused(served: Served) -> None:
+    async def talk() -> list[int]:
+        async with aiohttp.ClientSession() as client, contextlib.AsyncExitStack() as pages:
+            statuses = []
+            for _ in range(20):
+                asked = client.ws_connect(f"{served.server.address}live")
+                try:
+                    await pages.enter_async_context(asked)
+                    statuses.append(101)
+                except aiohttp.WSServerHandshakeError as error:
+                    statuses.append(error.status)
+            return statuses
+
+    assert asyncio.run(talk()) == [101] * 16 + [503] * 4
+
+
 def test_malformed_requests_neither_stop_it_nor_leak_a_path(
     served: Served, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -208,3 +247,20 @@ def test_token_is_kept_for_this_user_alone(tmp_path: Path, monkeypatch: pytest.M
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
     file.write_text("no token")
     assert kept_token() is None
+
+
+def test_indicators_are_those_of_the_package() -> None:
+    runs = []
+    for seed in range(3):
+        sound, faulty, without = (
+            run_episode(SMALL, policies.load("swarm-dt"), seed, faults)
+            for faults in ([], [Fault("FM1", [0, 1])], [Fault("removed", [0, 1])])
+        )
+        runs.append((sound, faulty, without))
+    found = {entry["symbol"]: entry for entry in indicators("swarm-dt", runs, 6, 2)}
+    sound_p, faulty_p, without_p = ([run.delivered for run in column] for column in zip(*runs))
+    assert found["R"]["value"] == round(spi.robustness(sound_p, faulty_p, n=6, m=2).value, 3)
+    expected = spi.fault_tolerance(sound_p, faulty_p, without_p, n=6, m=2)
+    assert found["FT"]["value"] == round(expected.value, 3)
+    assert found["FT"]["seeds"] == 3
+    assert [entry["symbol"] for entry in indicators("swarm-dt", runs, 2, 2)] == ["R"]

@@ -7,7 +7,7 @@ from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, po
 from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
 from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.web.messages import observation_parts
+from swarm_logistics_env.watch.messages import observation_parts
 
 SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
 

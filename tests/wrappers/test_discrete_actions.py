@@ -19,9 +19,9 @@ from swarm_logistics_env.wrappers import (
     FaultInjection,
     FixedAgents,
     SwarmSize,
-    discrete_actions,
+    action_forms,
 )
-from swarm_logistics_env.wrappers.discrete_actions import ACTIONS
+from swarm_logistics_env.wrappers.action_forms import ACTIONS
 
 NUMBERS = {name: number for number, name in enumerate(ACTIONS)}
 
@@ -130,4 +130,4 @@ def test_stable_baselines3_takes_numbers_for_every_row() -> None:
 
 
 def test_the_docstrings_example_holds() -> None:
-    assert doctest.testmod(discrete_actions).failed == 0
+    assert doctest.testmod(action_forms).failed == 0

@@ -23,11 +23,9 @@ from swarm_logistics_env.wrappers import (
     ParameterChange,
     RunningMeans,
     SwarmSize,
+    indicator_payments,
     indicator_reward,
-    reference_performances,
-)
-from swarm_logistics_env.wrappers import (
-    condition as condition_module,
+    wrapper,
 )
 
 N = 4
@@ -307,6 +305,42 @@ def test_who_carried_the_item_before_shares_the_credit() -> None:
     assert total.tolist() == [0.5, 0.5]
 
 
+@pytest.mark.parametrize(
+    ("credit", "own"), [("team", "delivery"), ("deliverer", "own_delivery"), ("carriers", "shared")]
+)
+@pytest.mark.parametrize("removed", [False, True])
+def test_a_delivery_is_paid_as_the_environment_pays_it(
+    credit: Any, own: str, removed: bool
+) -> None:
+    """P at reference 1 is the environment's own reward, in the step of a removal too."""
+    plain = busy(rewards={own: 1.0} if own != "shared" else None)
+    _, _ = play(plain, 3)
+    first = plain.warehouse.state.delivery_times[0]
+    faults = [Fault("removed", 2, onset=first)] if removed else []
+    expected, _ = play(plain, 3, {"faults": faults})
+    paid, _ = play(
+        IndicatorReward(busy(), "P", references=1.0, credit=credit), 3, {"faults": faults}
+    )
+    assert expected.any()
+    if own == "shared":  # everybody who carried it since it was asked for, in equal parts
+        assert paid.sum(axis=1) == pytest.approx(expected.max(axis=1))
+    else:
+        assert paid == pytest.approx(expected)
+
+
+def test_who_carried_an_earlier_item_has_no_share_in_the_next() -> None:
+    env = IndicatorReward(busy(n_robots=2), "P", references=1.0, credit="carriers")
+    env.reset(seed=0)
+    state = env.unwrapped.warehouse.state
+    for robot in (0, 1):  # each brings one item all the way, after the other
+        while len(state.delivered_by) <= robot and env.agents:
+            commands = np.zeros((2, 4))
+            heading = state.robot_heading[robot]
+            commands[robot] = np.cos(heading), -np.sin(heading), 0.0, 1.0
+            _, rewards, _, _ = env.step_arrays(commands)
+        assert rewards.tolist() == [robot == 0, robot == 1]
+
+
 def test_the_environments_own_reward_can_be_kept_for_shaping() -> None:
     rewards, _ = play(busy(rewards={"contact": -1.0}), 0)
     assert rewards.any()
@@ -402,7 +436,7 @@ def test_pettingzoos_own_tests_pass(conformance: ModuleType, make: Callable[...,
     conformance.api_test(parallel_to_aec(rewarded()), num_cycles=25)
 
 
-@pytest.mark.parametrize("module", [condition_module, indicator_reward, reference_performances])
+@pytest.mark.parametrize("module", [wrapper, indicator_reward, indicator_payments])
 def test_the_examples_run(module: ModuleType) -> None:
     ran = doctest.testmod(module)
     assert ran.attempted

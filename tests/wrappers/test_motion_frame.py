@@ -18,7 +18,7 @@ from swarm_logistics_env.wrappers import (
     FixedAgents,
     MotionFrame,
     SwarmSize,
-    motion_frame,
+    action_forms,
 )
 
 
@@ -101,6 +101,6 @@ def test_it_stacks_in_a_vector_environment() -> None:
 
 
 def test_the_example_runs() -> None:
-    ran = doctest.testmod(motion_frame)
+    ran = doctest.testmod(action_forms)
     assert ran.attempted
     assert not ran.failed

@@ -1,0 +1,355 @@
+"""The search for the fault that costs most, within a budget of runs, with an estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from swarm_logistics_env.errors import SetupError, StudyError, suggest
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spi import Estimate, robustness
+from swarm_logistics_env.streams import generator
+from swarm_logistics_env.studies.engines import Engine
+from swarm_logistics_env.studies.judged_comparisons import same_runs
+from swarm_logistics_env.studies.performance_table import Played, played
+from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
+from swarm_logistics_env.studies.store import Store
+from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
+from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.faults import ROLES
+
+# Plays pairs of a fault's place in the list and the number of its run, 0, 1, ..; returns the change
+# of performance, P_F - P_o, of each: the lower, the worse the fault.
+Play: TypeAlias = Callable[[Sequence[tuple[int, int]]], Sequence[float]]
+
+_FIRST_SHARE = (
+    0.25  # of the budget: faults at random, so that the model has something to learn from
+)
+_ROUNDS = 8  # in which the rest is spent; the runs of one round are played side by side
+_SEEDS_AT_RANDOM = 2  # runs of each fault in a random search, to tell faults from luck
+# Shares of the variance between faults: by mode; by mode and role; by mode, onset and duration; by
+# all of them.
+_SHARES = (0.4, 0.2, 0.2, 0.2)
+_NOISES = (0.1, 0.3, 1.0, 3.0)  # candidates for the variance between seeds over that between faults
+
+
+@dataclass
+class Trials:
+    """The runs of a search so far.
+
+    Attributes:
+        tried: place of the fault of each run in the list of faults.
+        change: P_F - P_o of each run [items].
+    """
+
+    tried: list[int] = field(default_factory=list)
+    change: list[float] = field(default_factory=list)
+
+    def add(self, places: Sequence[int], play: Play) -> None:
+        """Play one more run of each of these faults."""
+        pairs: list[tuple[int, int]] = []
+        for place in places:
+            earlier = [place_before for place_before, _ in pairs]
+            pairs.append((place, self.tried.count(place) + earlier.count(place)))
+        self.change += [float(change) for change in play(pairs)]
+        self.tried += [place for place, _ in pairs]
+
+
+def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple[int, Trials]:
+    """Search by Thompson sampling from a Gaussian process over the faults.
+
+    Faults that are alike (in mode, role, onset, duration) are expected to cost alike, so that a run
+    of one tells of the others; the next faults are those that are worst in a draw from what is
+    believed (Thompson 1933).
+
+    Args:
+        faults: to search among.
+        budget: runs of faults, at least 1.
+        seed: of the search's own choices.
+
+    Returns:
+        The place of the fault that is believed to be worst, and all runs.
+    """
+    rng = generator(seed, "fault search")
+    trials, covariance = Trials(), _covariance(faults)
+    first = max(1, round(budget * _FIRST_SHARE))
+    trials.add([int(p) for p in rng.choice(len(faults), first, replace=first > len(faults))], play)
+    sizes = np.diff(np.linspace(first, budget, _ROUNDS + 1).round().astype(int))
+    for size in sizes[sizes > 0]:
+        mean, spread = _posterior(covariance, trials)
+        root = np.linalg.cholesky(spread + 1e-9 * np.eye(len(faults)))
+        draws = mean[:, None] + root @ rng.standard_normal((len(faults), size))
+        trials.add([int(place) for place in draws.argmin(axis=0)], play)
+    mean, _ = _posterior(covariance, trials)
+    return min(set(trials.tried), key=lambda place: float(mean[place])), trials
+
+
+def random_search(
+    faults: Sequence[Fault], play: Play, budget: int, seed: int
+) -> tuple[int, Trials]:
+    """Try faults at random, each over some seeds, within the same budget; for comparison.
+
+    Returns:
+        The place of the fault with the lowest mean, and all runs.
+    """
+    rng, trials = generator(seed, "random fault search"), Trials()
+    count = min(len(faults), max(1, budget // _SEEDS_AT_RANDOM))
+    chosen = [int(place) for place in rng.choice(len(faults), count, replace=False)]
+    trials.add([chosen[number % count] for number in range(budget)], play)
+    tried, change = np.array(trials.tried), np.array(trials.change)
+    return min(chosen, key=lambda place: float(change[tried == place].mean())), trials
+
+
+def _covariance(faults: Sequence[Fault]) -> NDArray[np.float64]:
+    """Return how alike the faults are expected to be, (faults, faults), 1 on the diagonal."""
+
+    def are_equal(values: Sequence[object]) -> NDArray[np.bool_]:
+        return np.array([[one == other for other in values] for one in values])
+
+    def near(values: Sequence[float]) -> NDArray[np.float64]:
+        steps = np.searchsorted(np.unique(values), values)
+        alike: NDArray[np.float64] = np.exp(-0.5 * (steps[:, None] - steps[None, :]) ** 2)
+        return alike
+
+    mode, role = (are_equal([getattr(f, name) for f in faults]) for name in ("mode", "role"))
+    lasting = near([np.inf if fault.duration is None else fault.duration for fault in faults])
+    time = near([fault.onset for fault in faults]) * lasting
+    both = mode & role
+    by_mode, by_role, by_time, by_all = _SHARES
+    return by_mode * mode + by_role * both + by_time * mode * time + by_all * both * time
+
+
+def _posterior(
+    covariance: NDArray[np.float64], trials: Trials
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean (faults,) and covariance (faults, faults) of what the runs let one believe.
+
+    The noise is that under which the runs are likeliest; scale and mean are those of the runs.
+    """
+    tried, change = np.array(trials.tried), np.array(trials.change)
+    centre, scale = change.mean(), max(float(change.std()), 1e-6)
+    normal = (change - centre) / scale
+    prior, across = covariance[np.ix_(tried, tried)], covariance[:, tried]
+
+    def factor(noise: float) -> tuple[NDArray[np.float64], bool]:
+        made: tuple[NDArray[np.float64], bool] = cho_factor(
+            (prior + noise * np.eye(len(tried))) / (1.0 + noise), lower=True
+        )
+        return made
+
+    def likelihood(noise: float) -> float:
+        root = factor(noise)
+        fit = normal @ cho_solve(root, normal)
+        return float(-0.5 * fit - np.log(np.diag(root[0])).sum())
+
+    noise = max(_NOISES, key=likelihood)
+    root, share = factor(noise), 1.0 / (1.0 + noise)
+    mean = centre + scale * share * across @ cho_solve(root, normal)
+    spread = share * covariance - share**2 * across @ cho_solve(root, across.T)
+    return mean, scale**2 * spread
+
+
+STORE = "runs.sqlite"
+# A removed robot is the reference of the others; motor_wear leaves more speed than motor_slow.
+MODES = tuple(mode for mode in FAILURE_MODES if mode not in ("removed", "motor_wear"))
+_ONSETS = (0.0, 0.2, 0.4, 0.6)  # shares of an episode
+_DURATIONS = (None, 0.2, 0.4)  # shares of an episode; None: for good
+_NAMED_SEEDS = 5  # runs of each named mode, from which the worst is chosen
+
+
+@dataclass(frozen=True)
+class Attack:
+    """What to search, and how long.
+
+    Attributes:
+        policy: as `policies.load` knows it, or a policy.
+        scenario: conditions of every episode.
+        robots: how many fail.
+        modes: failure modes to search among.
+        budget: runs of faults in the search; the random search has as many.
+        fresh: seeds of the estimates, none of which the search has met; at least 3.
+        seed: of the search's own choices.
+    """
+
+    policy: object
+    scenario: Scenario
+    robots: int = 2
+    modes: tuple[str, ...] = MODES
+    budget: int = 200
+    fresh: int = 30
+    seed: int = 0
+
+    def faults(self) -> list[Fault]:
+        """Return all faults that are searched: every mode, role, onset and duration.
+
+        Raises:
+            SetupError: a mode is unknown, or there are fewer robots.
+        """
+        for mode in self.modes:
+            if mode not in MODES:
+                raise SetupError(f"modes: no mode {mode!r} to search{suggest(mode, MODES)}")
+        if not 1 <= self.robots < self.scenario.n_robots:
+            raise SetupError(f"robots = {self.robots}: should be 1 to {self.scenario.n_robots - 1}")
+        end = self.scenario.duration
+        return [
+            Fault(
+                mode,
+                self.robots,
+                onset=round(onset * end, 1),
+                duration=None if lasts is None else round(lasts * end, 1),
+                role=role,
+            )
+            for mode, role, onset, lasts in product(self.modes, (None, *ROLES), _ONSETS, _DURATIONS)
+            # At the start nobody carries anything, and nobody stands in the delivery area.
+            if onset > 0.0 or role in (None, "searching")
+        ]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A fault, how it was found, and its robustness on fresh seeds.
+
+    Attributes:
+        by: "search", "random search" or "named modes".
+        runs: how many runs of faults it took.
+    """
+
+    by: str
+    fault: Fault
+    robustness: Estimate
+    runs: int
+
+
+@dataclass(frozen=True)
+class AttackResult:
+    """The worst faults found, the search's first.
+
+    Attributes:
+        tried: how many different faults the search has tried.
+        searched: how many there were to search.
+        is_capped: whether every item was delivered in a run without a fault on a fresh seed, so
+            that the faults may cost more than R tells.
+    """
+
+    found: tuple[Found, ...]
+    tried: int
+    searched: int
+    is_capped: bool
+
+
+def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
+    """Search for the worst fault, and estimate its robustness on fresh seeds.
+
+    What it finds bounds the worst fault from one side: there may be worse ones. Every run is kept
+    in `out` at once, and the same call goes on from there.
+
+    Raises:
+        SetupError: as `Attack.faults`; or the policy delivers nothing without faults.
+        PolicyError: there is no such policy.
+        StudyError: the directory cannot be used, or a run failed.
+    """
+    faults = asked.faults()
+    label, identity = policy_label(asked.policy), policy_identity(asked.policy)
+    policy = StudiedPolicy(label, identity, asked.policy)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(f"cannot write to {out}: {error.strerror}") from error
+    with Store(out / STORE) as store:
+        players = _Players(policy, asked.scenario, engine, store)
+        play = players.search_play(faults)
+        worst, trials = search(faults, play, asked.budget, asked.seed)
+        at_random, _ = random_search(faults, play, asked.budget, asked.seed)
+        named = [Fault(mode, asked.robots) for mode in asked.modes]
+        tries = players.played(named, range(_NAMED_SEEDS))
+        worst_named = int(np.argmin([runs.by_seed.mean() for runs in tries]))
+        # Seeds that neither search can have met, nor the choice among the named modes.
+        first = max(asked.budget, _NAMED_SEEDS)
+        fresh = range(first, first + asked.fresh)
+        chosen = [
+            ("search", faults[worst], asked.budget),
+            ("random search", faults[at_random], asked.budget),
+            ("named modes", named[worst_named], _NAMED_SEEDS * len(named)),
+        ]
+        sound, *failed = players.played([None, *(fault for _, fault, _ in chosen)], fresh)
+    return AttackResult(
+        found=tuple(
+            Found(by, fault, _robustness(asked, sound, with_fault), runs)
+            for (by, fault, runs), with_fault in zip(chosen, failed, strict=True)
+        ),
+        tried=len(set(trials.tried)),
+        searched=len(faults),
+        is_capped=sound.saturated,
+    )
+
+
+def _robustness(asked: Attack, sound: Played, failed: Played) -> Estimate:
+    return robustness(
+        sound.by_seed,
+        failed.by_seed,
+        n=asked.scenario.n_robots,
+        m=asked.robots,
+        saturated=[name for name, runs in (("p_o", sound), ("p_f", failed)) if runs.saturated],
+        identical=same_runs(sound.digests, failed.digests),
+    )
+
+
+class _Players:
+    """Plays faults over seeds; every run is kept in a store and played once."""
+
+    def __init__(
+        self, policy: StudiedPolicy, scenario: Scenario, engine: Engine, store: Store
+    ) -> None:
+        self._policy, self._scenario = policy, scenario
+        self._engine, self._store = engine, store
+
+    def played(self, faults: Sequence[Fault | None], seeds: Sequence[int]) -> list[Played]:
+        """Return the runs of each fault (None: without one) over the seeds."""
+        outcomes = self._outcomes([(fault, seed) for fault in faults for seed in seeds])
+        n = len(seeds)
+        return [played(outcomes[place * n : (place + 1) * n]) for place in range(len(faults))]
+
+    def search_play(self, faults: Sequence[Fault]) -> Play:
+        """Return what plays a fault's k-th run with seed k, beside the run without a fault."""
+
+        def play(pairs: Sequence[tuple[int, int]]) -> Sequence[float]:
+            last = max(seed for _, seed in pairs)
+            sound = self._delivered([(None, seed) for seed in range(max(last + 1, _NAMED_SEEDS))])
+            if not sound.any():
+                raise SetupError(
+                    f"{self._policy.label} delivers nothing without faults, so no fault can cost "
+                    "anything: should be another policy, a longer duration or more robots"
+                )
+            failed = self._delivered([(faults[place], seed) for place, seed in pairs])
+            return list(failed - sound[[seed for _, seed in pairs]])
+
+        return play
+
+    def _delivered(self, pairs: Sequence[tuple[Fault | None, int]]) -> NDArray[np.float64]:
+        return played(self._outcomes(pairs)).by_seed
+
+    def _outcomes(self, pairs: Sequence[tuple[Fault | None, int]]) -> list[Outcome]:
+        code = WAREHOUSE.code()
+        runs = [
+            Condition(
+                self._policy, self._scenario, () if fault is None else (fault,), task=WAREHOUSE
+            ).run(code, seed)
+            for fault, seed in pairs
+        ]
+        done = self._store.succeeded()
+        missing = {run.key: run for run in runs if run.key not in done}
+        for run, outcome in self._engine(missing.values()):
+            self._store.add(run, outcome)
+            if outcome.error is not None:
+                raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
+        outcomes = self._store.outcomes(runs)
+        return [outcomes[run.key] for run in runs]

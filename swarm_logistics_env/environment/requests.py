@@ -1,0 +1,206 @@
+"""What callers hand to an environment: a reset's options, checked, and commands of any library."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swarm_logistics_env.errors import CommandError, FaultError, SetupError, suggest
+from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
+
+
+def as_array(given: ArrayLike, name: str) -> NDArray[Any]:
+    """Return `given` as an array; shape and dtype stay as they are.
+
+    Args:
+        given: an array, a list, a tensor on the CPU, ...
+        name: the name of the value, for errors.
+
+    Raises:
+        CommandError: NumPy cannot read it, as a tensor of bfloat16, on a GPU or with a gradient;
+            names its type, dtype and device.
+    """
+    try:
+        return np.asarray(given)
+    except Exception as error:  # tensors raise TypeError, RuntimeError, NotImplementedError, ...
+        traits = [f"{trait} {getattr(given, trait)}" for trait in _TRAITS if hasattr(given, trait)]
+        kind = ", ".join([f"type {type(given).__name__}", *traits])
+        reason = str(error).strip().partition("\n")[0]
+        raise CommandError(
+            f"{name} ({kind}) cannot be read: should be numbers that numpy.asarray takes, which "
+            f"says: {reason}"
+        ) from error
+
+
+def gathered(
+    actions: Mapping[str, ArrayLike],
+    agents: Sequence[str],
+    possible_agents: Sequence[str],
+    wanted: tuple[int, ...],
+) -> NDArray[np.float64]:
+    """Return the commands of `agents`, in their order, as rows of one array.
+
+    Args:
+        actions: agent -> command; those of other possible agents are ignored.
+        agents: whose commands are wanted.
+        possible_agents: who may be named in `actions`.
+        wanted: the shape of one command.
+
+    Raises:
+        CommandError: no dict; a command is missing, for an unknown agent, unreadable, of the wrong
+            shape or no numbers.
+    """
+    if not isinstance(actions, Mapping):
+        raise CommandError(
+            f"actions of type {type(actions).__name__}: should be a dict of one command for every "
+            "agent; step_arrays takes an array"
+        )
+    if actions.keys() != set(agents):
+        _check_names(actions, agents, possible_agents)
+    rows: list[Any] = [actions[agent] for agent in agents]
+    if not all(type(row) is np.ndarray and row.shape == wanted for row in rows):  # seldom
+        rows = [as_array(row, f"command of {agent!r}") for agent, row in zip(agents, rows)]
+        for agent, row in zip(agents, rows):
+            if row.shape != wanted:
+                raise CommandError(f"command of {agent!r} of shape {row.shape}: should be {wanted}")
+    try:
+        # To concatenate is several times as fast as an array of arrays; numbers cannot be.
+        given = np.concatenate(rows) if wanted else np.array(rows)
+    except TypeError as error:
+        raise CommandError(f"commands should be numbers: {error}") from error
+    if given.dtype.kind not in "fiub":
+        raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
+    return given.reshape(len(rows), *wanted).astype(np.float64)
+
+
+def _check_names(
+    actions: Mapping[str, ArrayLike], agents: Sequence[str], possible_agents: Sequence[str]
+) -> None:
+    possible = set(possible_agents)
+    for agent in actions:
+        if agent not in possible:
+            raise CommandError(
+                f"a command for {agent!r}, who is not there: should be among {len(possible)} "
+                f"possible agents, {possible_agents[0]} to {possible_agents[-1]}"
+            )
+    for agent in agents:
+        if agent not in actions:
+            raise CommandError(f"no command for {agent!r}: should be one for every agent")
+
+
+_TRAITS = ("dtype", "device", "requires_grad")
+
+
+OPTIONS = ("faults", "scenario")
+
+
+def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a copy of the options as a dict; it is empty for None.
+
+    Raises:
+        SetupError: they are not a mapping.
+    """
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise SetupError(f"options = {options!r}: should be None or a dict with keys {OPTIONS}")
+    return dict(options)
+
+
+def checked_seed(seed: int) -> int:
+    """Return the seed as an int.
+
+    Raises:
+        SetupError: it is not an integer.
+    """
+    try:
+        return operator.index(seed)
+    except TypeError:
+        raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
+
+
+def checked_count(name: str, value: int) -> int:
+    """Return the value as an int of at least 1.
+
+    Raises:
+        SetupError: it is none.
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = 0
+    if number < 1:
+        raise SetupError(f"{name} = {value!r}: should be a whole number of at least 1")
+    return number
+
+
+def scenario_fields(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of the scenario that the options replace.
+
+    Raises:
+        SetupError: they are not a mapping from names.
+    """
+    fields = options.get("scenario", {})
+    if not isinstance(fields, Mapping) or not all(isinstance(name, str) for name in fields):
+        raise SetupError(
+            f'options["scenario"] = {fields!r}: should be a dict of fields, as {{"n_robots": 40}}'
+        )
+    return dict(fields)
+
+
+def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[Fault, ...]:
+    """Return the faults of the options, or `default` if there are none.
+
+    Raises:
+        SetupError, FaultError: as `checked_faults`.
+    """
+    return checked_faults('options["faults"]', options.get("faults", default))
+
+
+def checked_faults(name: str, faults: Any) -> tuple[Fault, ...]:
+    """Return faults as a tuple; a dict of a fault's arguments, as JSON and YAML have it, is one.
+
+    Raises:
+        SetupError: they are not a sequence of faults.
+        FaultError: a dict is not that of a fault that can be.
+    """
+    is_list = isinstance(faults, Sequence) and not isinstance(faults, str)
+    if not is_list or not all(isinstance(fault, Fault | Mapping) for fault in faults):
+        raise SetupError(
+            f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)] or '
+            '[{"mode": "FM1", "robots": 2}]'
+        )
+    return tuple(fault if isinstance(fault, Fault) else _fault_of(name, fault) for fault in faults)
+
+
+def _fault_of(name: str, fields: Mapping[str, Any]) -> Fault:
+    known = Fault.model_fields
+    for field in fields:
+        if field not in known:
+            raise FaultError(f"{name}: a fault has no {field!r}{suggest(str(field), known)}")
+    if "mode" not in fields:
+        raise FaultError(f'{name}: {dict(fields)!r} has no "mode": should name one, as "FM1"')
+    return Fault(**fields)
+
+
+def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:
+    """Check that an episode with these faults begins with at least one robot.
+
+    Raises:
+        SetupError: they remove all at 0 s.
+        FaultError: a fault names robots that are not there.
+    """
+    gone = set[int]()
+    for fault in faults:
+        if fault.onset <= GRACE and not failure_mode(fault.mode).present:
+            gone.update(failed_robots(fault, seed, n_robots).tolist())
+    if len(gone) == n_robots:
+        raise SetupError(
+            f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
+        )

@@ -1,1 +1,0 @@
-"""Which fault costs most."""

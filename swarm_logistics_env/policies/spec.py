@@ -1,0 +1,252 @@
+"""Policies by text: what a text stands for, its label, its identity, whether it is trusted."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import importlib
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+from pydantic import Field, JsonValue, field_validator
+
+from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.policies.central import Central
+from swarm_logistics_env.policies.files import (
+    SB3_SUFFIX,
+    SUFFIX,
+    StableBaselinesPolicy,
+    read_card,
+    read_policy,
+)
+from swarm_logistics_env.policies.homing import Homing
+from swarm_logistics_env.policies.policy import Mixed, Policy, identity
+from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.records import Record, canonical_json
+
+ENTRY_POINTS = "swarm_logistics_env.policies"
+SUFFIXES = (SUFFIX, SB3_SUFFIX)  # of policy files
+WEIGHTS = Path(__file__).parent / "weights"
+
+
+SCRIPTED: dict[str, Callable[..., Policy]] = {
+    "swarm-dt": SwarmDT,
+    "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
+    # This is Swarm D-T without its taxis, for ablations.
+    "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
+    "homing": Homing,
+    "central": Central,
+}
+
+NAMES: dict[str, Callable[..., Policy]] = {
+    **SCRIPTED,
+    # These are trained; each file names the command that made it.
+    **{
+        path.stem: functools.partial(read_policy, path)
+        for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))
+    },
+}
+
+
+def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
+    """Return the policy called `name`.
+
+    Args:
+        name: one of `NAMES`, a name that an installed package declares in the entry-point group
+            `swarm_logistics_env.policies`, "package.module:Class", or the path of a policy file.
+            Naming a class imports, and so executes, its module. A file that `swarm-logistics
+            train` wrote (.safetensors) executes nothing; a model that stable-baselines3 saved
+            (.zip) does. "NAME=20,NAME=5" mixes them in one swarm, see `mixed.Mixed`.
+        trust_code: whether to read a file although that executes the code in it.
+        parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
+
+    Raises:
+        PolicyError: there is no such policy, or it does not take these parameters.
+    """
+    make = (
+        NAMES.get(name)
+        or _declared(name)
+        or _mixed(name, trust_code)
+        or _filed(name, trust_code)
+        or _imported(name)
+    )
+    if make is None:
+        known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
+        near = f" (a name, 'package.module:Class' or a file){suggest(name, known)}"
+        raise PolicyError(f"no policy {name!r}{_classes_of(name) or near}")
+    try:
+        policy = make(**parameters)
+    except SwarmLogisticsError:
+        raise
+    except TypeError as error:
+        raise PolicyError(f"policy {name!r} cannot be made: {error}") from None
+    except Exception as error:  # of code that is not ours
+        kind = type(error).__name__
+        raise PolicyError(f"policy {name!r} cannot be made: {kind}: {error}") from error
+    if not isinstance(policy, Policy):
+        raise PolicyError(f"{name!r} is no policy: it should have the methods reset and act")
+    return policy
+
+
+class PolicySpec(Record):
+    """A policy by its text: what it is called, what names its behaviour, whether it runs code.
+
+    Args:
+        name: the text, for `load`.
+        parameters: handed to the policy; whatever TOML and JSON both hold.
+        label: how a report calls it; empty: made from name and parameters.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+
+    name: str
+    parameters: dict[str, JsonValue] = Field(default_factory=dict)
+    label: str = ""
+
+    @field_validator("parameters")
+    @classmethod
+    def _policys_own(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
+        # These are `load`'s: whether to trust code is not for a file to say.
+        for name in ("name", "trust_code"):
+            if name in parameters:
+                raise ValueError(f"{name!r} is no parameter of a policy")
+        return parameters
+
+    @property
+    def title(self) -> str:
+        """What people call it: its label, or its name with the parameters given."""
+        given = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
+        return self.label or called(self.name) + (f" ({given})" if given else "")
+
+    @property
+    def runs_code(self) -> bool:
+        """Whether to load it runs code that its name leads to, so that somebody has to trust it."""
+        return ":" in self.name or self.name.endswith(SB3_SUFFIX)
+
+    def load(self, *, trust_code: bool = False) -> Policy:
+        """Return the policy; see the function `load`."""
+        return load(self.name, trust_code=trust_code, **self.parameters)
+
+    def identity_of(self, policy: Policy) -> str:
+        """Return text that changes whenever the behaviour of `policy`, made of this, may have."""
+        found = identity(policy)
+        if not self.parameters:
+            return found
+        # A class of one's own need not tell its parameters.
+        return canonical_json({"given": self.parameters, "policy": found})
+
+
+class KnownPolicy(NamedTuple):
+    """A policy that `load` knows by name: how it decides, and a sentence about it."""
+
+    name: str
+    kind: str
+    about: str
+
+
+def known_policies() -> Iterator[KnownPolicy]:
+    """Yield the policies of the package, then those that installed packages declare."""
+    for name, make in SCRIPTED.items():
+        given = make.keywords if isinstance(make, functools.partial) else {}
+        kind = make.func if isinstance(make, functools.partial) else make
+        about = (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")
+        with_ = "".join(f" {field} = {value}." for field, value in given.items())
+        yield KnownPolicy(name, "scripted", about + with_)
+    for path in sorted(WEIGHTS.glob(f"*{SUFFIX}")):
+        yield KnownPolicy(path.stem, "trained", read_card(path).about)
+    for point in entry_points(group=ENTRY_POINTS):
+        yield KnownPolicy(point.name, "installed", point.value)
+
+
+def called(name: str) -> str:
+    """Return what people call the policy `name`: a trained policy's file by its card's name."""
+    if not name.endswith(SUFFIX) or name in NAMES:
+        return name
+    try:
+        return read_card(Path(name)).name
+    except PolicyError:  # whoever loads it will say what is wrong with the file
+        return name
+
+
+def _declared(name: str) -> Callable[..., Policy] | None:
+    for point in entry_points(group=ENTRY_POINTS, name=name):
+        made: Callable[..., Policy] = point.load()
+        return made
+    return None
+
+
+def _mixed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
+    if not re.fullmatch(r"[^,]+=\d+(,[^,]+=\d+)+", name):
+        return None
+    parts = [part.rpartition("=") for part in name.split(",")]
+    return functools.partial(
+        Mixed, [(load(part, trust_code=trust_code), int(count)) for part, _, count in parts]
+    )
+
+
+def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
+    path = Path(name)
+    if path.suffix == SUFFIX:
+        return functools.partial(read_policy, path)
+    if path.suffix == SB3_SUFFIX:
+        if not trust_code:
+            raise PolicyError(
+                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
+                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
+            )
+        return functools.partial(StableBaselinesPolicy, path)
+    if path.is_file() and path.suffix != ".py":
+        raise PolicyError(f"{name} is no policy file: should end in {' or '.join(SUFFIXES)}")
+    return None
+
+
+def _classes_of(module: str) -> str:
+    """Return the end of an error message that proposes the classes with `act` of a module.
+
+    Its file is looked for in the current folder and read, not imported; empty: there is none.
+    """
+    path = Path(module.removesuffix(".py").replace(".", "/") + ".py")
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return ""
+    found = [
+        f"{path.stem}:{node.name}"
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+        if any(isinstance(part, ast.FunctionDef) and part.name == "act" for part in node.body)
+    ]
+    if not found:
+        return f": {path} has no class with a method act"
+    return f": should name its class, {' or '.join(map(repr, found))}"
+
+
+def _imported(name: str) -> Callable[..., Policy] | None:
+    module, colon, attribute = name.partition(":")
+    if not colon:
+        return None
+    if "/" in module or module.endswith(".py"):
+        raise PolicyError(
+            f"policy {name!r}: should be MODULE:CLASS, as '{Path(module).stem}:{attribute}', with "
+            "the module's folder as the current one or on PYTHONPATH"
+        )
+    try:
+        found: Any = importlib.import_module(module)
+        for part in attribute.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError, ValueError) as error:
+        hint = _classes_of(module)
+        if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
+            hint = ": should lie in this folder, on PYTHONPATH, or be installed"
+        raise PolicyError(f"policy {name!r} cannot be imported: {error}{hint}") from None
+    except Exception as error:  # of code that is not ours
+        kind = type(error).__name__
+        raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
+    if not callable(found):
+        raise PolicyError(f"policy {name!r} is a {type(found).__name__}: should be a class")
+    made: Callable[..., Policy] = found
+    return made

@@ -1,0 +1,360 @@
+"""What robots sense of others and of things: by rangers, radio and cameras.
+
+The rangers are 16 beams that measure distances. By radio every robot broadcasts its timer and a
+message to those in range that hear. Cameras tell of items in view, and of the nearest robots.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.kernels import inlined_kernel, kernel, pair_key, uniform
+
+from .logistics import MESSAGE, is_remembered
+from .structs import NOBODY, Grid, Nearby, Numbers, Sensed, World
+
+_N_BEAMS = row.N_BEAMS
+_BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
+_BEAM_Y = np.sin(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
+# Tangents of the angles half-way between the beams of the first quarter.
+_BORDERS = tuple(math.tan((beam + 0.5) * 2.0 * math.pi / _N_BEAMS) for beam in range(_N_BEAMS // 4))
+# Beyond so many squares of its radius a disc meets only the beam nearest to its centre: it looks
+# less wide than the beams stand apart. A little more, so that rounding decides nothing.
+_ONE_BEAM = 1.001 / math.sin(math.pi / _N_BEAMS) ** 2
+
+
+class Pose(NamedTuple):
+    """The position and the direction of a robot."""
+
+    x: float  # [m]
+    y: float  # [m]
+    cosine: float  # of its heading
+    sine: float
+
+
+@inlined_kernel
+def in_frame(pose: Pose, x: float, y: float) -> tuple[float, float]:
+    """Return how far (x, y) [m] lies forward and to the left of the robot."""
+    dx, dy = x - pose.x, y - pose.y
+    return dx * pose.cosine + dy * pose.sine, dy * pose.cosine - dx * pose.sine
+
+
+@kernel
+def scan_disc(forward: float, left: float, square: float, radius: float, scan: Sensed) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a disc.
+
+    Args:
+        forward, left: its centre in the robot's frame [m]; `square` is their squares' sum [m^2].
+        radius: the disc's radius [m].
+        scan: is changed.
+    """
+    clearance = square - radius * radius
+    middle = nearest_beam(forward, left)
+    if square > _ONE_BEAM * radius * radius:
+        # Without a branch: whether it is met cannot be predicted.
+        along = forward * _BEAM_X[middle] + left * _BEAM_Y[middle]
+        inside = along * along - clearance
+        distance = along - math.sqrt(max(inside, 0.0))
+        met = inside > 0.0 and distance < scan[middle]
+        scan[middle] = distance if met else scan[middle]
+        return
+    if clearance <= 0.0:
+        scan[:] = 0.0
+        return
+    # Outwards from the beam that looks nearest to its centre: if that one misses, all do.
+    for way in (1, -1):
+        for turned in range(_N_BEAMS // 2):
+            beam = (middle + way * (turned if way > 0 else turned + 1)) % _N_BEAMS
+            along = forward * _BEAM_X[beam] + left * _BEAM_Y[beam]
+            if along <= 0.0 or along * along <= clearance:
+                break
+            distance = along - math.sqrt(along * along - clearance)
+            if distance < scan[beam]:
+                scan[beam] = distance
+
+
+@inlined_kernel
+def nearest_beam(forward: float, left: float) -> int:
+    """Return the number of the beam that looks nearest to a direction in the robot's frame."""
+    across, ahead = abs(left), abs(forward)
+    beam = 0
+    for border in _BORDERS:
+        beam += across > border * ahead
+    if forward < 0.0:
+        beam = _N_BEAMS // 2 - beam
+    if left < 0.0:
+        beam = _N_BEAMS - beam
+    return beam % _N_BEAMS
+
+
+@kernel
+def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall of the arena."""
+    reach = scan[0]
+    for axis in range(2):
+        if axis == 0:
+            back, front, ahead, aside = pose.x, width - pose.x, pose.cosine, -pose.sine
+        else:
+            back, front, ahead, aside = pose.y, height - pose.y, pose.sine, pose.cosine
+        if min(back, front) >= reach:
+            continue
+        back, front = max(back, 0.0), max(front, 0.0)
+        for beam in range(_N_BEAMS):
+            towards = _BEAM_X[beam] * ahead + _BEAM_Y[beam] * aside
+            # Without a branch: all beams together are a few vector instructions.
+            found = np.float32((front if towards > 0.0 else back) / abs(towards))
+            scan[beam] = found if found < scan[beam] else scan[beam]
+
+
+@inlined_kernel
+def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""
+    parameters, obstacles = world.parameters, world.obstacles
+    scan_walls(pose, parameters.warehouse_width, parameters.warehouse_height, scan)
+    radius = parameters.obstacle_radius
+    for obstacle in range(len(obstacles)):
+        forward, left = in_frame(pose, obstacles[obstacle, 0], obstacles[obstacle, 1])
+        dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y
+        square = dx * dx + dy * dy
+        if square < (reach + radius) ** 2:
+            scan_disc(forward, left, square, radius, scan)
+
+
+@kernel
+def scan_discs(
+    pose: Pose, reach: float, radius: float, grid: Grid, nearby: Nearby, n_found: int, scan: Sensed
+) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet discs nearby, within `reach` [m]."""
+    limit, n_scanned = (reach + radius) ** 2, 0
+    # Written always and counted only if near: no branch to mispredict.
+    for index in range(n_found):
+        nearby.scanned[n_scanned] = index
+        n_scanned += int(nearby.square[index] < limit)
+    for number in range(n_scanned):
+        index = nearby.scanned[number]
+        place = nearby.place[index]
+        nearby.forward[number], nearby.left[number] = in_frame(
+            pose, grid.places[place, 0], grid.places[place, 1]
+        )
+        nearby.scanned_square[number] = nearby.square[index]
+    meet_middle_beams(nearby, n_scanned, radius)
+    for number in range(n_scanned):
+        square = nearby.scanned_square[number]
+        if square > _ONE_BEAM * radius * radius:
+            beam, distance = nearby.beam[number], nearby.distance[number]
+            scan[beam] = distance if distance < scan[beam] else scan[beam]
+        else:
+            scan_disc(nearby.forward[number], nearby.left[number], square, radius, scan)
+
+
+@inlined_kernel
+def meet_middle_beams(nearby: Nearby, n_scanned: int, radius: float) -> None:
+    """Fill the beams nearest to the centres of discs, and where these meet them [m].
+
+    Infinitely far where they do not. Without branches: several discs are one vector instruction.
+    """
+    for number in range(n_scanned):
+        forward, left = nearby.forward[number], nearby.left[number]
+        beam = nearest_beam(forward, left)
+        along = forward * _BEAM_X[beam] + left * _BEAM_Y[beam]
+        inside = along * along - (nearby.scanned_square[number] - radius * radius)
+        distance = along - math.sqrt(max(inside, 0.0))
+        nearby.beam[number] = beam
+        nearby.distance[number] = distance if inside > 0.0 else math.inf
+
+
+# Purposes of the streams between a robot and another thing: numbers of one step.
+RADIO, ROBOT_SEEN, ITEM_SEEN, N_PURPOSES = range(4)
+
+
+@inlined_kernel
+def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: float) -> bool:
+    """Return whether what `other` offers the robot of that key is lost in this step."""
+    if probability == 0.0:
+        return False
+    return uniform(pair_key(key, other), N_PURPOSES * step + purpose) < probability
+
+
+@kernel
+def send_messages(world: World, commands: Numbers) -> None:
+    """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
+    robots, able, step = world.robots, world.able, world.progress.step[0]
+    message, before = robots.message, robots.message_before
+    n, n_kept = len(message), len(robots.told_before)
+    for robot in range(n):
+        sends = robots.present[robot] and able.obeys[robot]
+        for place in range(message.shape[1]):
+            given = commands[robot, MESSAGE + place] if sends else 0.0
+            given = min(max(given, -1.0), 1.0)
+            before[(step % n_kept) * n + robot, place] = given
+            if able.radio_delay[robot] > 0:
+                then = step - able.radio_delay[robot]
+                given = before[(then % n_kept) * n + robot, place] if then >= 0 else 0.0
+            message[robot, place] = given
+
+
+@kernel
+def run_timers(world: World) -> None:
+    """Advance every robot's timer and what it tells (NaN: silent) [s].
+
+    Counted in steps, so that rounding never adds up. With gossip a robot tells the lowest of its
+    own timer and of what it heard one period ago, aged. If the radio is delayed, the broadcast
+    comes late. One that is not honest tells 0.
+    """
+    robots, able, step = world.robots, world.able, world.progress.step[0]
+    parameters = world.parameters
+    period, limit = parameters.control_period, parameters.timer_limit - 1e-9
+    n_kept = len(robots.told_before)
+    for robot in range(len(robots.timer)):
+        if robots.in_delivery[robot]:
+            robots.last_in_delivery[robot] = step
+        timer, is_present = math.nan, robots.present[robot]
+        if is_present and robots.last_in_delivery[robot] >= 0:
+            elapsed = (step - robots.last_in_delivery[robot]) * period
+            timer = elapsed if elapsed < limit else timer
+        robots.timer[robot] = timer
+        told = timer
+        aged = robots.heard[robot] + period
+        if parameters.is_gossip and is_present and aged < limit:
+            told = aged if math.isnan(told) else min(told, aged)
+        robots.told_before[step % n_kept, robot] = told
+        if is_present and able.radio_delay[robot] > 0:
+            then = step - able.radio_delay[robot]
+            told = robots.told_before[then % n_kept, robot] if then >= 0 else math.nan
+            # The limit may have fallen since it was told.
+            told = told if told < limit else math.nan
+        robots.told[robot] = 0.0 if is_present and not able.honest[robot] else told
+
+
+@inlined_kernel
+def listen(me: int, world: World, n_found: int) -> None:
+    """Note in `nearby.is_heard` which of the robots found nearby `me` hears."""
+    robots, able, nearby = world.robots, world.able, world.nearby
+    limit, loss = world.parameters.radio_range**2, world.parameters.radio_loss
+    step = world.progress.step[0]
+    for index in range(n_found):
+        other = world.robot_grid.members[nearby.place[index]]
+        is_heard = (nearby.square[index] <= limit) & able.sends[other] & able.hears[me]
+        if loss > 0.0 and is_heard:
+            is_heard = not is_missed(robots.sensor_key[me], other, step, RADIO, loss)
+        nearby.is_heard[index] = is_heard
+
+
+@inlined_kernel
+def lowest_timer_heard(world: World, n_found: int) -> tuple[int, float]:
+    """Return who tells the lowest timer of those nearby that are heard, or NOBODY, and it [s].
+
+    If several broadcast the same timer, it is the nearest of them.
+    """
+    robots, grid, nearby = world.robots, world.robot_grid, world.nearby
+    lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
+    # Without branches, as what they hang on cannot be predicted.
+    for index in range(n_found):
+        other, square = grid.members[nearby.place[index]], nearby.square[index]
+        told = robots.told[other]
+        is_lower = (told < lowest_timer) | ((told == lowest_timer) & (square < lowest_square))
+        is_lower &= nearby.is_heard[index]
+        lowest = other if is_lower else lowest
+        lowest_square = square if is_lower else lowest_square
+        lowest_timer = told if is_lower else lowest_timer
+    return lowest, lowest_timer
+
+
+_ITEM_WIDTH = len(row.ITEM_FEATURES)
+_NEIGHBOUR_WIDTH = len(row.NEIGHBOUR_FEATURES)
+_N_ITEMS, _N_NEIGHBOURS = row.N_ITEMS_IN_VIEW, row.N_NEIGHBOURS
+_ITEMS, _NEIGHBOURS, _MESSAGES = row.ITEMS, row.NEIGHBOURS, row.MESSAGES
+
+
+@inlined_kernel
+def rank_nearest(nearby: Nearby, count: int, wanted: int) -> int:
+    """List in `nearby.nearest` the `wanted` nearest of `count` chosen things, nearest first.
+
+    If two are equally near, the one that comes first is chosen.
+
+    Returns how many there are, at most `wanted`.
+    """
+    squares = nearby.chosen_square
+    for one in range(count):
+        # Counted without a branch: a few vector instructions for all the others.
+        square, n_nearer = squares[one], 0
+        for other in range(one):
+            n_nearer += squares[other] <= square
+        for other in range(one + 1, count):
+            n_nearer += squares[other] < square
+        if n_nearer < wanted:
+            nearby.nearest[n_nearer] = one
+    return min(count, wanted)
+
+
+@inlined_kernel
+def view_square(view_range: float) -> float:
+    """Return the square of how far cameras see; without them not even what lies at the centre."""
+    return view_range**2 if view_range > 0.0 else -1.0
+
+
+@inlined_kernel
+def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> None:
+    """Fill the block of items in a row from the free items nearby."""
+    robots, grid, nearby = world.robots, world.item_grid, world.nearby
+    limit, dropout = view_square(world.able.view_range[me]), world.parameters.sensor_dropout
+    n_seen, step = 0, world.progress.step[0]
+    for index in range(n_found):
+        item, square = grid.members[nearby.place[index]], nearby.square[index]
+        is_seen = square <= limit
+        if dropout > 0.0 and is_seen:
+            is_seen = not is_missed(robots.sensor_key[me], item, step, ITEM_SEEN, dropout)
+        nearby.chosen[n_seen], nearby.chosen_square[n_seen] = item, square
+        n_seen += int(is_seen)
+    for place in range(rank_nearest(nearby, n_seen, _N_ITEMS)):
+        item = nearby.chosen[nearby.nearest[place]]
+        position = world.items.position
+        forward, left = in_frame(pose, position[item, 0], position[item, 1])
+        column = _ITEMS + place * _ITEM_WIDTH
+        out[column] = 1.0
+        out[column + 1] = forward
+        out[column + 2] = left
+        out[column + 3] = 1.0 if item == world.progress.requested[0] else 0.0
+        out[column + 4] = 1.0 if is_remembered(robots.memory, me, item) else 0.0
+
+
+@inlined_kernel
+def choose_neighbours(me: int, world: World, n_found: int) -> int:
+    """List in `nearby.chosen` the robots that `me` sees or hears; returns how many."""
+    robots, nearby, grid = world.robots, world.nearby, world.robot_grid
+    limit = view_square(world.able.view_range[me])
+    dropout, n_chosen, step = world.parameters.sensor_dropout, 0, world.progress.step[0]
+    for index in range(n_found):
+        other, square = grid.members[nearby.place[index]], nearby.square[index]
+        is_heard, is_seen = nearby.is_heard[index], square <= limit
+        if dropout > 0.0 and is_seen:
+            is_seen = not is_missed(robots.sensor_key[me], other, step, ROBOT_SEEN, dropout)
+        nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square
+        nearby.chosen_heard[n_chosen] = is_heard
+        n_chosen += int(is_heard | is_seen)
+    return n_chosen
+
+
+@inlined_kernel
+def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
+    """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
+    robots, parameters = world.robots, world.parameters
+    nearby, width = world.nearby, world.robots.message.shape[1]
+    for place in range(rank_nearest(nearby, n_chosen, _N_NEIGHBOURS)):
+        index = nearby.nearest[place]
+        other, is_heard = nearby.chosen[index], nearby.chosen_heard[index]
+        forward, left = in_frame(pose, robots.position[other, 0], robots.position[other, 1])
+        tells = is_heard and not math.isnan(robots.told[other])
+        column = _NEIGHBOURS + place * _NEIGHBOUR_WIDTH
+        out[column] = 1.0
+        out[column + 1] = forward
+        out[column + 2] = left
+        out[column + 3] = 1.0 if tells else 0.0
+        out[column + 4] = robots.told[other] if tells else parameters.timer_limit
+        if is_heard and width > 0:
+            for part in range(width):
+                out[_MESSAGES + place * width + part] = robots.message[other, part]

@@ -1,0 +1,286 @@
+"""What server and page tell each other, and a recording of it that needs no server."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import zlib
+from collections.abc import Callable
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, ValidationError, validate_call
+
+from swarm_logistics_env.episode import Play
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.observations import columns
+from swarm_logistics_env.rendering import palette
+from swarm_logistics_env.rendering.readings import followed, ranges
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse import FAILURE_MODES
+from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.watch.session import SPEEDS, Session
+
+_SHAPE = (
+    "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
+    "restock", "robot_radius", "item_radius", "obstacle_radius",
+)  # fmt: skip
+# Several things stand in each of these blocks; those that are absent come last and are left out.
+_BLOCKS = ("item", "neighbour", "lowest_timer")
+_TIMER_STEPS = 8  # shades of the timer's halo
+
+
+def fixed_data(session: Session) -> dict[str, Any]:
+    """Return what never changes: colours, failure modes, speeds, policies to choose from."""
+    return {
+        "colours": {
+            theme: {name: _css(colour) for name, colour in colours.items()}
+            for theme, colours in (("light", palette.COLOURS), ("dark", palette.DARK_COLOURS))
+        },
+        "curves": palette.RUN_NAMES,
+        "modes": [
+            {"name": name, "mark": palette.MARKS.get(name, ""), "meaning": mode.description}
+            for name, mode in FAILURE_MODES.items()
+        ],
+        "speeds": SPEEDS,
+        "choices": session.choices,
+    }
+
+
+def frame(session: Session) -> dict[str, Any]:
+    """Return what is true now. Lengths in mm, times in s, angles in mrad; x right, y up.
+
+    `arenas` has for each of the two runs: `poses` (3 N numbers: x, y, heading of each robot, or
+    None where it is absent), `robots` ([activity, age of its timer in 1/8 of the limit or None,
+    mark, robot it follows] of each), `items` (x, y of each that is stored), `requested` ([x, y,
+    carrier] of the item asked for, or None) and `deliveries` (their times).
+    """
+    frame: dict[str, Any] = {
+        "seed": session.seed,
+        "time": round(session.run.world.state.time, 3),
+        "speed": session.speed,
+        "paused": session.paused,
+        "over": session.is_over,
+        "mode": session.mode,
+        "note": session.note,
+        "policy": session.policy,
+        "against": session.against,
+        "names": session.names,
+        "scenario": {name: getattr(session.scenario, name) for name in _SHAPE},
+        "obstacles": _millimetres(session.run.world.state.obstacle_position),
+        "events": [[round(e.time, 1), e.robot, e.label] for e in session.events],
+        "selected": _selected(session),
+    }
+    for number, play in enumerate((session.run, session.beside)):
+        frame |= {f"{name}{number}": value for name, value in _arena(play).items()}
+    return frame
+
+
+def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+    """Return the entries of `after` that are not the same in `before`."""
+    return {name: value for name, value in after.items() if before.get(name, ...) != value}
+
+
+def encode(message: dict[str, Any]) -> str:
+    """Return a message as JSON."""
+    return json.dumps(message, separators=(",", ":"), allow_nan=False)
+
+
+_checked = validate_call(config=ConfigDict(strict=True, arbitrary_types_allowed=True))
+# Orders by name; the rest of an order is the arguments, which have to be of the right types.
+_ORDERS: dict[str, Callable[..., object]] = {
+    "pause": _checked(Session.pause),
+    "step": _checked(Session.step),
+    "speed": _checked(Session.set_speed),
+    "next": _checked(Session.next_seed),
+    "again": _checked(Session.restart),
+    "compare": _checked(Session.compare),
+    "select": _checked(Session.select),
+    "choose": _checked(Session.choose_mode),
+    "break": _checked(Session.break_robot),
+    "repair": _checked(Session.repair_robot),
+    "toggle": _checked(Session.toggle_robot),
+    "resize": _checked(Session.resize),
+    "widen": _checked(Session.set_delivery_width),
+}
+
+
+def obey(session: Session, text: str) -> None:
+    """Do what an order, a JSON object such as {"do": "toggle", "robot": 3}, says.
+
+    Raises:
+        SwarmLogisticsError: it says nothing that can be done.
+    """
+    try:
+        arguments = json.loads(text, parse_constant=_refuse)
+        act = _ORDERS[arguments.pop("do")]
+    except (ValueError, RecursionError, LookupError, TypeError, AttributeError):
+        raise SetupError(
+            f'order: should be a JSON object whose "do" is one of {", ".join(_ORDERS)}'
+        ) from None
+    try:
+        act(session, **arguments)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise SetupError(f"order {where}: {first['msg']}") from None
+
+
+def observation_parts(
+    row: NDArray[np.float32], scenario: Scenario
+) -> list[tuple[str, str, list[float]]]:
+    """Return name, unit and values of every named part of an observation row (D,).
+
+    Items and neighbours are listed only if present, the nearest first.
+    """
+    parts = {column.name: row[column.columns] for column in columns(scenario)}
+    found = []
+    for column in columns(scenario):
+        values = parts[column.name]
+        block = next((block for block in _BLOCKS if column.name.startswith(block)), None)
+        if block is not None and column.name != f"{block}_present":
+            n_present = int((parts[f"{block}_present"] > 0.5).sum())
+            values = values[: n_present * (len(values) // len(parts[f"{block}_present"]))]
+        # Adding 0.0 turns a negative zero into zero.
+        found.append((column.name, column.unit, [round(float(v), 2) + 0.0 for v in values]))
+    return found
+
+
+def _arena(play: Play) -> dict[str, Any]:
+    state, scenario = play.world.state, play.world.scenario
+    poses: list[int | None] = []
+    robots: list[list[Any] | None] = []
+    positions = _millimetres(state.robot_position)
+    ages = state.robot_timer / scenario.timer_limit
+    for robot in range(state.n_robots):
+        if not state.robot_present[robot]:
+            poses += [None, None, None]
+            robots.append(None)
+            continue
+        poses += [*positions[robot], round(1000 * float(state.robot_heading[robot]))]
+        age = int(_TIMER_STEPS * ages[robot]) if ages[robot] < 1.0 else None
+        mark = palette.mark(state.failure_modes[robot])
+        robots.append([_activity(state, robot), age, mark, followed(state, scenario, robot)])
+    requested = None
+    if state.requested != NOBODY:
+        place = _millimetres(state.item_position[state.requested][np.newaxis])[0]
+        requested = [*place, int(state.item_carrier[state.requested])]
+    stored = state.item_status == STORED
+    if requested:
+        stored[state.requested] = False
+    return {
+        "poses": poses,
+        "robots": robots,
+        "items": _millimetres(state.item_position[stored]),
+        "requested": requested,
+        "deliveries": [round(time, 1) for time in state.delivery_times],
+    }
+
+
+def _activity(state: WarehouseState, robot: int) -> str:
+    item = int(state.robot_item[robot])
+    if item == NOBODY:
+        return "searching"
+    return "delivering" if item == state.requested else "shuffling"
+
+
+def _selected(session: Session) -> dict[str, Any] | None:
+    robot = session.selected
+    if robot is None:
+        return None
+    state, scenario = session.run.world.state, session.scenario
+    return {
+        "robot": robot,
+        "activity": _activity(state, robot),
+        "modes": list(state.failure_modes[robot]),
+        "beams": [round(float(r), 3) for r in np.min(ranges(state, scenario, robot), axis=0)],
+        "reach": round(float(state.ranger_range[robot]), 3),
+        "view": round(float(state.view_range[robot]), 3),
+        "row": observation_parts(session.run.sensed(robot), scenario),
+    }
+
+
+def _millimetres(places: NDArray[np.float64]) -> list[list[int]]:
+    whole: list[list[int]] = np.rint(1000.0 * places).astype(int).tolist()
+    return whole
+
+
+def _css(colour: palette.RGB) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no JSON")
+
+
+_SPACING = 0.5  # [s] between frames; the page draws what lies between
+
+
+class Recording:
+    """What a session has shown of its present episode.
+
+    Args:
+        session: the session; call `note` after each of its steps.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._play: object = None
+        self._last: dict[str, Any] = {}
+        self._messages: list[str] = []
+
+    def note(self) -> None:
+        """Keep the session as it is now, if it has gone on far enough."""
+        session = self._session
+        if session.run is not self._play:  # another episode
+            self._play, self._last, self._messages = session.run, {}, []
+        time = session.run.world.state.time
+        if self._last and time < self._last["time"] + _SPACING - 1e-9 and not session.is_over:
+            return
+        now = {**frame(session), "selected": None, "note": "", "paused": False}
+        message = changes(self._last, now)
+        if message:
+            self._messages.append(encode(message))
+        self._last = now
+
+    def page(self) -> str:
+        """Return the recording as an HTML page that loads nothing."""
+        self.note()
+        frames = ",".join(self._messages)
+        text = f'{{"fixed":{encode(fixed_data(self._session))},"frames":[{frames}]}}'
+        return _page_around(text)
+
+
+def recorded_page(session: Session, until: float) -> str:
+    """Play a session up to a time [s], or to its end; return the page that replays it."""
+    recording = Recording(session)
+    recording.note()
+    while not session.is_over and session.run.world.state.time < until - 1e-9:
+        session.advance()
+        recording.note()
+    return recording.page()
+
+
+def _page_around(text: str) -> str:
+    packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode()
+    page, css, *scripts = (
+        resources.files(__package__).joinpath("web", name).read_text(encoding="utf-8")
+        for name in ("page.html", "page.css", "draw.js", "panel.js", "page.js")
+    )
+    script = "\n".join(scripts)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+    head, tail = page.split("<!-- files -->")[0], page.split("<!-- /files -->")[1]
+    body, end = tail.split("<!-- scripts -->")[0], tail.split("<!-- /scripts -->")[1]
+    return (
+        f'{head}<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        f"<style>{css}</style>{body}"
+        f'<script type="application/octet-stream" id="recording">{packed}</script>'
+        f"<script>{script}</script>{end}"
+    )

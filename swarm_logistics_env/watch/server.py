@@ -1,0 +1,386 @@
+"""The server: for this machine, for those who know the token in the address.
+
+It plays the run's faults on other seeds in the background: what R and FT they lead to.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import logging
+import os
+import re
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.episode import Episode, run_episode
+from swarm_logistics_env.errors import SetupError, SwarmLogisticsError
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.watch.messages import Recording, changes, encode, fixed_data, frame, obey
+from swarm_logistics_env.watch.session import Session
+
+if TYPE_CHECKING:
+    from aiohttp import web
+    from aiohttp.typedefs import Handler
+
+MOST_SEEDS = 20
+LEAST_SEEDS = 3  # of fewer the spread says nothing
+EFFECT = 0.1  # the least R or FT that seeds are planned for
+
+
+@dataclass(frozen=True)
+class _Question:
+    """The faults that hold now, to be played from the start of whole episodes."""
+
+    scenario: Scenario
+    policies: tuple[str, ...]
+    seed: int
+    faults: tuple[Fault, ...]
+
+    def removed(self) -> tuple[Fault, ...]:
+        """Return the same robots, each removed when it first fails: the paper's P_S."""
+        onsets: dict[int, float] = {}
+        for fault in sorted(self.faults, key=lambda fault: fault.onset):
+            for robot in fault.robots if isinstance(fault.robots, tuple) else ():
+                onsets.setdefault(robot, fault.onset)
+        return tuple(Fault("removed", [robot], onset=onset) for robot, onset in onsets.items())
+
+
+class Replicas:
+    """Plays whole episodes in a thread and keeps R and FT of the faults that hold now.
+
+    The seeds follow the one that is shown. A change of faults, policies or conditions begins anew;
+    the runs without faults are kept.
+    """
+
+    def __init__(self) -> None:
+        self._question: _Question | None = None
+        self._load: Any = None
+        self._changed = threading.Condition()
+        self._results: list[dict[str, Any]] = []
+        self._sound: dict[tuple[Scenario, str, int], Episode] = {}
+        self._thread = threading.Thread(target=self._work, daemon=True)
+
+    def ask(self, session: Session | None) -> None:
+        """Let the thread work on what the session shows; None lets it rest."""
+        question = None
+        if session is not None:
+            names = (session.policy, *filter(None, [session.against]))
+            faults = session.run.world.faults
+            question = _Question(session.scenario, names, session.seed, tuple(faults))
+        if question == self._question:
+            return
+        if not self._thread.is_alive() and question is not None:
+            self._thread.start()
+        with self._changed:
+            self._question = question
+            if question is not None and session is not None:
+                self._load, self._results = session.load, []
+            self._changed.notify_all()
+
+    def results(self) -> list[dict[str, Any]]:
+        """Return an entry per indicator and policy: its estimate so far, and seeds that tell."""
+        return self._results
+
+    def _work(self) -> None:
+        answered: _Question | None = None
+        while True:
+            with self._changed:
+                while self._question is None or self._question is answered:
+                    self._changed.wait()
+                answered = self._question
+            self._answer(answered)
+
+    def _answer(self, question: _Question) -> None:
+        removed = question.removed()
+        if not removed:
+            return
+        runs: dict[str, list[tuple[Episode, Episode, Episode]]] = {}
+        for seed in range(question.seed + 1, question.seed + 1 + MOST_SEEDS):
+            for policy in question.policies:
+                key = question.scenario, policy, seed
+                try:
+                    if key not in self._sound:
+                        self._sound[key] = self._episode(*key, ())
+                    sound = self._sound[key]
+                    faulty = self._episode(*key, question.faults)
+                    without = self._episode(*key, removed)
+                except SwarmLogisticsError:
+                    return  # the run that is shown meets the same error and tells it
+                runs.setdefault(policy, []).append((sound, faulty, without))
+                if self._question is not question:
+                    return
+            results = [
+                entry
+                for policy in runs
+                for entry in indicators(
+                    policy, runs[policy], question.scenario.n_robots, len(removed)
+                )
+            ]
+            with self._changed:
+                if self._question is question:
+                    self._results = results
+
+    def _episode(
+        self, scenario: Scenario, policy: str, seed: int, faults: tuple[Fault, ...]
+    ) -> Episode:
+        return run_episode(scenario, self._load(policy), seed, faults)
+
+
+def indicators(
+    policy: str, runs: list[tuple[Episode, Episode, Episode]], n: int, m: int
+) -> list[dict[str, Any]]:
+    """Return R and, where a robot is left, FT of m faulty robots of n.
+
+    Args:
+        runs: for each seed the run without faults, with them, and with those robots removed.
+    """
+    sound, faulty, without = ([run.delivered for run in column] for column in zip(*runs))
+    if not sum(sound):
+        return []
+    estimates = [spi.robustness(sound, faulty, n=n, m=m)]
+    if m < n:
+        estimates.append(spi.fault_tolerance(sound, faulty, without, n=n, m=m))
+    return [
+        {
+            "policy": policy,
+            "symbol": estimate.indicator,
+            "value": round(estimate.value, 3),
+            "interval": None
+            if estimate.low is None or estimate.high is None
+            else [round(max(-9.0, estimate.low), 3), round(min(9.0, estimate.high), 3)],
+            "verdict": estimate.verdict,
+            "seeds": estimate.n_seeds,
+            "needed": None
+            if estimate.n_seeds < LEAST_SEEDS
+            else spi.seeds_for_power(estimate, EFFECT),
+        }
+        for estimate in estimates
+    ]
+
+
+_LOOPBACK = "127.0.0.1"
+# A foreign page may resolve its name to this machine, but it cannot forge these headers.
+_OWN_HOST = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?")
+_TOKEN = re.compile(r"[\w-]{24}")
+FILES = {
+    "page.html": "text/html",
+    "page.css": "text/css",
+    "draw.js": "text/javascript",
+    "panel.js": "text/javascript",
+    "page.js": "text/javascript",
+}
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
+    "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+    "Server": "swarm-logistics",
+}
+_LONGEST_ORDER = 4096  # bytes
+_MOST_PAGES = 16
+_FRAME_PERIOD = 0.05  # [s]
+
+
+class WatchServer:
+    """Shows a session to those who know its address, which holds the token.
+
+    Args:
+        session: the session to show.
+        port: the port; 0 takes any that is free.
+        token: 24 letters, digits, - or _; None: random ones.
+
+    Attributes:
+        address: the address to open in a browser, once `start` is done.
+
+    Raises:
+        SetupError: aiohttp is not installed.
+    """
+
+    def __init__(self, session: Session, port: int, token: str | None = None) -> None:
+        try:
+            from aiohttp import web
+        except ImportError as error:
+            raise SetupError(
+                f"watch needs aiohttp ({error}): pip install 'swarm-logistics-env[watch]'"
+            ) from None
+        self._web = web
+        self.session, self.port = session, port
+        self.token = token or secrets.token_urlsafe(18)
+        self.recording, self.replicas = Recording(session), Replicas()
+        self.address = ""
+        self._pages: dict[web.WebSocketResponse, dict[str, Any]] = {}
+
+        @web.middleware
+        async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+            self._check(request)
+            return await handler(request)
+
+        app = web.Application(middlewares=[guard])
+        app.router.add_get("/{token}/live", self._live)
+        app.router.add_get("/{token}/recording.html", self._save)
+        app.router.add_get("/{token}/{name:.*}", self._file)
+        app.on_response_prepare.append(_add_headers)
+        logger = logging.getLogger(__name__)
+        logger.addFilter(_is_own_error)
+        self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
+
+    async def start(self) -> None:
+        """Listen on the loopback interface.
+
+        Raises:
+            SetupError: the port is in use or not allowed.
+        """
+        await self._runner.setup()
+        site = self._web.TCPSite(self._runner, _LOOPBACK, self.port)
+        try:
+            await site.start()
+        except OSError as error:
+            await self._runner.cleanup()
+            if "in use" in str(error):
+                raise SetupError(
+                    f"port = {self.port}: is in use, should be another one, or 0 for any that "
+                    "is free"
+                ) from None
+            raise SetupError(f"port = {self.port}: {error.strerror}") from None
+        self.port = self._runner.addresses[0][1]
+        self.address = f"http://{_LOOPBACK}:{self.port}/{self.token}/"
+
+    async def play(self) -> None:
+        """Let the session go on while a page is open, until this is cancelled.
+
+        Raises:
+            PolicyError: the policy returned commands of the wrong shape, or not finite.
+        """
+        before = time.monotonic()
+        try:
+            while True:
+                await asyncio.sleep(_FRAME_PERIOD)
+                now = time.monotonic()
+                elapsed, before = now - before, now
+                if self._pages:
+                    self.replicas.ask(self.session)
+                    self.session.play(elapsed, _FRAME_PERIOD, self.recording.note)
+                    await self._tell()
+                else:
+                    self.replicas.ask(None)
+        finally:
+            self.replicas.ask(None)
+            await self._runner.cleanup()
+
+    async def _tell(self) -> None:
+        now = {**frame(self.session), "indicators": self.replicas.results()}
+        for page, known in list(self._pages.items()):
+            message = changes(known, now)
+            if message:
+                self._pages[page] = now
+                with contextlib.suppress(ConnectionError):
+                    await page.send_str(encode(message))
+
+    async def _live(self, request: web.Request) -> web.StreamResponse:
+        if len(self._pages) >= _MOST_PAGES:
+            raise self._web.HTTPServiceUnavailable(text="Too many pages are open.\n")
+        page = self._web.WebSocketResponse(
+            max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False
+        )
+        await page.prepare(request)
+        await page.send_str(encode(fixed_data(self.session)))
+        self._pages[page] = {}
+        try:
+            async for message in page:
+                try:
+                    obey(self.session, message.data if isinstance(message.data, str) else "")
+                except SwarmLogisticsError as error:
+                    await page.send_str(encode({"problem": str(error)}))
+                self.recording.note()
+        finally:
+            self._pages.pop(page, None)
+        return page
+
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        name = request.match_info["name"] or "page.html"
+        if name not in FILES or request.path.endswith("/page.html"):
+            raise self._web.HTTPNotFound(text="Not Found\n")
+        text = resources.files(__package__).joinpath("web", name).read_text(encoding="utf-8")
+        return self._web.Response(text=text, content_type=FILES[name], charset="utf-8")
+
+    async def _save(self, request: web.Request) -> web.StreamResponse:
+        headers = {"Content-Disposition": 'attachment; filename="run.html"'}
+        page = await asyncio.to_thread(self.recording.page)
+        return self._web.Response(text=page, content_type="text/html", headers=headers)
+
+    def _check(self, request: web.Request) -> None:
+        hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
+        own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0])
+        token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
+        known = hmac.compare_digest(token.encode(), self.token.encode())
+        if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
+            text = "Open the address that swarm-logistics watch printed, on its machine.\n"
+            raise self._web.HTTPForbidden(text=text)
+
+
+def _is_own_error(record: logging.LogRecord) -> bool:
+    """Return whether an error is ours: no request that is no HTTP, no page that was closed."""
+    from aiohttp.http_exceptions import HttpProcessingError
+
+    others = HttpProcessingError | ConnectionError
+    return not (record.exc_info and isinstance(record.exc_info[1], others))
+
+
+async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(_HEADERS)
+
+
+def kept_token() -> str | None:
+    """Return this user's token, so that an open page finds the server again; None if it can't be.
+
+    It is kept in a file that only the user can read, in the folder for the state of programs.
+    """
+    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    file = Path(state) / "swarm-logistics" / "watch-token"
+    try:
+        with contextlib.suppress(FileExistsError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(descriptor, "w") as opened:
+                opened.write(secrets.token_urlsafe(18))
+        token = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    return token if _TOKEN.fullmatch(token) else None
+
+
+def serve(session: Session, port: int, announce: Callable[[str], None]) -> None:
+    """Show a session in the browser until Ctrl-C.
+
+    Args:
+        announce: is called with a sentence that has the address.
+
+    Raises:
+        SetupError: the port is in use or not allowed, or aiohttp is not installed.
+        PolicyError: the policy returned commands of the wrong shape, or not finite.
+    """
+
+    async def run() -> None:
+        server = WatchServer(session, port, kept_token())
+        await server.start()
+        announce(
+            f"Open {server.address} in a browser on this machine (from another one: "
+            f"ssh -L {server.port}:127.0.0.1:{server.port}). Ctrl-C ends it."
+        )
+        await server.play()
+
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(run())

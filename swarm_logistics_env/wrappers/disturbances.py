@@ -1,0 +1,262 @@
+"""Wrappers that let robots fail, or change a parameter of the scenario during an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.requests import faults_among, scenario_fields
+from swarm_logistics_env.errors import FaultError, ScenarioError, suggest
+from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
+from swarm_logistics_env.streams import generator
+from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
+
+from .wrapper import Distribution, Sampler, Wrapper
+
+
+class FaultInjection(Wrapper):
+    """Lets robots fail in every episode, in addition to the environment's own faults.
+
+    Robots do not sense that they failed. `infos` tell it by the key "failed", and
+    `warehouse.state.failure_modes` names the modes while they hold. Faults in the options of a
+    reset replace the environment's own; the faults of this wrapper are added to either.
+
+    Args:
+        env: the environment, or a wrapper of one.
+        mode: a key of `FAILURE_MODES`.
+        robots: how many robots fail, or the numbers of those that do. A number of robots is
+            chosen by the episode's seed alone: sets of 1, 2, 3, .. are nested, and are the same
+            for every mode.
+        onset: the time of the failure [s]; a list to draw from in each episode; or a function of
+            a numpy Generator that returns one time or an array of times. At each further time
+            as many robots more fail, as long as there are any; robots given by number fail anew.
+        duration: how long a failure lasts [s]; None means until the end.
+        factor: the part of speed (`motor_slow`) or of view (`view_reduced`) that is left, in
+            [0, 1).
+
+    Attributes:
+        injected: this episode's faults of this wrapper, with the robots' numbers.
+
+    Raises:
+        FaultError: mode, robots, times or factor are not allowed, or there may be fewer robots
+            than that. If a function gives such times, the reset raises it.
+        SetupError: `env` is not such an environment.
+
+    Example:
+        >>> from swarm_logistics_env import swarm_logistics_v0
+        >>> env = FaultInjection(swarm_logistics_v0.parallel_env(), "FM1", robots=2, onset=200.0)
+        >>> observations, infos = env.reset(seed=0)
+        >>> len(env.failed_robots), env.injected[0].onset
+        (2, 200.0)
+        >>> def onsets(rng):
+        ...     return rng.exponential(100.0, size=3).cumsum()
+        >>> env = FaultInjection(env, "motor_dead", onset=onsets)
+        >>> observations, infos = env.reset(seed=0)
+        >>> len(env.failed_robots)
+        3
+    """
+
+    def __init__(
+        self,
+        env: SwarmLogisticsEnv | Wrapper,
+        mode: str,
+        robots: int | Sequence[int] = 1,
+        onset: ArrayLike | Distribution = 0.0,
+        duration: float | None = None,
+        factor: float | None = None,
+    ) -> None:
+        super().__init__(env)
+        self._fault = Fault(mode, robots, duration=duration, factor=factor)
+        if not callable(onset):
+            onset = _times(onset)
+            for time in onset:
+                self._fault.replace(onset=time)
+            if len(onset) == 0:
+                raise FaultError("Fault.onset = []: should list at least one time [s]")
+        self._onset = onset
+        self.injected: tuple[Fault, ...] = ()
+        for scenario in self.env.scenarios:
+            self._check(scenario)
+
+    @property
+    def failed_robots(self) -> tuple[int, ...]:
+        """The robots that this wrapper's faults affect in this episode, ascending."""
+        return tuple(sorted({robot for fault in self.injected for robot in _named(fault)}))
+
+    def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
+        """Return the options with this episode's faults added to theirs."""
+        n_robots = self.env.scenario_of(seed, options).n_robots
+        faults = self._drawn(seed, n_robots)
+        return {**options, "faults": (*faults_among(options, self.unwrapped.faults), *faults)}
+
+    def begun(self, seed: int) -> None:
+        """Store this episode's faults."""
+        self.injected = self._drawn(seed, self.warehouse.state.n_robots)
+
+    def declare_spaces(self, scenario: Scenario) -> None:
+        """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
+
+        Raises:
+            FaultError: `scenario` has fewer robots than are to fail.
+        """
+        self._check(scenario)
+        self.env.declare_spaces(scenario)
+
+    def _check(self, scenario: Scenario) -> None:
+        failed_robots(self._fault, 0, scenario.n_robots)
+
+    def _drawn(self, seed: int, n_robots: int) -> tuple[Fault, ...]:
+        rng = generator(seed, "fault onsets", self._place())
+        if callable(self._onset):
+            onsets = sorted(_times(self._onset(rng)))
+        else:
+            onsets = [self._onset[int(rng.integers(len(self._onset)))]]
+        if isinstance(self._fault.robots, tuple):
+            return self._anew(onsets)
+        return self._one_group_after_another(onsets, self._fault.robots, seed, n_robots)
+
+    def _one_group_after_another(
+        self, onsets: list[float], size: int, seed: int, n_robots: int
+    ) -> tuple[Fault, ...]:
+        faults, before = [], set[int]()
+        for number, onset in enumerate(onsets, start=1):
+            # The first group has to exist; later groups are drawn from the robots that are left.
+            so_many = self._fault.replace(robots=max(size, min(number * size, n_robots)))
+            chosen = set(failed_robots(so_many, seed, n_robots).tolist())
+            if more := tuple(sorted(chosen - before)):
+                faults.append(self._fault.replace(robots=more, onset=onset))
+            before = chosen
+        return tuple(faults)
+
+    def _anew(self, onsets: list[float]) -> tuple[Fault, ...]:
+        faults: list[Fault] = []
+        for onset in onsets:
+            last = faults[-1] if faults else None
+            if last is None or (last.duration and onset > last.onset + last.duration):
+                faults.append(self._fault.replace(onset=onset))
+            elif last.duration and self._fault.duration:
+                # The robot has still failed; two faults of motor_slow would make it slower still.
+                until = onset + self._fault.duration
+                faults[-1] = last.replace(duration=until - last.onset)
+        return tuple(faults)
+
+
+def _times(given: ArrayLike) -> list[float]:
+    try:
+        times = np.atleast_1d(np.asarray(given, dtype=np.float64)).ravel()
+    except (TypeError, ValueError):
+        raise FaultError(
+            f"Fault.onset = {given!r}: should be a time [s], a list of times, or a function of a "
+            "numpy Generator that returns them"
+        ) from None
+    return [float(time) for time in times]
+
+
+def _named(fault: Fault) -> tuple[int, ...]:
+    return fault.robots if isinstance(fault.robots, tuple) else ()
+
+
+class ParameterChange(Wrapper):
+    """Plays each episode with a parameter of the scenario changed, throughout or from a time on.
+
+    If the options of a reset name the parameter, their value holds until the time of the change.
+
+    Args:
+        env: the environment, or a wrapper of one.
+        name: a field of `Scenario`, e.g. "delivery_width".
+        values: the new value; a list to draw from in each episode (a tuple is one value, as
+            `speed_mix` has them); or a function of a numpy Generator.
+        at: the time of the change [s], given like `values`; the value holds from the first step
+            that begins then or later. None means that it holds throughout the episode.
+        within: (least, greatest) value that a function returns; required with a function.
+        at_within: (earliest, latest) time that a function returns; required with a function.
+
+    Attributes:
+        value: the value that the parameter has, or will have, in this episode.
+        time: the time of the change [s], or None.
+
+    Raises:
+        ScenarioError: there is no such parameter, it cannot change during a run, or its value or
+            time is not allowed.
+        SetupError: a function comes without its bounds, or the spaces have no room for a value.
+
+    Example:
+        >>> from swarm_logistics_env import swarm_logistics_v0
+        >>> env = swarm_logistics_v0.parallel_env(duration=500.0)
+        >>> env = ParameterChange(env, "delivery_width", [0.5, 1.0], at=250.0)
+        >>> observations, infos = env.reset(seed=0)
+        >>> env.value in (0.5, 1.0), env.time, env.warehouse.scenario.delivery_width
+        (True, 250.0, 2.0)
+    """
+
+    def __init__(
+        self,
+        env: SwarmLogisticsEnv | Wrapper,
+        name: str,
+        values: Any,
+        *,
+        at: Any = None,
+        within: tuple[Any, Any] | None = None,
+        at_within: tuple[float, float] | None = None,
+    ) -> None:
+        super().__init__(env)
+        if not isinstance(name, str) or name not in Scenario.model_fields:
+            raise ScenarioError(
+                f"Scenario has no field {name!r}{suggest(str(name), Scenario.model_fields)}. What "
+                f"a policy decides by is set where it is made, as policies.load(.., {name}=..)"
+            )
+        if at is not None and name not in CHANGES_DURING_RUN:
+            raise ScenarioError(
+                f"Scenario.{name} cannot change during a run: should be set per episode, at=None; "
+                f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
+            )
+        self.name = name
+        self._values = Sampler(name, values, within)
+        self._times = None if at is None else Sampler("at", at, at_within)
+        if self._times is not None:
+            for time in self._times.ends:
+                if not isinstance(time, int | float) or not time >= 0:
+                    raise ScenarioError(f"at = {time!r}: should be a time of at least 0 s")
+        self.value: Any = None
+        self.time: float | None = None
+        self._is_due = False
+        before = self.env.scenarios
+        after = [known.replace(**{name: value}) for known in before for value in self._values.ends]
+        for scenario in after:
+            self.declare_spaces(scenario)
+        known = after if at is None else [*before, *after]
+        self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys(known))
+
+    def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
+        """Return the options with the parameter among them, if it holds throughout."""
+        value, time = self._drawn(seed)
+        if time is None:
+            return {**options, "scenario": {self.name: value, **scenario_fields(options)}}
+        # The change is tried now, because an error in mid-run would cost the run.
+        self.env.scenario_of(seed, options).replace(**{self.name: value})
+        return options
+
+    def begun(self, seed: int) -> None:
+        """Store this episode's value and time."""
+        self.value, self.time = self._drawn(seed)
+        present = getattr(self.warehouse.scenario, self.name)
+        if self.time is None:
+            self.value = present
+        self._is_due = self.value != present
+
+    def before_step(self, commands: ArrayLike) -> ArrayLike:
+        """Make the change if it is due."""
+        if self._is_due and self.warehouse.state.time >= (self.time or 0.0) - GRACE:
+            self.warehouse.change(**{self.name: self.value})
+            self._is_due = False
+        return commands
+
+    def _drawn(self, seed: int) -> tuple[Any, float | None]:
+        rng = generator(seed, f"change of {self.name}", self._place())
+        value = self._values.sample(rng)
+        return value, None if self._times is None else float(self._times.sample(rng))

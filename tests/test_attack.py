@@ -1,0 +1,110 @@
+"""The search for the worst fault: against brute force, against chance, and killed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario, policies, run_episode
+from swarm_logistics_env.attack import STORE, Attack, attack, random_search, search
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.studies.engines import serial
+from swarm_logistics_env.studies.store import Store
+
+SCENARIO = Scenario(
+    n_robots=6,
+    warehouse_width=5.0,
+    warehouse_height=5.0,
+    delivery_width=1.5,
+    n_items=8,
+    restock=True,
+    duration=60.0,
+)
+
+
+def test_the_search_comes_nearer_to_the_brute_force_worst_than_chance() -> None:
+    faults = [
+        Fault(mode, 2, onset=onset, duration=lasts, role=role)
+        for mode in ("FM1", "FM2", "FM3", "FM4", "dead")
+        for role in ("carrier", "searching")
+        for onset in (10.0, 30.0)
+        for lasts in (None, 15.0)
+    ]
+    policy, seeds = policies.load("swarm-dt"), range(16)
+    sound = np.array([run_episode(SCENARIO, policy, seed).delivered for seed in seeds])
+    failed = np.array(
+        [[run_episode(SCENARIO, policy, s, [fault]).delivered for s in seeds] for fault in faults]
+    )
+    change = (failed - sound) / sound.mean()
+    fresh = change[:, 8:].mean(axis=1)  # the search sees the first eight seeds alone
+
+    def regret(way: object, seed: int) -> float:
+        shuffled = np.random.default_rng(seed).permutation(8)
+
+        def play(pairs: list[tuple[int, int]]) -> list[float]:
+            return [float(change[place, shuffled[number % 8]]) for place, number in pairs]
+
+        worst, trials = way(faults, play, 60, seed)  # type: ignore[operator]
+        assert len(trials.tried) == 60
+        return float(fresh[worst] - fresh.min())
+
+    by_search = np.mean([regret(search, seed) for seed in range(20)])
+    by_chance = np.mean([regret(random_search, seed) for seed in range(20)])
+    assert by_search < by_chance
+
+
+def test_a_search_that_was_stopped_goes_on_and_ends_alike(tmp_path: Path) -> None:
+    asked = Attack("swarm-dt", SCENARIO, modes=("FM4", "dead"), budget=12, fresh=3)
+    whole = attack(asked, serial, tmp_path / "whole")
+
+    class StoppedError(Exception):
+        """Stands for a Ctrl-C."""
+
+    def stopped(runs: object) -> object:
+        for number, played in enumerate(serial(runs)):  # type: ignore[arg-type]
+            yield played
+            if number == 2:
+                raise StoppedError
+
+    with pytest.raises(StoppedError):
+        attack(asked, stopped, tmp_path / "stopped")  # type: ignore[arg-type]
+    with Store(tmp_path / "stopped" / STORE) as store:
+        assert len(store) == 3
+    assert attack(asked, serial, tmp_path / "stopped") == whole
+    assert [found.by for found in whole.found] == ["search", "random search", "named modes"]
+    assert {found.robustness.n_seeds for found in whole.found} == {3}
+    assert all(found.robustness.paired for found in whole.found)
+
+
+def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SetupError, match="no mode 'FM9'"):
+        Attack("swarm-dt", SCENARIO, modes=("FM9",)).faults()
+    with pytest.raises(SetupError, match="robots = 6: should be 1 to 5"):
+        Attack("swarm-dt", SCENARIO, robots=6).faults()
+    short = Attack("swarm-dt", SCENARIO.replace(duration=0.5), budget=10, fresh=3)
+    with pytest.raises(SetupError, match="delivers nothing without faults"):
+        attack(short, serial, tmp_path)
+
+
+def test_a_cap_on_the_runs_without_faults_is_told(tmp_path: Path) -> None:
+    scenario = SCENARIO.replace(restock=False, n_items=3)  # all are delivered early
+    asked = Attack("homing", scenario, 1, modes=("FM2",), budget=10, fresh=12)
+    result = attack(asked, serial, tmp_path)
+    assert result.is_capped
+    assert "supported" not in {found.robustness.verdict for found in result.found}
+
+
+def test_a_fault_that_changes_no_run_is_no_evidence(tmp_path: Path) -> None:
+    asked = Attack("random-walk", SCENARIO, 1, modes=("FM3_hear",), budget=10, fresh=3)
+    result = attack(asked, serial, tmp_path)
+    assert all(found.robustness.identical for found in result.found)
+    assert not result.is_capped
+
+
+def test_few_tries_leave_the_seeds_of_the_estimates_fresh(tmp_path: Path) -> None:
+    asked = Attack("swarm-dt", SCENARIO, modes=("FM2", "FM4"), budget=1, fresh=3)
+    attack(asked, serial, tmp_path)
+    with Store(tmp_path / STORE) as store:
+        seeds = [row["seed"] for row in store.rows() if row["faults"] == "[]"]
+    # Five for the choice among the named modes, and three that had no part in any choice.
+    assert sorted(seeds) == [0, 1, 2, 3, 4, 5, 6, 7]

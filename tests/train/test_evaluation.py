@@ -1,0 +1,54 @@
+"""What is measured on the way: seeds of their own, and policies that remember no other episode."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("stable_baselines3")
+
+from swarm_logistics_env import Fault, Scenario, policies, run_episode
+from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.studies.specification import MOST_SEEDS
+from swarm_logistics_env.train import evaluation
+from swarm_logistics_env.train.settings import Evaluation
+
+SCENARIO = Scenario(
+    n_robots=6, n_items=9, warehouse_width=3.0, warehouse_height=3.0, duration=20.0, restock=True
+)
+
+
+class Remembering(SwarmDT):
+    """Plays ever more at random, episode after episode."""
+
+    episodes = 0
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        self.episodes += 1
+        super().reset(n_robots, seed + 1000 * self.episodes)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_episode_follows_from_its_seed_alone(threads: int) -> None:
+    kinds, seeds = [(), (Fault("FM2", 1),), ()], [5, 6, 5, 6, 5]
+    found = evaluation.performances(Remembering(), SCENARIO, kinds, seeds, threads)
+    np.testing.assert_array_equal(found[0], found[2])
+    np.testing.assert_array_equal(found[:, 2:4], found[:, :2])
+    assert found.any()
+
+
+def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    seeds = set()
+
+    def noted(scenario: Scenario, policy: Any, seed: int, faults: Any) -> Any:
+        seeds.add(seed)
+        return run_episode(scenario.replace(duration=0.5), policy, seed, faults)
+
+    monkeypatch.setattr(evaluation, "run_episode", noted)
+    asked = Evaluation(seeds=3, n_robots=6, faults={"FM1": 1})
+    evaluation.evaluate(policies.load("swarm-dt"), SCENARIO, asked)
+    assert len(seeds) == 3
+    assert seeds.isdisjoint(range(MOST_SEEDS))

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("stable_baselines3")
+
+import torch
+
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.motion.frame import INPUTS
+from swarm_logistics_env.motion.memory import HELD
+from swarm_logistics_env.train.learner import KNOWN, make_learner, read_known
+from swarm_logistics_env.train.trainer import _new_view
+from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.warehouse.state import CARRIED
+
+
+def test_the_critic_knows_where_the_requested_item_is() -> None:
+    env = SwarmLogisticsEnv(n_robots=3, n_items=5)
+    env.reset_arrays(seed=0)
+    state = env.warehouse.state
+    state.robot_position[0], state.robot_heading[0] = (4.0, 5.0), 0.5 * math.pi
+    state.item_position[state.requested] = (4.0, 6.0)
+    turned, known = np.zeros(3), np.zeros((4, len(KNOWN)), np.float32)
+    turned[0] = 0.5 * math.pi  # so that the frame looks along -x
+    read_known(env.warehouse, turned, known)
+    told = dict(zip(KNOWN, known[0].tolist()))
+    assert told["to_delivery"] == pytest.approx(0.4)
+    assert (told["frame_cos"], told["frame_sin"]) == pytest.approx((-1.0, 0.0), abs=1e-6)
+    assert told["requested_along"] == pytest.approx(0.0, abs=1e-6)
+    assert told["requested_aside"] == pytest.approx(-1.0)
+    assert told["requested_distance"] == pytest.approx(0.1)
+    assert told["is_carried"] == 0.0
+    assert not known[3].any()
+
+    state.item_status[state.requested], state.item_carrier[state.requested] = CARRIED, 1
+    state.robot_position[1] = (7.0, 5.0)
+    read_known(env.warehouse, turned, known)
+    told = dict(zip(KNOWN, known[0].tolist()))
+    assert (told["is_carried"], told["carrier_delivers"]) == (1.0, 1.0)
+    assert told["carrier_to_delivery"] == pytest.approx(0.1)
+
+
+def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: object) -> None:
+    training: Training = small()  # type: ignore[operator]
+    view = _new_view(training)
+    view.seed(0)
+    view.reset()
+    n_steps, commands = 0, np.ones((view.num_envs, 3), np.float32)
+    dones = np.zeros(view.num_envs, np.bool_)
+    while not dones.any():
+        view.step_async(commands)
+        _, _, dones, _ = view.step_wait()
+        n_steps += 1
+        # Decisions in this episode, and whether any command in it is remembered.
+        assert view.frame.counts.tolist() == np.where(dones, 1, n_steps + 1).tolist()
+        assert (view.frame.memory[dones, HELD] == 0.0).all()
+        assert (view.frame.memory[~dones, HELD] > 0.0).all()
+    assert n_steps > 5
+
+
+def test_the_actor_sees_nothing_of_it(small: object) -> None:
+    training: Training = small()  # type: ignore[operator]
+    learner = make_learner(training, _new_view(training), "cpu")
+    columns = torch.randn(50, len(INPUTS) + len(KNOWN))
+    changed = columns.clone()
+    changed[:, len(INPUTS) :] += 1.0
+    with torch.no_grad():
+        one, other = (
+            learner.policy.get_distribution(columns),
+            learner.policy.get_distribution(changed),
+        )
+        assert (one.mode() == other.mode()).all()
+        values = learner.policy.predict_values(columns) - learner.policy.predict_values(changed)
+    assert values.abs().min() > 0.0

@@ -1,0 +1,193 @@
+"""Faults that meet: what they leave, what is paid and how it ends, by the slow reference.
+
+`HYPOTHESIS_PROFILE=nightly` plays 2,000 worlds.
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+import random
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.rewards import POTENTIALS, REWARD_TERMS
+from swarm_logistics_env.warehouse import FAILURE_MODES
+from swarm_logistics_env.warehouse.faults import ROLES
+from verification.invariants import Watch
+from verification.reference import Faults, Moment, Planned, Radio, ends, rewards
+
+EXAMPLES = 2000 if settings().max_examples >= 2000 else 40
+STEPS = 36  # a radio that is late by 2 s is late by 20 of these
+ABLE = ("max_speed", "max_turn_rate", "view_range", "ranger_range", "ranger_bias")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A small world, its faults, and what is to meet a delivery in it."""
+
+    number: int
+    scenario: Scenario
+    planned: tuple[Planned, ...]
+    later: tuple[Planned, ...] | None
+    weights: dict[str, float]
+    aim: str
+
+
+@st.composite
+def planned_faults(draw: st.DrawFn, n_robots: int, least: int) -> Planned:
+    mode = draw(st.sampled_from([*sorted(FAILURE_MODES), "dead[move,send]", "dead[pick_up]"]))
+    begins = draw(st.integers(0, 50)) if mode != "removed" else draw(st.integers(2, 60))
+    ends = None if mode == "removed" else draw(st.none() | st.integers(begins + 1, begins + 40))
+    role = draw(st.none() | st.sampled_from(sorted(ROLES)))
+    named = st.lists(st.integers(0, n_robots - 1), min_size=1, max_size=n_robots, unique=True)
+    robots = draw(st.integers(1, n_robots) if role else st.integers(1, n_robots) | named.map(tuple))
+    has_factor = mode in ("motor_slow", "motor_wear", "view_reduced")
+    factor = draw(st.none() | st.sampled_from([0.0, 0.25, 0.9])) if has_factor else None
+    breaks = draw(st.just((0.5, 0.5)) | st.none()) if mode != "removed" and least == 0 else None
+    return Planned(mode, robots, begins, ends, factor, breaks, role)
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> Case:
+    n = draw(st.integers(2, 6))
+    scenario = Scenario(
+        n_robots=n, n_items=draw(st.integers(1, 4)), warehouse_width=2.5, warehouse_height=1.6,
+        delivery_width=draw(st.sampled_from([0.6, 1.2])), duration=STEPS * 0.1,
+        restock=draw(st.booleans()), pickup_range=0.6, view_range=0.8, radio_range=1.2,
+        timer_limit=1.5, relay=draw(st.sampled_from(["none", "gossip"])), message_size=1,
+        speed_mix=draw(st.sampled_from([(1.0,), (1.0, 0.5)])), heading_drift=0.5,
+        sensing_mix=draw(st.sampled_from([(1.0,), (1.0, 0.4)])),
+        drive=draw(st.sampled_from(["holonomic", "differential"])),
+    )  # fmt: skip
+    # The last alone may have breaks, which its robots' own streams decide.
+    some = st.lists(planned_faults(n, 1), min_size=1, max_size=3)
+    planned = (*draw(some), draw(planned_faults(n, 0)))
+    later = draw(st.none() | some.map(tuple))
+    terms = draw(st.sets(st.sampled_from(sorted(REWARD_TERMS)), min_size=1))
+    weights = {name: draw(st.sampled_from([0.5, 1.0, -2.0])) for name in sorted(terms)}
+    if not POTENTIALS.isdisjoint(weights):
+        weights["discount"] = 0.9
+    aim = draw(st.sampled_from(["nothing", "the end", "a removal"]))
+    return Case(draw(st.integers(0, 2**32)), scenario, planned, later, weights, aim)
+
+
+def commands_of(world: Warehouse, source: random.Random) -> list[list[float]]:
+    """Drive to the requested item and bring things away, so that deliveries come, or anyhow."""
+    state, commands = world.state, []
+    for robot in range(state.n_robots):
+        x, y = state.robot_position[robot].tolist()
+        to_x, to_y = (2.4, y) if state.robot_item[robot] >= 0 else (0.3, 0.8)
+        if state.robot_item[robot] < 0 and state.requested >= 0:
+            to_x, to_y = state.item_position[state.requested].tolist()
+        way = math.atan2(to_y - y, to_x - x) - float(state.robot_heading[robot])
+        if source.random() < 0.3:
+            way = source.uniform(-math.pi, math.pi)
+        gripper = source.choice([1.0, 1.0, 1.0, 1.0, 0.0, -1.0])
+        turn = max(-1.0, min(1.0, math.remainder(way, 2.0 * math.pi)))
+        commands.append([math.cos(way), math.sin(way), turn, gripper, source.uniform(-1.5, 1.5)])
+    return commands
+
+
+def play(case: Case, last: int) -> list[int]:
+    """Play a case against the reference; return the steps with deliveries."""
+    scenario, period, source = case.scenario, case.scenario.control_period, case.number % 2**31
+    env = SwarmLogisticsEnv(
+        scenario, faults=[one.fault(period) for one in case.planned], rewards=case.weights,
+        max_cycles=last,
+    )  # fmt: skip
+    env.reset_arrays(case.number)
+    world, rng = env.warehouse, random.Random(source)
+    watch, faults = Watch(world), Faults(scenario, case.number, case.planned)
+    radio, before = Radio(scenario), Moment.of(world)
+    copy: Warehouse | None = None
+    able = check_able(world, faults, before)
+    deaf = replace(before, heard=[math.nan] * scenario.n_robots)  # nobody has heard anything yet
+    assert_told(world, radio.told(before, deaf, able))
+    watch.look()
+    found = []
+    while env.agents:
+        if case.later is not None and before.step == STEPS // 2:
+            world.set_faults([one.fault(period) for one in case.later])
+            watch.faults_changed()
+            faults.plan(case.later)
+            able = check_able(world, faults, before)
+            # Who is removed so terminates in the step that follows, so `before` stays as it is.
+            copy = pickle.loads(pickle.dumps(world))
+        commands = commands_of(world, rng)
+        agents = list(env.agents)
+        rows, paid, terminated, truncated = env.step_arrays(commands)
+        if copy is not None:
+            assert np.array_equal(copy.step(commands), rows)
+        now = Moment.of(world)
+        assert world.state.robot_message.tolist() == radio.messages(commands, able)
+        able = check_able(world, faults, before)
+        assert_told(world, radio.told(now, before, able))
+        expected = rewards(case.weights, scenario, before, now)
+        settled = [is_ or not was for was, is_ in zip(before.present, now.present)]
+        is_placed = "in_the_way" in case.weights  # who is gone stands nowhere
+        for robot, value in enumerate(expected):
+            assert paid[robot] == pytest.approx(value) or (is_placed and not settled[robot])
+        wanted = ends(before, now, min(last, STEPS))
+        assert (terminated.tolist(), truncated.tolist()) == wanted
+        over = np.logical_or(*wanted)
+        left = [f"robot_{r}" for r in np.flatnonzero(np.array(before.present) & ~over)]
+        assert env.agents == left
+        assert {f"robot_{r}" for r in np.flatnonzero(before.present)} == set(agents)
+        assert env.state_space.contains(env.state())
+        watch.look()
+        if len(now.delivered_by) > len(before.delivered_by):
+            found.append(now.step)
+        before = now
+    return found
+
+
+def check_able(world: Warehouse, faults: Faults, before: Moment) -> list[dict[str, Any]]:
+    expected, state = faults.expected(world, before), world.state
+    for robot, able in enumerate(expected):
+        for name, value in able.items():
+            if name == "modes":
+                assert state.failure_modes[robot] == value
+            elif name == "present":
+                assert state.robot_present[robot] == value
+            else:
+                assert getattr(state, name)[robot] == pytest.approx(value), (robot, name)
+    assert state.failed.tolist() == [bool(able["modes"]) for able in expected]
+    assert world.n_removed == sum(not able["present"] for able in expected)
+    return expected
+
+
+def assert_told(world: Warehouse, told: list[float]) -> None:
+    assert world.state.robot_told.tolist() == pytest.approx(told, nan_ok=True)
+
+
+@pytest.mark.parametrize("first", sorted(FAILURE_MODES))
+def test_any_two_modes_add_up(first: str) -> None:
+    scenario = Scenario(
+        n_robots=3, n_items=3, warehouse_width=2.5, warehouse_height=1.6, delivery_width=1.2,
+        duration=STEPS * 0.1, restock=True, pickup_range=0.6, message_size=1, timer_limit=5.0,
+    )  # fmt: skip
+    for number, second in enumerate(sorted(FAILURE_MODES)):
+        planned = (Planned(first, 2, 4), Planned(second, 2, 10))
+        play(Case(number, scenario, planned, None, {"delivery": 1.0}, "nothing"), STEPS)
+
+
+@given(case=cases())
+@settings(max_examples=EXAMPLES, report_multiple_bugs=False)
+def test_faults_that_meet_leave_pay_and_end_as_the_reference_says(case: Case) -> None:
+    delivered = play(case, STEPS)
+    if not delivered:
+        return
+    step = random.Random(case.number).choice(delivered)
+    if case.aim == "the end":  # in the very step of a delivery
+        play(case, step)
+    if case.aim == "a removal":
+        gone = Planned("removed", (case.number % case.scenario.n_robots,), 2 * step)
+        play(replace(case, planned=(*case.planned, gone)), STEPS)

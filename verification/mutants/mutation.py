@@ -1,0 +1,141 @@
+"""A fault made on purpose: where it is, what it changes, and the source with it."""
+
+from __future__ import annotations
+
+import ast
+import shutil
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = "swarm_logistics_env"
+LEFT_OUT = shutil.ignore_patterns(
+    ".git", ".venv*", "results", "build", "dist", "*.egg-info", "__pycache__", ".*_cache",
+    ".hypothesis",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A fault: one node of a syntax tree becomes another.
+
+    Attributes:
+        name: what goes wrong with the mutant.
+        file: the module, in the package; of another file than Python's a text is replaced.
+        where: the function, method (`Class.method`) or constant that holds the node; the whole
+            file of what is not Python.
+        node: the expression or statement, as Python source; its layout does not matter.
+        becomes: what replaces it, as Python source; an expression replaces an expression.
+        tests: those that stand nearest to the fault, for pytest, the likely killer first.
+        interpreted: whether kernels run in the interpreter, as it changes one.
+        survives: why no test catches it; empty: one should.
+        room: the list that it stands in.
+    """
+
+    name: str
+    file: str
+    where: str
+    node: str
+    becomes: str
+    tests: tuple[str, ...]
+    interpreted: bool = False
+    survives: str = ""
+    room: str = ""
+
+
+class MutantError(ValueError):
+    """A mutant whose place in the code is gone."""
+
+
+def read_mutants() -> tuple[Mutant, ...]:
+    """Return the mutants of all lists."""
+    found = []
+    for path in sorted(Path(__file__).parent.glob("*.toml")):
+        listed = tomllib.loads(path.read_text(encoding="utf-8"))
+        tests, interpreted = listed.pop("tests"), listed.pop("interpreted", False)
+        for name, told in listed.items():
+            file, _, where = told.pop("at").partition(" ")
+            node, chosen = told.pop("was"), tuple(told.pop("tests", tests))
+            rest = {"interpreted": interpreted, "room": path.stem, **told}
+            found.append(Mutant(name, file, where, node, tests=chosen, **rest))
+    return tuple(found)
+
+
+@contextmanager
+def scratch_copy() -> Iterator[Path]:
+    """Yield a copy of the repository that is gone afterwards."""
+    with TemporaryDirectory(prefix="mutants-") as folder:
+        copy = Path(folder) / "copy"
+        shutil.copytree(ROOT, copy, symlinks=True, ignore=LEFT_OUT)
+        yield copy
+
+
+def mutated(mutant: Mutant, source: str) -> str:
+    """Return the source of `mutant.file` with the fault in it, of Python without comments.
+
+    Raises:
+        MutantError: the code no longer has the place that the mutant was written for.
+    """
+    if not mutant.file.endswith(".py"):
+        _check_once(mutant, source.count(mutant.node))
+        return source.replace(mutant.node, mutant.becomes)
+    tree = ast.parse(source)
+    place = _definition(tree, mutant)
+    wanted, new = ast.dump(_node(mutant.node)), _node(mutant.becomes)
+    found = [node for node in ast.walk(place) if ast.dump(node) == wanted]
+    _check_once(mutant, len(found))
+    if isinstance(found[0], ast.expr) and isinstance(new, ast.Pass):
+        new = ast.Constant(None)
+    if isinstance(found[0], ast.stmt) and isinstance(new, ast.expr):
+        new = ast.Expr(new)
+    _Replace(found[0], new).visit(place)
+    changed = ast.unparse(ast.fix_missing_locations(tree))
+    compile(changed, mutant.file, "exec")
+    return changed
+
+
+def _check_once(mutant: Mutant, times: int) -> None:
+    if times != 1:
+        raise MutantError(
+            f"{mutant.name}: {mutant.node!r} is {times} times in `{mutant.where}` of "
+            f"{mutant.file}: should be there once, so adapt the mutant to the code"
+        )
+
+
+class _Replace(ast.NodeTransformer):
+    def __init__(self, old: ast.AST, new: ast.AST) -> None:
+        self._old, self._new = old, new
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        return self._new if node is self._old else super().visit(node)
+
+
+def _node(source: str) -> ast.AST:
+    (statement,) = ast.parse(source).body
+    return statement.value if isinstance(statement, ast.Expr) else statement
+
+
+def _definition(tree: ast.Module, mutant: Mutant) -> ast.AST:
+    place: ast.Module | ast.ClassDef = tree
+    for name in mutant.where.split("."):
+        found = [node for node in place.body if name in _names(node)]
+        if len(found) != 1:
+            raise MutantError(
+                f"{mutant.name}: {mutant.file} defines `{mutant.where}` {len(found)} times: "
+                "should be once, so adapt the mutant to the code"
+            )
+        place = found[0]  # type: ignore[assignment]  # a name that is no class ends the path
+    return place
+
+
+def _names(node: ast.stmt) -> list[str]:
+    """Return the names that a statement defines."""
+    if isinstance(node, ast.Assign):
+        return [target.id for target in node.targets if isinstance(target, ast.Name)]
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        return [node.name]
+    return []

@@ -1,0 +1,288 @@
+"""A slow reference of what faults leave, what is told, what is paid and how episodes end.
+
+In plain Python from what the documentation says, robot by robot and in whole numbers of half
+control periods, so that it shares no rounding, no array and no shortcut with the package.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.warehouse import FailureMode
+from swarm_logistics_env.warehouse.failure_modes import LOST_AS_A_WHOLE, failure_mode
+from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.warehouse.state import NOBODY
+
+
+@dataclass
+class Planned:
+    """A fault in half control periods: it holds at step k if begins <= 2 k < ends."""
+
+    mode: str
+    robots: int | tuple[int, ...]
+    begins: int
+    ends: int | None = None
+    factor: float | None = None
+    breaks: tuple[float, float] | None = None
+    role: str | None = None
+    struck: list[int] | None = field(default=None, compare=False)
+
+    def fault(self, period: float) -> Fault:
+        """Return it as the package has it; its times are sums, with the rounding of sums."""
+        onset = sum([0.5 * period] * self.begins)
+        duration = None if self.ends is None else sum([0.5 * period] * self.ends) - onset
+        return Fault(self.mode, self.robots, onset, duration, self.factor, self.breaks, self.role)
+
+    def holds(self, step: int) -> bool:
+        """Return whether it holds at a step, breaks included."""
+        return self.begins <= 2 * step and (self.ends is None or 2 * step < self.ends)
+
+    @property
+    def lost(self) -> FailureMode:
+        """What its mode takes."""
+        return failure_mode(self.mode)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What is true after a step, robot by robot, as far as rewards and roles ask."""
+
+    step: int
+    present: list[bool]
+    x: list[float]
+    y: list[float]
+    holds: list[int]
+    in_area: list[bool]
+    item_x: list[float]
+    item_y: list[float]
+    carriers: list[int]
+    requested: int
+    delivered_by: list[int]
+    contact: list[bool]
+    lifts: list[bool]
+    delivers: list[bool]
+    heard: list[float]
+
+    @classmethod
+    def of(cls, world: Warehouse) -> Moment:
+        """Return the moment that a world is in."""
+        s = world.state
+        (x, y), (item_x, item_y) = s.robot_position.T.tolist(), s.item_position.T.tolist()
+        return cls(
+            s.step, s.robot_present.tolist(), x, y, s.robot_item.tolist(),
+            s.robot_in_delivery.tolist(), item_x, item_y, s.item_carrier.tolist(), s.requested,
+            list(s.delivered_by), s.robot_contact.tolist(), s.lifts.tolist(), s.delivers.tolist(),
+            s.robot_heard.tolist(),
+        )  # fmt: skip
+
+    @property
+    def carrier(self) -> int:
+        """The robot that carries the requested item, or NOBODY."""
+        return NOBODY if self.requested == NOBODY else self.carriers[self.requested]
+
+
+class Faults:
+    """What planned faults leave the robots of one world, step by step."""
+
+    def __init__(self, scenario: Scenario, seed: int, planned: Sequence[Planned]) -> None:
+        self._scenario, self._seed = scenario, seed
+        self.gone = [False] * scenario.n_robots
+        self.plan(planned)
+
+    def plan(self, planned: Sequence[Planned]) -> None:
+        """Let these faults hold from now on; who is gone stays gone."""
+        self._planned = list(planned)
+        for one in self._planned:
+            one.struck = None
+            if isinstance(one.robots, tuple):
+                one.struck = sorted(one.robots)
+            elif one.role is None:  # whatever the mode, the seed chooses the same robots
+                like = Fault("FM1", one.robots)
+                one.struck = failed_robots(like, self._seed, self._scenario.n_robots).tolist()
+
+    def expected(self, world: Warehouse, before: Moment) -> list[dict[str, Any]]:
+        """Return of each robot what it can do now, its modes and whether it is there."""
+        now, modes = Moment.of(world), world.state.failure_modes
+        left = [self._sound(robot) for robot in range(self._scenario.n_robots)]
+        for number, one in enumerate(self._planned):
+            if not one.holds(now.step):
+                continue
+            if one.struck is None:
+                is_whole = now.present == before.present
+                views = [able["view_range"] for able in left]
+                # Who is removed in this very step no longer stands where it was struck.
+                chosen = world._occurrences[number].robots.tolist()
+                one.struck = self._in_role(one, now, views) if is_whole else chosen
+            for robot in one.struck:
+                if one.breaks is None or self._is_broken(one, robot, modes[robot], now.step):
+                    self._take(one, left[robot], now.step)
+        for robot, able in enumerate(left):
+            self.gone[robot] |= not able.pop("there")
+            able["present"] = not self.gone[robot]
+        return left
+
+    def _sound(self, robot: int) -> dict[str, Any]:
+        s = self._scenario
+        speed = s.speed_mix[robot % len(s.speed_mix)]
+        sensing = s.sensing_mix[robot % len(s.sensing_mix)]
+        return {
+            "max_speed": s.max_speed * speed,
+            "max_turn_rate": s.max_turn_rate * speed,
+            "view_range": s.view_range * sensing,
+            "ranger_range": s.ranger_range * sensing,
+            "ranger_bias": 0.0,
+            "radio_delay": 0,
+            **dict.fromkeys(LOST_AS_A_WHOLE, True),
+            "modes": (),
+            "there": True,
+        }
+
+    def _take(self, one: Planned, able: dict[str, Any], step: int) -> None:
+        """Take from a robot what a fault of its takes; several faults add up."""
+        s, lost = self._scenario, one.lost
+        speed, view = lost.speed, lost.view
+        if one.factor is not None:
+            speed, view = (one.factor, view) if lost.factor == "speed" else (speed, one.factor)
+        if lost.wears:  # linearly, from all at the onset
+            begins = 0.5 * one.begins * s.control_period
+            share = (step * s.control_period - begins) / (s.duration - begins)
+            speed = 1.0 - (1.0 - speed) * min(share, 1.0)
+        able["max_speed"] *= speed
+        able["max_turn_rate"] *= speed
+        able["view_range"] *= view
+        able["ranger_range"] *= 1.0 if lost.rangers else 0.0
+        able["ranger_bias"] += lost.ranger_bias
+        delay = round(lost.radio_delay / s.control_period)
+        able["radio_delay"] = max(able["radio_delay"], delay)
+        for name in LOST_AS_A_WHOLE:
+            able[name] = able[name] and getattr(lost, name)
+        able["modes"] = (*able["modes"], one.mode)
+        able["there"] = able["there"] and lost.present
+
+    def _is_broken(self, one: Planned, robot: int, told: tuple[str, ...], step: int) -> bool:
+        """Return whether an intermittent fault holds, which the robot's own stream decides."""
+        others = [
+            other.mode
+            for other in self._planned
+            if other is not one and other.holds(step) and robot in (other.struck or ())
+        ]
+        return told.count(one.mode) > others.count(one.mode)
+
+    def _in_role(self, one: Planned, now: Moment, views: list[float]) -> list[int]:
+        """Return the robots that a fault by role strikes: those in it, then those nearest."""
+        asked, carrier = now.requested, now.carrier
+
+        def away(robot: int) -> float:
+            if asked == NOBODY:
+                return 0.0
+            return math.hypot(now.x[robot] - now.item_x[asked], now.y[robot] - now.item_y[asked])
+
+        def role(robot: int) -> str:
+            if robot == carrier:
+                return "carrier"
+            if carrier != NOBODY and away(robot) <= views[carrier]:
+                return "neighbour"
+            if now.in_area[robot]:
+                return "in_area"
+            return "searching" if now.holds[robot] == NOBODY else "shuffling"
+
+        ranked = sorted(
+            range(len(now.x)),
+            key=lambda r: (not now.present[r], role(r) != one.role, away(r), r),
+        )
+        assert isinstance(one.robots, int)
+        return sorted(ranked[: one.robots])
+
+
+class Radio:
+    """What each robot broadcasts: its timer, late and untrue as its faults make it; messages."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._last_inside: dict[int, int] = {}
+        self._own: list[list[float]] = []  # by step and robot, before delays and lies
+        self._given = [[[0.0] * scenario.message_size] * scenario.n_robots]
+
+    def told(self, now: Moment, before: Moment, able: list[dict[str, Any]]) -> list[float]:
+        """Return the timer that each robot tells [s], NaN: none; to be asked once a step."""
+        s, told = self._scenario, []
+        limit, period = s.timer_limit - 1e-9, s.control_period
+        self._own.append([])
+        for robot, one in enumerate(able):
+            if now.in_area[robot]:
+                self._last_inside[robot] = now.step
+            timer = math.nan
+            if one["present"] and robot in self._last_inside:
+                timer = (now.step - self._last_inside[robot]) * period
+            heard = before.heard[robot] + period if s.is_gossip and one["present"] else math.nan
+            known = [value for value in (timer, heard) if value < limit]
+            self._own[-1].append(min(known, default=math.nan))
+            then = now.step - one["radio_delay"]
+            late = self._own[then][robot] if then >= 0 else math.nan
+            late = late if late < limit else math.nan
+            told.append(late if one["honest"] else 0.0)
+        return [value if one["present"] else math.nan for value, one in zip(told, able)]
+
+    def messages(
+        self, commands: Sequence[Sequence[float]], able: list[dict[str, Any]]
+    ) -> list[list[float]]:
+        """Return the message of each robot after a step; what it could do as the step began."""
+        given = [
+            [min(max(word, -1.0), 1.0) for word in command[4:]]
+            if one["present"] and one["obeys"]
+            else [0.0] * self._scenario.message_size
+            for command, one in zip(commands, able)
+        ]
+        self._given.append(given)
+        step = len(self._given) - 1
+        return [
+            self._given[max(step - one["radio_delay"], 0)][robot] for robot, one in enumerate(able)
+        ]
+
+
+def rewards(
+    weights: Mapping[str, float], scenario: Scenario, before: Moment, now: Moment
+) -> list[float]:
+    """Return what a step pays each robot that was there as it began."""
+    period, edge, total = scenario.control_period, scenario.storage_width, []
+    new = now.delivered_by[len(before.delivered_by) :]
+    was, is_ = before.carrier, now.carrier
+    for robot in range(len(now.x)):
+        inside, inside_before = min(now.x[robot], edge), min(before.x[robot], edge)
+        same_request = not new and is_ == was == robot and now.requested == before.requested
+        way = 0.0
+        for item, after in enumerate(now.carriers):
+            who = before.carriers[item] if after == NOBODY else after
+            is_delivered = before.carriers[item] != NOBODY and before.carriers[item] in new
+            if who == robot and not is_delivered:
+                way += min(now.item_x[item], edge) - min(before.item_x[item], edge)
+        discount = weights.get("discount", 1.0)
+        terms = {
+            "delivery": len(new),
+            "own_delivery": new.count(robot),
+            "lift_requested": 0 if new else (is_ == robot) - (was == robot),
+            "approach": inside - inside_before if same_request else 0.0,
+            "stocking": way,
+            "carrying": discount * (is_ == robot) - (was == robot),
+            "carried_way": discount * inside * (is_ == robot) - inside_before * (was == robot),
+            "contact": period * now.contact[robot],
+            "blocked_request": period * (is_ == robot and not now.delivers[robot]),
+            "in_the_way": period * (scenario.warehouse_width - now.x[robot])
+            * (not now.lifts[robot]),
+        }  # fmt: skip
+        paid = sum(weights.get(name, 0.0) * value for name, value in terms.items())
+        total.append(paid if before.present[robot] else 0.0)
+    return total
+
+
+def ends(before: Moment, now: Moment, last_step: int) -> tuple[list[bool], list[bool]]:
+    """Return which robots terminate and which are truncated; none does both."""
+    is_all = now.requested == NOBODY
+    terminated = [was and (is_all or not is_) for was, is_ in zip(before.present, now.present)]
+    is_late = now.step >= last_step
+    truncated = [is_late and was and not t for was, t in zip(before.present, terminated)]
+    return terminated, truncated
