@@ -13,7 +13,8 @@ from play_tables import FIRST_SEED, OUT, ROOT, play, rewritten
 from record_tables import table
 
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.store import FILE_NAME, Store
 
@@ -34,7 +35,7 @@ def studies(out: Path) -> Iterator[Study]:
 
 def spent(clear: StudyResults, fixed: StudyResults) -> str:
     """Return the seeds that each claim took until it was clear, and both verdicts on it."""
-    claims: dict[tuple[str, str], list[tuple[Row, Row]]] = {}
+    claims: dict[tuple[str, str], list[tuple[Finding, Finding]]] = {}
     for one, other in zip(rows_of(clear.indicators), rows_of(fixed.indicators), strict=True):
         claims.setdefault((one.claim, one.factor), []).append((one, other))
     head = (
@@ -72,7 +73,7 @@ def spent(clear: StudyResults, fixed: StudyResults) -> str:
     return f"{table(head, rows)}\n\n{text}"
 
 
-def _asked(test: Row) -> str:
+def _asked(test: Finding) -> str:
     if test.kind == "fault":
         return f"m = {test.after:g}"
     return f"N = {test.n_robots}" if test.kind == "policy" else f"{test.before:g} -> {test.after:g}"

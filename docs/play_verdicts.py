@@ -15,7 +15,8 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding
+from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults
 
 EQUIVALENCE = ROOT / "docs" / "equivalence.md"
@@ -28,7 +29,7 @@ def faults_study(out: Path) -> Study:
 
 def harm(found: StudyResults) -> str:
     """Return what each fault does to P, a row a fault."""
-    rows: dict[str, dict[str, Row]] = {}
+    rows: dict[str, dict[str, Finding]] = {}
     for test in rows_of(found.indicators):
         rows.setdefault(test.comparison, {})[test.indicator] = test
     margin = found.plan.specification.margin
@@ -59,16 +60,16 @@ def harm(found: StudyResults) -> str:
     return f"{table(headings, body)}\n\nOver {len(seeds)} seeds from {seeds[0]:,} on."
 
 
-def _change(test: Row) -> str:
+def _change(test: Finding) -> str:
     return wording.bracketed(Interval(test.change, test.change_low, test.change_high), 3)
 
 
-def _verdict(test: Row) -> str:
+def _verdict(test: Finding) -> str:
     plain, adjusted = test.equivalence, test.equivalence_holm
     return plain if plain == adjusted else f"{plain} ({adjusted})"
 
 
-def _planned(test: Row) -> int | None:
+def _planned(test: Finding) -> int | None:
     return spi.seeds_for_equivalence(test.equivalence_test)
 
 

@@ -15,7 +15,8 @@ from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.comparisons import Arm
-from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding
+from swarm_logistics_env.studies.performance_table import Cell, rows_of
 from swarm_logistics_env.studies.policy_comparison import (
     cells_against_baseline,
     indicators_against_baseline,
@@ -37,13 +38,13 @@ def over(found: StudyResults) -> str:
     return f"{len(seeds)} paired seeds from {seeds[0]:,} on"
 
 
-def with_sign(test: Row) -> str:
+def with_sign(test: Finding) -> str:
     """Return an indicator with its interval and the sign of its verdict."""
     known = "unaffected" if test.verdict == "unaffected" else test.conclusion or "blocked"
     return f"{wording.ratio(test)} {SIGNS[known].mark}"
 
 
-Judged = tuple[StudyResults, Row]
+Judged = tuple[StudyResults, Finding]
 
 
 def difference(one: Judged, other: Judged) -> Interval:
@@ -93,7 +94,7 @@ def differences(found: StudyResults) -> str:
     )
 
 
-def performances(found: StudyResults) -> Iterator[tuple[str, Row, Interval | None]]:
+def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | None]]:
     """Yield label, row and difference of P, each condition once and those with faults not."""
     labels: dict[str, str] = {}
     cells = [one for own in cells_against_baseline(found).values() for one in own]
@@ -123,7 +124,7 @@ def _side(difference: Interval | None) -> str:
 
 def by_size(found: StudyResults) -> str:
     """Return R of every failure mode against N, and its change from the first N to the last."""
-    tests: dict[tuple[str, str], list[Row]] = {}
+    tests: dict[tuple[str, str], list[Finding]] = {}
     for test in rows_of(found.indicators):
         if test.indicator == "R":
             tests.setdefault((test.policy, test.factor), []).append(test)
@@ -143,7 +144,7 @@ def by_size(found: StudyResults) -> str:
 
 def performances_by_size(found: StudyResults) -> str:
     """Return P, P for each robot, and S of every policy against N."""
-    cells: dict[str, list[Row]] = {}
+    cells: dict[str, list[Cell]] = {}
     for cell in rows_of(found.performance):
         if cell.kind == "size":
             cells.setdefault(cell.policy, []).append(cell)
@@ -166,7 +167,7 @@ def performances_by_size(found: StudyResults) -> str:
 REPAIRED_AT = 200.0  # [s]: failed at 100 s, for 100 s
 
 
-def repaired_tests(found: StudyResults) -> Iterator[tuple[Row, Row]]:
+def repaired_tests(found: StudyResults) -> Iterator[tuple[Finding, Finding]]:
     """Yield each fault that stays until the end with the same one that is repaired."""
     tests = {
         (test.policy, test.factor, test.table): test
@@ -202,7 +203,7 @@ def after_repairs(found: StudyResults) -> str:
     return table(("policy", "mode", "not repaired [%]", "repaired [%]", "all back"), body)
 
 
-def _by_seed(found: StudyResults, test: Row, arm: Arm) -> NDArray[np.float64]:
+def _by_seed(found: StudyResults, test: Finding, arm: Arm) -> NDArray[np.float64]:
     counts: NDArray[np.float64] = found.by_arm[test.policy, test.table, arm].by_seed
     return counts
 

@@ -12,7 +12,8 @@ from record_tables import table
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies.comparisons import Setting
-from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding
+from swarm_logistics_env.studies.performance_table import Cell, rows_of
 from swarm_logistics_env.studies.policy_comparison import agreement, judged_policies
 from swarm_logistics_env.studies.results import StudyResults
 
@@ -73,7 +74,7 @@ def paper_block(parts: list[StudyResults]) -> str:
     return "\n".join(lines)
 
 
-def _paper_rows(cells: Mapping[Setting, Row]) -> list[tuple[str, list[Setting]]]:
+def _paper_rows(cells: Mapping[Setting, Cell]) -> list[tuple[str, list[Setting]]]:
     """Return the rows: a label, and the levels that stand side by side in it."""
     factors: dict[str, list[Setting]] = {}
     for level in cells:
@@ -97,7 +98,7 @@ def _label(levels: list[Setting], n_items: int) -> str:
     return f"{_FAULTS[name]}, m = {values}" if levels[0].value else "no fault"
 
 
-def _row(label: str, cells: list[Row], missed: set[str]) -> tuple[str, ...]:
+def _row(label: str, cells: list[Cell], missed: set[str]) -> tuple[str, ...]:
     published = [
         f"**{cell.published:g}**" if cell.cell in missed else f"{cell.published:g}"
         for cell in cells
@@ -107,7 +108,7 @@ def _row(label: str, cells: list[Row], missed: set[str]) -> tuple[str, ...]:
     return label, ", ".join(published), ", ".join(ours), ", ".join(seeds)
 
 
-def _claims(tests: list[Row]) -> list[str]:
+def _claims(tests: list[Finding]) -> list[str]:
     """Return how many claims of the paper's text are supported, and which are not."""
     claims = [test for test in tests if test.claim]
     if not claims:

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.spi.verdict_signs import SIGNS
-from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding, findings_of
+from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.policy_comparison import (
     CellAgainstBaseline,
     cells_against_baseline,
@@ -151,11 +152,13 @@ def _surprises(results: StudyResults) -> Iterator[str]:
         yield contrast
     refuted = tests[tests["claim_verdict_holm"] == "refuted"]
     distance = (refuted["value"] - refuted["threshold"]).abs()
-    for test in rows_of(refuted.assign(distance=distance).sort_values("distance", ascending=False)):
+    for test in findings_of(
+        refuted.assign(distance=distance).sort_values("distance", ascending=False)
+    ):
         yield f"{test.policy} is {_turned(test)}, {_short(test.comparison)} ({test.value:.2f})"
 
 
-def _turned(test: Row) -> str:
+def _turned(test: Finding) -> str:
     """Return the opposite of a claim, e.g. "not tolerant"."""
     claim = str(test.claim)
     return claim.removeprefix("not ") if claim.startswith("not ") else f"not {claim}"

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.studies.performance_table import groups_of, rows_of
+from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
+from swarm_logistics_env.studies.indicator_table import findings_of
+from swarm_logistics_env.studies.performance_table import groups_of
+from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.results import StudyResults
 
 from .answer import Answer, answer
@@ -14,8 +19,7 @@ from .figures import Figure, indicator_figures, size_figures
 from .further_measures import budget_sections, load_sections, look_sections, resilience_sections
 from .policies_compared import policy_sections
 from .result_tables import Section, tables, warnings
-from .setup_sheet import glossary, methods, setup_sheet
-from .wording import sentence
+from .wording import NOTHING, sentence
 
 
 @dataclass(frozen=True)
@@ -138,5 +142,172 @@ def _verdicts(results: StudyResults) -> Iterator[Section]:
     for (policy, indicator), tests in families:
         yield Section(
             f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(sentence(results, test) for test in rows_of(tests)),
+            sentences=tuple(sentence(results, test) for test in findings_of(tests)),
         )
+
+
+def setup_sheet(plan: Plan) -> tuple[Section, ...]:
+    """Return everything that was held fixed and everything that was varied."""
+    if plan.imported_from is not None:
+        return _recorded_setup(plan)
+    policies = {condition.policy.label: condition.policy.identity for condition in plan.conditions}
+    return (
+        Section("Study", lines=tuple(_study(plan))),
+        Section(
+            "Policies",
+            ("policy", "class", "parameters", "source"),
+            tuple((label, *_identified(policies[label])) for label in sorted(policies)),
+        ),
+        *_failure_modes(plan),
+        Section(
+            "Base scenario",
+            ("condition", "value", "unit, meaning; source"),
+            tuple(plan.specification.scenario.conditions()),
+            tuple(_variations(plan)),
+        ),
+    )
+
+
+def _study(plan: Plan) -> Iterator[str]:
+    yield (
+        f"Study {plan.specification.name!r}: {len(plan.conditions)} conditions x "
+        f"{len(plan.seeds)} seeds ({plan.seeds[0]} to {plan.seeds[-1]}), the same seeds for every "
+        f"condition. swarm-logistics-env {version('swarm-logistics-env')}, code version "
+        f"{plan.code}."
+    )
+    clear = plan.specification.until_clear
+    level = "at the levels of the declared looks." if clear else "2.5 % on each side."
+    yield (
+        f"Performance P is {plan.specification.played.performance}. Intervals of P are "
+        "t-intervals over seeds; those of indicators invert the test, paired by seed. A verdict is "
+        "a paired test against the threshold, from ten seeds on the larger p of Student's t and "
+        f"the studentised bootstrap, below them t alone, one-sided {level}"
+    )
+
+
+def _identified(identity: str) -> tuple[str, str, str]:
+    """Return class, parameters and digest of the source from a policy's identity."""
+    try:
+        told = json.loads(identity)
+    except json.JSONDecodeError:  # a policy's own identity need not be JSON
+        told = None
+    match told:
+        case {"given": given, "policy": str(policy)}:
+            kind, parameters, source = _identified(policy)
+            own = "" if parameters == NOTHING else f"{parameters}; "
+            return kind, f"{own}given: {_listed(given)}", source
+        case {"class": kind, "parameters": parameters, "source": source}:
+            return kind, _listed(parameters) or NOTHING, source
+    return identity, NOTHING, NOTHING
+
+
+def _listed(parameters: object) -> str:
+    if not isinstance(parameters, dict):
+        return str(parameters)
+    return ", ".join(f"{name} = {value}" for name, value in parameters.items())
+
+
+def _failure_modes(plan: Plan) -> Iterator[Section]:
+    modes = dict.fromkeys(fault.mode for c in plan.conditions for fault in c.faults)
+    known = plan.conditions[0].task.failure_modes
+    if modes:
+        rows = tuple((mode, _described(mode, known)) for mode in modes)
+        yield Section("Failure modes", ("mode", "what it does to a robot"), rows)
+
+
+def _described(mode: str, known: Mapping[str, str]) -> str:
+    whole, _, lost = mode.partition("[")
+    return f"{known[whole]}; of this: {lost[:-1].replace(',', ', ')}" if lost else known[whole]
+
+
+def _variations(plan: Plan) -> Iterator[str]:
+    asked = plan.specification
+    base = asked.scenario.model_dump()
+    for factor in (*asked.sizes, *asked.faults, *asked.parameters, *asked.ablations):
+        changed = plan.conditions[0].task.vary(asked.scenario, factor.scenario).model_dump()
+        differing = [f"{name} = {x}" for name, x in changed.items() if x != base[name]]
+        if differing:
+            title = factor.title or type(factor).__name__
+            yield f"{title} differs: {', '.join(differing)}."
+    for faults in asked.faults:
+        if manner := str(faults):
+            yield f"{faults.title or 'Faults'}: robots fail {manner}."
+
+
+def _recorded_setup(plan: Plan) -> tuple[Section, ...]:
+    """Return what is known of the trials, the set-up that the user states, and the methods."""
+    shared = "Paired by the seeds that it names" if plan.paired else "Unpaired: it names no seeds"
+    known = (
+        f"Study {plan.specification.name!r}: {len(plan.conditions)} conditions, imported from "
+        f"{plan.imported_from}. {shared}. Of their conditions what varies is known, and what is "
+        "stated below."
+    )
+    unstated = () if plan.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
+    return (
+        Section("Study", lines=(known,)),
+        Section("Set-up as stated", ("condition", "value"), plan.setup, unstated),
+    )
+
+
+def methods(plan: Plan) -> str:
+    """Return a paragraph for a paper: what was measured, how it was estimated and tested."""
+    asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
+    names = [DEFINITIONS[symbol].heading for symbol in asked]
+    listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    n = len(plan.seeds)
+    if plan.paired:
+        what = "trials" if plan.imported_from else "simulated runs"
+        trials = f"{n} {what} of each of {len(plan.conditions)} conditions, paired by seed"
+        test = "the paired t-test (Fieller's interval)"
+        if n >= MIN_SEEDS:
+            test += " and its studentised bootstrap, whichever gives the larger p"
+    else:
+        trials = f"up to {n} independent trials of each of {len(plan.conditions)} conditions"
+        test = "Welch's t-test for independent samples"
+    return (
+        f"We measured performance P in {trials}. We report {listed}, each a ratio of mean "
+        f"performances, with the 95 % interval that inverts {test}. An indicator is called above "
+        "its threshold (supported) or below it (refuted) where this test rejects at 2.5 % on that "
+        "side, equivalent where it does not but two one-sided tests find that P changes by less "
+        f"than {100 * plan.specification.margin:.3g} % of P_o, else inconclusive; p is adjusted by "
+        "Holm's method over all comparisons of one indicator for one policy. Computed with "
+        "swarm-logistics-env "
+        f"{version('swarm-logistics-env')}."
+    )
+
+
+def glossary(plan: Plan) -> Section:
+    """Return what the words and letters of the report mean."""
+    asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
+    rows = [
+        ("P", f"performance: {plan.specification.played.performance}"),
+        ("P_o, P_new", "P in the original condition, and in the changed one"),
+        *((DEFINITIONS[symbol].heading, _meaning(DEFINITIONS[symbol])) for symbol in asked),
+        *_WORDS,
+    ]
+    return Section("", ("word", "meaning"), tuple(rows))
+
+
+def _meaning(definition: Definition) -> str:
+    """Return an indicator's formula, which its function's docstring begins with, and its words."""
+    first, *_ = (definition.function.__doc__ or definition.heading).strip().splitlines()
+    formula = first.partition(" (paper")[0].rstrip(".")
+    adjectives = (f"above {x:g} {adjective}" for x, adjective in definition.adjectives.items())
+    return "; ".join([formula, *adjectives])
+
+
+_WORDS = (
+    ("N, m", "number of robots of the swarm; number of those added, faulty or removed"),
+    ("seed", "number that decides the layout, the requests, which robots fail and the behaviour"),
+    ("paired", "all conditions are played over the same seeds, and compared seed by seed"),
+    ("twin", "the run of the same seed in the original condition"),
+    ("supported, refuted", "above, or below, the threshold beyond chance"),
+    ("equivalent", "the indicator is open, but P changes by less than the declared margin"),
+    ("open, inconclusive", "these seeds cannot tell"),
+    ("same runs, unaffected", "both conditions gave the same runs: exact, and no evidence"),
+    ("blocked", "runs failed or are missing, or nothing was delivered in the reference"),
+    ("Holm", "adjustment of a family of verdicts so that any error among them has 5 % at most"),
+    ("provisional", "the verdict assumes normal differences: below ten seeds, or unpaired"),
+    ("claim", "what the reference says of an indicator"),
+    ("†", "P is capped: every item was delivered in at least one run"),
+)

@@ -20,8 +20,9 @@ from swarm_logistics_env.studies.fault_measures import (
     resiliences,
     window_of,
 )
+from swarm_logistics_env.studies.indicator_table import Finding, findings_of
 from swarm_logistics_env.studies.judged_comparisons import CONFIDENCE
-from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.until_clear import SPENDING
 
@@ -190,7 +191,9 @@ def _rate_figures(results: StudyResults) -> Iterator[Figure]:
     import pandas as pd
 
     for (*where, mode, onset), tests in groups_of(mid_run_faults(results), *_ONE_FIGURE):
-        curves = {_members(test): rate_curves(results, test.compared) for test in rows_of(tests)}
+        curves = {
+            _members(test): rate_curves(results, test.compared) for test in findings_of(tests)
+        }
         data = pd.concat(curves, names=["panel"]).reset_index(level="panel")
         window = window_of(tests["compared"].iloc[0])
         if not data.empty:
@@ -214,7 +217,7 @@ def _repair_figures(
     tests = mid_run_faults(results)
     tests = tests[tests["compared"].isin(list(singles))]
     for (*where, mode, onset), here in groups_of(tests, *_ONE_FIGURE):
-        panels = {_members(test): singles[test.compared] for test in rows_of(here)}
+        panels = {_members(test): singles[test.compared] for test in findings_of(here)}
         rows = [
             (title, curve.runs, *point)
             for title, curves in panels.items()
@@ -243,5 +246,5 @@ def _where(policy: str, table: str, n_robots: int) -> str:
     return f"{policy}, {table}, N = {n_robots}"
 
 
-def _members(test: Row) -> str:
+def _members(test: Finding) -> str:
     return f"m = {test.after:g}"

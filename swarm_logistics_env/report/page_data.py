@@ -16,11 +16,12 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.fault_text import text_of
 from swarm_logistics_env.studies.comparisons import Arm, Comparison
-from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding, findings_of
+from swarm_logistics_env.studies.performance_table import Cell, cells_of, groups_of
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.tasks.policy_choice import runs_code
-from swarm_logistics_env.tasks.replay import Recording, record_run
 from swarm_logistics_env.tasks.task import DEFAULT
+from swarm_logistics_env.tasks.warehouse_task import Recording, record_run
 
 from . import wording
 from .verdict_matrix import VerdictMatrix
@@ -44,7 +45,7 @@ def page_data(results: StudyResults, matrix: VerdictMatrix) -> dict[str, Any]:
         "seeds": [int(seed) for seed in results.plan.seeds],
         "paired": results.plan.paired,
         "conditions": list(_conditions(results, arms.values())),
-        "questions": [_question(results, test, places) for test in rows_of(results.indicators)],
+        "questions": [_question(results, test, places) for test in findings_of(results.indicators)],
         "views": [*_performance_views(results, places), *_indicator_views(results)],
         "first": _first(results.indicators),
         "replays": list(_replays(results, places)),
@@ -97,7 +98,7 @@ def watch_command(arm: Arm) -> str | None:
     return shlex.join(words)
 
 
-def _question(results: StudyResults, test: Row, places: dict[str, int]) -> dict[str, Any]:
+def _question(results: StudyResults, test: Finding, places: dict[str, int]) -> dict[str, Any]:
     told = wording.sentence(results, test)
     compared: Comparison = test.compared
     return {
@@ -124,7 +125,7 @@ def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterato
     cells = results.performance[results.performance["kind"] != "policy"]
     for table, here in groups_of(cells, "table"):
         # One failure mode after the other, as in the tables.
-        rows = [row for _, part in groups_of(here, "factor") for row in rows_of(part)]
+        rows = [row for _, part in groups_of(here, "factor") for row in cells_of(part)]
         categories = list(dict.fromkeys(row.cell for row in rows))
         yield {
             "name": f"P: {table}",
@@ -156,7 +157,7 @@ def _short(told: str) -> str:
     return value if not name.endswith(", m") else f"{name.removesuffix(', m')} {value}"
 
 
-def _over(row: Row) -> str:
+def _over(row: Cell | Finding) -> str:
     """Return the label of the axis of a figure on which the conditions stand."""
     factors = {
         "size": "swarm size N",
@@ -171,7 +172,9 @@ def _indicator_views(results: StudyResults) -> Iterator[dict[str, Any]]:
     tests = results.indicators.assign(number=range(len(results.indicators)))
     tests = tests.drop_duplicates(["policy", "table", "indicator", "comparison"])
     for (table, indicator), here in groups_of(tests, "table", "indicator"):
-        rows = [row for _, part in groups_of(here, "factor") for row in rows_of(part)]
+        parts = [part for _, part in groups_of(here, "factor")]
+        numbers = [number for part in parts for number in part["number"]]
+        rows = [row for part in parts for row in findings_of(part)]
         categories = list(dict.fromkeys(row.comparison for row in rows))
         yield {
             "name": f"{indicator}: {table}",
@@ -184,10 +187,10 @@ def _indicator_views(results: StudyResults) -> Iterator[dict[str, Any]]:
                     "at": categories.index(row.comparison),
                     **_limits(row.value, row.low, row.high),
                     "published": _number(row.published),
-                    "question": row.number,
+                    "question": number,
                     "seeds": _seed_by_seed(results, row.compared),
                 }
-                for row in rows
+                for number, row in zip(numbers, rows)
                 if row.estimate is not None
             ],
         }
@@ -248,7 +251,7 @@ def _replays(results: StudyResults, places: dict[str, int]) -> Iterator[dict[str
             }
 
 
-def _telling(tests: pd.DataFrame) -> Iterator[Row]:
+def _telling(tests: pd.DataFrame) -> Iterator[Finding]:
     """Yield the faults that harm most and, of several policies, where they differ most."""
     faults = tests[(tests["kind"] == "fault") & tests["value"].notna()]
     if faults.empty:
@@ -257,8 +260,8 @@ def _telling(tests: pd.DataFrame) -> Iterator[Row]:
     spread = faults.groupby(["table", "comparison"])["value"].transform(lambda x: x.max() - x.min())
     if spread.max() > 0:
         contrast = faults[spread == spread.max()].sort_values("value")
-        yield from rows_of(contrast.iloc[[0, -1]])
-    yield from rows_of(faults.sort_values("value", kind="stable"))
+        yield from findings_of(contrast.iloc[[0, -1]])
+    yield from findings_of(faults.sort_values("value", kind="stable"))
 
 
 def _typical_seed(results: StudyResults, original: Arm, changed: Arm) -> int:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding, findings_of
+from swarm_logistics_env.studies.performance_table import Cell, cells_of, groups_of
 from swarm_logistics_env.studies.policy_comparison import Agreement, agreements
 from swarm_logistics_env.studies.results import StudyResults
 
@@ -81,7 +82,7 @@ def _tables(
     """Yield a table of P and the first indicator, then one of each further indicator."""
     published = bool(cells["published"].notna().any())
     # Rows of one failure mode (or other factor) stand together, in order of appearance.
-    rows = [cell for _, here in groups_of(cells, "factor") for cell in rows_of(here)]
+    rows = [cell for _, here in groups_of(cells, "factor") for cell in cells_of(here)]
     setting: Column = ("", lambda cell: cell.cell)
     columns: list[Column] = [setting]
     if published:
@@ -97,11 +98,11 @@ def _tables(
         columns, title = [setting], title.removesuffix(", continued") + ", continued"
 
 
-def _published(cell: Row) -> str:
+def _published(cell: Cell) -> str:
     return f"{cell.published:g}" if wording.is_known(cell.published) else NOTHING
 
 
-def _one_run(cell: Row) -> str:
+def _one_run(cell: Cell) -> str:
     if not wording.is_known(cell.prediction_low):
         return NOTHING
     digits = wording.digits_of(cell.mean)
@@ -118,8 +119,8 @@ def _answers(
     verdict, with Holm's in brackets where it differs, beside what the paper claims.
     """
 
-    def column(heading: str, asked: pd.DataFrame, text: Callable[[Row], str]) -> Column:
-        by_arm = {test.compared.changed: test for test in rows_of(asked)}
+    def column(heading: str, asked: pd.DataFrame, text: Callable[[Finding], str]) -> Column:
+        by_arm = {test.compared.changed: test for test in findings_of(asked)}
         return heading, lambda cell: text(by_arm[cell.arm]) if cell.arm in by_arm else NOTHING
 
     yield column(f"{indicator} [{wording.percent(confidence)}]", tests, wording.ratio)
@@ -131,12 +132,12 @@ def _answers(
             yield column("paper", asked, _claimed)
 
 
-def _claimed(test: Row) -> str:
-    return {True: "yes", False: "no"}.get(test.claimed, NOTHING)
+def _claimed(test: Finding) -> str:
+    return NOTHING if test.claimed is None else "yes" if test.claimed else "no"
 
 
 def _claims(title: str, claims: pd.DataFrame, confidence: float) -> Section:
-    tests = list(rows_of(claims))
+    tests = list(findings_of(claims))
     plain, adjusted = (
         wording.counted(Counter(wording.counted_as(test, getattr(test, name)) for test in tests))
         for name in ("claim_verdict", "claim_verdict_holm")
@@ -161,7 +162,7 @@ def _claims(title: str, claims: pd.DataFrame, confidence: float) -> Section:
     )
 
 
-def _seeds_needed(test: Row) -> str:
+def _seeds_needed(test: Finding) -> str:
     if test.estimate is None or not wording.is_known(test.published):
         return NOTHING
     return "undefined" if test.seeds_for_power_80 is None else f"{test.seeds_for_power_80}"
@@ -195,11 +196,10 @@ def _agreement(figure: Agreement) -> Section:
 
 def _misses(cells: pd.DataFrame) -> str:
     told = []
-    for cell in rows_of(cells[:_MOST_MISSES]):
-        ours: Row = cell
-        one_run = Interval(ours.mean, ours.prediction_low, ours.prediction_high)
+    for cell in cells_of(cells[:_MOST_MISSES]):
+        one_run = Interval(cell.mean, cell.prediction_low, cell.prediction_high)
         told.append(
-            f"{ours.cell} ({ours.published:g} published, {wording.bracketed(one_run, 1)} ours)"
+            f"{cell.cell} ({cell.published:g} published, {wording.bracketed(one_run, 1)} ours)"
         )
     if len(cells) > _MOST_MISSES:
         told.append(f"and {len(cells) - _MOST_MISSES} more, in cells.csv")
@@ -214,7 +214,7 @@ def warnings(results: StudyResults) -> Iterator[str]:
             "least one run, and the indicators that rest on it. A verdict that a larger P could "
             "turn is inconclusive."
         )
-    stalls = [cell for cell in rows_of(results.performance) if cell.stalled > 0.0]
+    stalls = [cell for cell in cells_of(results.performance) if cell.stalled > 0.0]
     if stalls:
         told = (f"{c.policy}, {c.cell} ({c.stalled:.0%} of {c.n_seeds})" for c in stalls)
         yield (
@@ -231,10 +231,10 @@ def warnings(results: StudyResults) -> Iterator[str]:
             "The verdicts on the margin of equivalence are exploratory: another margin was "
             "declared before the first run."
         )
-    for cell in rows_of(results.performance):
+    for cell in cells_of(results.performance):
         if cell.problem:
             yield f"{cell.policy}, {cell.table}, {cell.cell} is incomplete: {cell.problem}."
-    for test in rows_of(results.indicators):
+    for test in findings_of(results.indicators):
         if test.problem:
             yield f"{test.policy}, {test.indicator}, {test.comparison} is blocked: {test.problem}."
     for flag, meaning in _FLAGS.items():

@@ -13,7 +13,8 @@ from typing import Any
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.fault_measures import fault_budgets
-from swarm_logistics_env.studies.performance_table import Row, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding, findings_of
+from swarm_logistics_env.studies.performance_table import cells_of
 from swarm_logistics_env.studies.results import StudyResults
 
 from . import wording
@@ -112,7 +113,7 @@ def score_card(results: StudyResults) -> ScoreCard:
 
 
 def _lines(results: StudyResults) -> Iterator[Line]:
-    unbroken = next(cell for cell in rows_of(results.performance) if cell.factor == "none")
+    unbroken = next(cell for cell in cells_of(results.performance) if cell.factor == "none")
     known = unbroken.n_seeds > 0
     yield Line(
         "P",
@@ -121,7 +122,7 @@ def _lines(results: StudyResults) -> Iterator[Line]:
         unbroken.low if known else None,
         unbroken.high if known else None,
     )
-    tests = list(rows_of(results.indicators))
+    tests = list(findings_of(results.indicators))
     for test in tests:
         if test.kind == "size":
             yield _line(f"S, {test.comparison}", "more robots", test)
@@ -145,7 +146,7 @@ def _lines(results: StudyResults) -> Iterator[Line]:
     yield Line("fault budget", f"robots of any mode; {ended}", float(robots))
 
 
-def _line(name: str, condition: str, test: Row) -> Line:
+def _line(name: str, condition: str, test: Finding) -> Line:
     low, high = (limit if wording.is_known(limit) else None for limit in (test.low, test.high))
     return Line(name, condition, test.value, low, high, test.answer_holm or "blocked")
 
@@ -209,7 +210,7 @@ def explanation(card: ScoreCard) -> tuple[str, ...]:
 
 def as_recorded(results: StudyResults) -> dict[str, Any]:
     """Return what `recorded` keeps of a shipped policy."""
-    unbroken = next(cell for cell in rows_of(results.performance) if cell.factor == "none")
+    unbroken = next(cell for cell in cells_of(results.performance) if cell.factor == "none")
     return {
         "p": [float(p) for p in unbroken.by_seed],
         "lines": {

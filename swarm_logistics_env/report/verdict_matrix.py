@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.verdict_signs import SIGNS
-from swarm_logistics_env.studies.performance_table import Row, groups_of, rows_of
+from swarm_logistics_env.studies.indicator_table import Finding, findings_of
+from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.policy_comparison import judged_policies
 from swarm_logistics_env.studies.results import StudyResults
 
@@ -25,7 +26,7 @@ _GAP = "  "
 
 
 @dataclass(frozen=True)
-class Cell:
+class MatrixCell:
     """One question asked of one policy: its row in the table of indicators, and that one's number.
 
     Attributes:
@@ -33,7 +34,7 @@ class Cell:
         number: its place in the table.
     """
 
-    test: Row
+    test: Finding
     number: int
 
     @property
@@ -66,7 +67,7 @@ class MatrixRow:
     indicator: str
     factor: str
     asked: str
-    cells: dict[str, tuple[Cell | None, ...]]
+    cells: dict[str, tuple[MatrixCell | None, ...]]
 
     @property
     def label(self) -> str:
@@ -111,7 +112,7 @@ class VerdictMatrix:
             f"{sign.mark} {sign.word}" for name, sign in SIGNS.items() if name in found
         )
 
-    def cells(self) -> Iterator[Cell]:
+    def cells(self) -> Iterator[MatrixCell]:
         """Yield every question of every policy."""
         for block in self.blocks:
             for row in block.rows:
@@ -135,14 +136,14 @@ def verdict_matrix(results: StudyResults) -> VerdictMatrix:
 
 
 def _block(table: str, kind: str, onset: float, tests: pd.DataFrame) -> Block:
-    at = list(dict.fromkeys(_step(test) for test in rows_of(tests)))
+    at = list(dict.fromkeys(_step(test) for test in findings_of(tests)))
     rows = []
     # "P falls" and "P falls by more than 33 %" are asked of different swarms.
     for (indicator, factor, asked), here in groups_of(tests, "indicator", "factor", "property"):
-        cells: dict[str, list[Cell | None]] = {}
-        for test in rows_of(here):
+        cells: dict[str, list[MatrixCell | None]] = {}
+        for number, test in zip(here["number"], findings_of(here)):
             line = cells.setdefault(test.policy, [None] * len(at))
-            line[at.index(_step(test))] = Cell(test, test.number)
+            line[at.index(_step(test))] = MatrixCell(test, number)
         start = f" from {onset:g} s" if onset else ""
         rows.append(
             MatrixRow(
@@ -157,7 +158,7 @@ def _block(table: str, kind: str, onset: float, tests: pd.DataFrame) -> Block:
     return Block(table, _axis(kind, at), tuple(rows))
 
 
-def _step(test: Row) -> tuple[float, float]:
+def _step(test: Finding) -> tuple[float, float]:
     """Return the values of the factor before and after."""
     return (test.n_robots, test.n_robots) if test.kind == "policy" else (test.before, test.after)
 

@@ -14,8 +14,8 @@ from typing import TypeGuard
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.indicator_table import POWER
-from swarm_logistics_env.studies.performance_table import Row
+from swarm_logistics_env.studies.indicator_table import POWER, Finding
+from swarm_logistics_env.studies.performance_table import Cell
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import seeds_in_words
 
@@ -36,7 +36,7 @@ def digits_of(p: float) -> int:
     return 1 if p >= 1 or p <= 0 else 2 - math.floor(math.log10(p))
 
 
-def bracketed(interval: Interval | Estimate | Row | None, digits: int) -> str:
+def bracketed(interval: Interval | Estimate | Finding | None, digits: int) -> str:
     """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
     if interval is None or not is_known(interval.value):
         return NOTHING
@@ -69,19 +69,19 @@ def p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def mean_p(cell: Row) -> str:
+def mean_p(cell: Cell) -> str:
     """Return the mean P of a row of performances with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
         return "no run"
     return bracketed(Interval(cell.mean, cell.low, cell.high), digits_of(cell.mean)) + mark(cell)
 
 
-def mark(row: Row) -> str:
+def mark(row: Cell | Finding) -> str:
     """Return the sign of a P that is capped, or of what rests on it."""
     return SATURATED if row.saturated else ""
 
 
-def ratio(test: Row) -> str:
+def ratio(test: Finding) -> str:
     """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
     return NOTHING if test.estimate is None else bracketed(test, 3) + mark(test)
 
@@ -91,13 +91,13 @@ def said(verdict: str | None) -> str:
     return {None: "blocked", "unaffected": UNAFFECTED}.get(verdict, f"{verdict}")
 
 
-def verdict(test: Row) -> str:
+def verdict(test: Finding) -> str:
     """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
     plain, adjusted = said(test.answer), said(test.answer_holm)
     return plain if plain in (adjusted, "blocked") else f"{plain} ({adjusted})"
 
 
-def counted_as(test: Row, verdict: str | None) -> str:
+def counted_as(test: Finding, verdict: str | None) -> str:
     """Return what a verdict on this test counts as in `counted`.
 
     A count is a headline: a verdict that assumes normal differences does not stand in it.
@@ -137,14 +137,14 @@ class Sentence:
     verdict: str
 
 
-def sentence(results: StudyResults, test: Row) -> Sentence:
+def sentence(results: StudyResults, test: Finding) -> Sentence:
     """Return the verdict on one comparison in words."""
     head = f"{test.policy}, {test.property}? {_conditions(test)}."
     text = " ".join(_parts(results, test))
     return Sentence(head, text, "blocked" if test.problem else test.conclusion or "blocked")
 
 
-def _parts(results: StudyResults, test: Row) -> Iterator[str]:
+def _parts(results: StudyResults, test: Finding) -> Iterator[str]:
     if test.problem:
         yield f"Blocked: {test.problem}."
         return
@@ -177,7 +177,7 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
         yield f"Pairing correlation {test.pairing_correlation:.2f}."
     if "assumes_normal" in test.flags:
         yield "The verdict assumes normal differences."
-    if "hidden_stalls" in test.flags:
+    if test.estimate is not None and "hidden_stalls" in test.flags:
         yield (
             "No verdict, as stalled runs that these seeds did not show could turn it: it needs at "
             f"least {spi.seeds_against_stalls(test.estimate)} seeds."
@@ -191,7 +191,7 @@ def _parts(results: StudyResults, test: Row) -> Iterator[str]:
         yield "Exploratory."
 
 
-def _unchanged(test: Row) -> str:
+def _unchanged(test: Finding) -> str:
     """Return the verdict on equivalence, e.g. "P_F within 10 % of P_o? Change -0.023 [..]: .."."""
     limits = ""
     if is_known(test.change_low) and is_known(test.change_high):
@@ -203,7 +203,7 @@ def _unchanged(test: Row) -> str:
     return f"{test.unchanged}? Change {change}: {test.equivalence}{adjusted}."
 
 
-def _conditions(test: Row) -> str:
+def _conditions(test: Finding) -> str:
     if test.kind == "size":
         return f"N = {test.before:g} → {test.after:g} (m = {test.after - test.before:g} more)"
     if test.kind == "fault":
@@ -221,7 +221,7 @@ def _p(p: float | None) -> str:
     return f" (p {text})" if text.startswith("<") else f" (p = {text})"
 
 
-def _what_it_takes(test: Row) -> Iterator[str]:
+def _what_it_takes(test: Finding) -> Iterator[str]:
     if is_known(test.detectable):
         yield (
             f"{test.n_seeds} seeds find an effect {test.detectable:.3f} away from "

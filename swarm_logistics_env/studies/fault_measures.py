@@ -19,8 +19,8 @@ from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparisons import Comparison
+from .indicator_table import Finding, findings_of
 from .judged_comparisons import same_runs
-from .performance_table import Row, rows_of
 from .results import StudyResults, Times
 
 if TYPE_CHECKING:
@@ -236,14 +236,15 @@ class AnchoringLoad(NamedTuple):
 
 def fault_budgets(results: StudyResults) -> Iterator[ModeBudget]:
     """Yield the fault budget of every policy, failure mode and onset."""
-    groups: dict[object, list[Row]] = {}
-    for test in rows_of(results.indicators):
+    groups: dict[object, list[Finding]] = {}
+    for test in findings_of(results.indicators):
         if test.indicator == "R":
             key = test.policy, test.table, test.factor, test.onset
             groups.setdefault(key, []).append(test)
     for tests in groups.values():
         estimates = {int(test.after): test.estimate for test in tests}
-        budget = None if None in estimates.values() else spi.fault_budget(estimates)
+        known = {m: one for m, one in estimates.items() if one is not None}
+        budget = spi.fault_budget(known) if len(known) == len(estimates) else None
         last = estimates.get(budget.limit) if budget and budget.limit else None
         verdict = last.answer if last else None
         yield ModeBudget(tests[0].compared, tuple(estimates), budget, verdict)

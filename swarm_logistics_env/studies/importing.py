@@ -19,7 +19,7 @@ from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, R
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparisons import OTHER_BEHAVIOUR, Arm, Comparison, Setting
-from .metadata import Declaration, Origin, rows_of
+from .metadata import Declaration, Origin, notes_of
 from .plan import Plan
 from .runs import Condition, StudiedPolicy
 from .specification import Specification
@@ -86,7 +86,7 @@ def import_results(
                 run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
                 store.add(run, _outcome(run.key, row))
         declared = Declaration.model_validate(specification)
-        notes = rows_of(specification, RECORDED.code(), {}, declared)
+        notes = notes_of(specification, RECORDED.code(), {}, declared)
         store.note({**notes, "imported": origin.model_dump_json()})
     return len(trials.rows)
 

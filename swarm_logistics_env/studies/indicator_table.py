@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.spi.definitions import Factor
+from swarm_logistics_env.spi.equivalence import Equivalence
 from swarm_logistics_env.spi.estimate import Estimate
 
 from .comparisons import Comparison, Reference
 from .judged_comparisons import Judged
-from .performance_table import Columns, table_of
+from .performance_table import columns_of, records_of, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,58 +21,91 @@ if TYPE_CHECKING:
 POWER = 0.8
 UNAFFECTED = "unaffected"
 
-INDICATORS: Columns = {
-    "policy": (object, "label of the policy"),
-    "table": (object, "heading of the report's table"),
-    "indicator": (object, "its symbol, e.g. FT"),
-    "comparison": (object, "the step in words, e.g. N 5 -> 10"),
-    "kind": (object, "what differs between the conditions: size, fault, parameter or policy"),
-    "factor": (object, "its name: n_robots, a failure mode, a parameter, or a policy"),
-    "before": (float, "its value in the original condition, as in the table of performances"),
-    "after": (float, "its value in the changed condition"),
-    "onset": (float, "when the fault begins [s]"),
-    "n_robots": (int, "swarm size N of the original condition"),
-    "threshold": (float, "what the indicator is tested against"),
-    "value": (float, "the estimate; missing: blocked"),
-    "low": (float, "lower limit of its interval"),
-    "high": (float, "upper limit of its interval"),
-    "confidence": (float, "confidence level of the interval and the verdict"),
-    "probability": (float, "confidence that the indicator lies above the threshold, in [0, 1]"),
-    "p_value": (float, "two-sided p, unadjusted"),
-    "p_holm": (float, "p adjusted after Holm within the family; missing: blocked or unaffected"),
-    "verdict": (object, "whether it lies above the threshold; unaffected: equal runs, no evidence"),
-    "verdict_holm": (object, "the same after Holm"),
-    "n_seeds": (object, "number of seeds; None: blocked"),
-    "stopped_at": (object, "number of seeds at which it was clear; None: open, or seeds are fixed"),
-    "pairing_correlation": (float, "correlation of the two performances over seeds"),
-    "flags": (object, "marks on the verdict, see `Estimate`, with blanks between; None: blocked"),
-    "saturated": (bool, "whether it rests on a P that is capped"),
-    "claim": (object, "what is claimed, e.g. not tolerant; None: nothing"),
-    "published": (float, "the reference's value of the indicator"),
-    "claim_verdict": (object, "verdict on the claim"),
-    "claim_verdict_holm": (object, "the same after Holm"),
-    "unchanged": (object, "what is tested for equivalence, e.g. P_F within 10 % of P_o"),
-    "margin": (float, "the largest change that counts as none, as a share of P_o"),
-    "change": (float, "relative change, e.g. P_F / P_o - 1; of FT (P_F - P_S) / P_o"),
-    "change_low": (float, "lower limit of its interval, of level 1 - 2 alpha"),
-    "change_high": (float, "upper limit of it"),
-    "p_unchanged": (float, "p of equivalence; of a larger change p of its being beyond the margin"),
-    "equivalence": (object, "verdict on unchanged: equivalent, refuted or inconclusive"),
-    "equivalence_holm": (object, "the same after Holm"),
-    "seeds_for_power_80": (object, "seeds for 80 % power at the published value, on average"),
-    "no_plan": (object, "why no such number can be named"),
-    "problem": (object, "why the comparison is blocked, e.g. by a failed run"),
-    "property": (object, "what is asked, e.g. tolerant, FT > 0.5 or P falls"),
-    "answer": (object, "verdict on the property"),
-    "answer_holm": (object, "the same after Holm"),
-    "conclusion": (object, "answer_holm, but equivalent if that is inconclusive and P unchanged"),
-    "claimed": (object, "whether the indicator is claimed to lie above the threshold, or None"),
-    "detectable": (float, "distance from the threshold that these seeds find with 80 % power"),
-    "least_power": (float, "power that so many seeds keep in at least nine pilots of ten"),
-    "compared": (object, "the `Comparison`"),
-    "estimate": (object, "the `Estimate`; None: blocked"),
-    "equivalence_test": (object, "the `Equivalence`; None: blocked or not asked"),
-}
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """One comparison with its verdicts; a number that is missing is NaN."""
+
+    policy: Annotated[str, "label of the policy"]
+    table: Annotated[str, "heading of the report's table"]
+    indicator: Annotated[str, "its symbol, e.g. FT"]
+    comparison: Annotated[str, "the step in words, e.g. N 5 -> 10"]
+    kind: Annotated[Factor, "what differs between the conditions: size, fault, parameter or policy"]
+    factor: Annotated[str, "its name: n_robots, a failure mode, a parameter, or a policy"]
+    before: Annotated[float, "its value in the original condition, as in the table of performances"]
+    after: Annotated[float, "its value in the changed condition"]
+    onset: Annotated[float, "when the fault begins [s]"]
+    n_robots: Annotated[int, "swarm size N of the original condition"]
+    threshold: Annotated[float, "what the indicator is tested against"]
+    value: Annotated[float, "the estimate; missing: blocked"]
+    low: Annotated[float, "lower limit of its interval"]
+    high: Annotated[float, "upper limit of its interval"]
+    confidence: Annotated[float, "confidence level of the interval and the verdict"]
+    probability: Annotated[
+        float,
+        "confidence that the indicator lies above the threshold, in [0, 1]",
+    ]
+    p_value: Annotated[float, "two-sided p, unadjusted"]
+    p_holm: Annotated[
+        float,
+        "p adjusted after Holm within the family; missing: blocked or unaffected",
+    ]
+    verdict: Annotated[
+        str | None,
+        "whether it lies above the threshold; unaffected: equal runs, no evidence",
+    ]
+    verdict_holm: Annotated[str | None, "the same after Holm"]
+    n_seeds: Annotated[int | None, "number of seeds; None: blocked"]
+    stopped_at: Annotated[
+        int | None,
+        "number of seeds at which it was clear; None: open, or seeds are fixed",
+    ]
+    pairing_correlation: Annotated[float, "correlation of the two performances over seeds"]
+    flags: Annotated[str, "marks on the verdict, see `Estimate`, with blanks between"]
+    saturated: Annotated[bool, "whether it rests on a P that is capped"]
+    claim: Annotated[str | None, "what is claimed, e.g. not tolerant; None: nothing"]
+    published: Annotated[float, "the reference's value of the indicator"]
+    claim_verdict: Annotated[str | None, "verdict on the claim"]
+    claim_verdict_holm: Annotated[str | None, "the same after Holm"]
+    unchanged: Annotated[str | None, "what is tested for equivalence, e.g. P_F within 10 % of P_o"]
+    margin: Annotated[float, "the largest change that counts as none, as a share of P_o"]
+    change: Annotated[float, "relative change, e.g. P_F / P_o - 1; of FT (P_F - P_S) / P_o"]
+    change_low: Annotated[float, "lower limit of its interval, of level 1 - 2 alpha"]
+    change_high: Annotated[float, "upper limit of it"]
+    p_unchanged: Annotated[
+        float,
+        "p of equivalence; of a larger change p of its being beyond the margin",
+    ]
+    equivalence: Annotated[str | None, "verdict on unchanged: equivalent, refuted or inconclusive"]
+    equivalence_holm: Annotated[str | None, "the same after Holm"]
+    seeds_for_power_80: Annotated[
+        int | None,
+        "seeds for 80 % power at the published value, on average",
+    ]
+    no_plan: Annotated[str | None, "why no such number can be named"]
+    problem: Annotated[str | None, "why the comparison is blocked, e.g. by a failed run"]
+    property: Annotated[str, "what is asked, e.g. tolerant, FT > 0.5 or P falls"]
+    answer: Annotated[str | None, "verdict on the property"]
+    answer_holm: Annotated[str | None, "the same after Holm"]
+    conclusion: Annotated[
+        str | None,
+        "answer_holm, but equivalent if that is inconclusive and P unchanged",
+    ]
+    claimed: Annotated[
+        bool | None,
+        "whether the indicator is claimed to lie above the threshold, or None",
+    ]
+    detectable: Annotated[
+        float,
+        "distance from the threshold that these seeds find with 80 % power",
+    ]
+    least_power: Annotated[float, "power that so many seeds keep in at least nine pilots of ten"]
+    compared: Annotated[Comparison, "the `Comparison`"]
+    estimate: Annotated[Estimate | None, "the `Estimate`; None: blocked"]
+    equivalence_test: Annotated[Equivalence | None, "the `Equivalence`; None: blocked or not asked"]
+
+
+INDICATORS = columns_of(Finding)
 _OF_ESTIMATE = (
     "value", "low", "high", "confidence", "probability", "p_value", "n_seeds",
     "pairing_correlation",
@@ -118,6 +154,11 @@ def indicator_table(
     return table_of(rows, INDICATORS)
 
 
+def findings_of(table: pd.DataFrame) -> Iterator[Finding]:
+    """Yield the rows of a table of indicators."""
+    return records_of(table, Finding)
+
+
 def _verdicts(one: Judged, reference: Reference | None) -> dict[str, Any]:
     """Return the columns on what is asked and claimed."""
     comparison, estimate = one.comparison, one.estimate
@@ -162,7 +203,7 @@ def _estimated(
     known = reference.estimate(comparison) if reference else None
     published = known.value if known else None
     if isinstance(estimate, str):
-        return {"published": published}
+        return {"published": published, "flags": ""}
     needed = least = None
     if published is not None:
         needed = spi.seeds_for_power(estimate, published, POWER)

@@ -201,7 +201,7 @@ def _missing_in(notes: Mapping[str, object]) -> str | None:
     return next((name for name in needed if name not in notes), None)
 
 
-def rows_of(
+def notes_of(
     specification: object, code: str, identities: Mapping[str, str], declared: Declaration
 ) -> dict[str, str]:
     """Return the rows that `Metadata.of` reads, of a study that is played."""
@@ -240,7 +240,7 @@ def merge(directories: Sequence[Path], out: Path) -> int:
     with new_store(out) as store:
         for directory in directories:
             store.absorb(directory / FILE_NAME)
-        store.note(rows_of(one.specification, one.code, one.identities, one.declared))
+        store.note(notes_of(one.specification, one.code, one.identities, one.declared))
         return len(store)
 
 

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from dataclasses import dataclass
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    NamedTuple,
+    TypeAlias,
+    TypeVar,
+    get_args,
+    get_type_hints,
+)
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.spi.definitions import Factor
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -18,37 +29,52 @@ from .plan import Plan
 if TYPE_CHECKING:
     import pandas as pd
 
-Row: TypeAlias = Any  # one row of a table, as `DataFrame.itertuples` gives it
-Columns = Mapping[str, tuple[type, str]]  # name to type and meaning; missing floats are NaN
+Columns = Mapping[str, tuple[type, str]]  # name to type and meaning
+Kind = TypeVar("Kind")
 
-PERFORMANCE: Columns = {
-    "policy": (object, "label of the policy"),
-    "table": (object, "heading of the report's table"),
-    "cell": (object, "the condition in words, e.g. N = 10"),
-    "kind": (object, "what is varied: size, fault, parameter or policy"),
-    "factor": (object, "its name: n_robots, a failure mode, a parameter, or a policy"),
-    "value": (float, "swarm size N, faulty robots m, or the parameter's value in its unit"),
-    "onset": (float, "when the fault begins [s]"),
-    "n_robots": (int, "swarm size N"),
-    "published": (float, "P of the reference"),
-    "counted": (bool, "whether it is one of the cells of the reference's tables"),
-    "n_seeds": (int, "number of runs that succeeded"),
-    "mean": (float, "mean P, in the unit of the task: items in the warehouse"),
-    "low": (float, "lower limit of the 95 % interval of the mean; missing at one seed"),
-    "high": (float, "upper limit of it"),
-    "prediction_low": (float, "lower limit of the 95 % interval of one further run"),
-    "prediction_high": (float, "upper limit of it"),
-    "published_inside": (
-        object,
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """P of one policy under one condition; a number that is missing is NaN."""
+
+    policy: Annotated[str, "label of the policy"]
+    table: Annotated[str, "heading of the report's table"]
+    cell: Annotated[str, "the condition in words, e.g. N = 10"]
+    kind: Annotated[Factor, "what is varied: size, fault, parameter or policy"]
+    factor: Annotated[str, "its name: n_robots, a failure mode, a parameter, or a policy"]
+    value: Annotated[float, "swarm size N, faulty robots m, or the parameter's value in its unit"]
+    onset: Annotated[float, "when the fault begins [s]"]
+    n_robots: Annotated[int, "swarm size N"]
+    published: Annotated[float, "P of the reference"]
+    counted: Annotated[bool, "whether it is one of the cells of the reference's tables"]
+    n_seeds: Annotated[int, "number of runs that succeeded"]
+    mean: Annotated[float, "mean P, in the unit of the task: items in the warehouse"]
+    low: Annotated[float, "lower limit of the 95 % interval of the mean; missing at one seed"]
+    high: Annotated[float, "upper limit of it"]
+    prediction_low: Annotated[float, "lower limit of the 95 % interval of one further run"]
+    prediction_high: Annotated[float, "upper limit of it"]
+    published_inside: Annotated[
+        bool | None,
         "whether the published P lies in the interval of one run; None: unknown",
-    ),
-    "saturated": (bool, "whether a run delivered every item, so that P is capped"),
-    "stalled": (float, "share of runs with less than a quarter of the cell's median P"),
-    "problem": (object, "why runs are missing; None: they are complete"),
-    "arm": (object, "the setting and the condition"),
-    "by_seed": (object, "P seed by seed, shape (n_seeds,)"),
-    "digests": (object, "digest of each run; equal digests: the same run"),
-}
+    ]
+    saturated: Annotated[bool, "whether a run delivered every item, so that P is capped"]
+    stalled: Annotated[float, "share of runs with less than a quarter of the cell's median P"]
+    problem: Annotated[str | None, "why runs are missing; None: they are complete"]
+    arm: Annotated[Arm, "the setting and the condition"]
+    by_seed: Annotated[NDArray[np.float64], "P seed by seed, shape (n_seeds,)"]
+    digests: Annotated[tuple[str | None, ...], "digest of each run; equal digests: the same run"]
+
+
+def columns_of(kind: type) -> Columns:
+    """Return the columns of the table that holds records of a kind; missing floats are NaN."""
+    found = {}
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        type_, meaning = get_args(hint)
+        found[name] = type_ if type_ in (float, int, bool) else object, meaning
+    return found
+
+
+PERFORMANCE = columns_of(Cell)
 _UNKNOWN = Interval(np.nan, None, None)
 
 
@@ -69,9 +95,20 @@ def performance_table(
     return table_of(rows, PERFORMANCE)
 
 
-def rows_of(table: pd.DataFrame) -> Iterator[Row]:
-    """Yield the rows of a table; each column is an attribute."""
+def rows_of(table: pd.DataFrame) -> Iterator[Any]:
+    """Yield the rows of a table with any columns; each column is an attribute."""
     return iter(table.itertuples(index=False))
+
+
+def records_of(table: pd.DataFrame, kind: type[Kind]) -> Iterator[Kind]:
+    """Yield the rows of a table, or of a part of it, as records of the kind that it holds."""
+    names = list(columns_of(kind))
+    yield from (kind(*row) for row in table[names].itertuples(index=False, name=None))
+
+
+def cells_of(table: pd.DataFrame) -> Iterator[Cell]:
+    """Yield the rows of a table of performances."""
+    return records_of(table, Cell)
 
 
 def groups_of(table: pd.DataFrame, *columns: str) -> Iterator[tuple[Any, pd.DataFrame]]:
@@ -107,6 +144,9 @@ class Played(NamedTuple):
     digests: tuple[str | None, ...]
     saturated: bool
     problem: str | None
+
+
+Row: TypeAlias = Cell | Played  # what a comparison reads of a condition
 
 
 def played(found: Sequence[Outcome | None], *, paired: bool = True) -> Played:

@@ -14,7 +14,8 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 
 from .comparisons import Comparison, Setting
-from .performance_table import Row, groups_of, rows_of
+from .indicator_table import Finding, findings_of
+from .performance_table import Cell, cells_of, groups_of
 from .results import StudyResults
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class CellAgainstBaseline(NamedTuple):
             same cases as `difference`.
     """
 
-    cell: Row
+    cell: Cell
     interquartile_mean: float
     worst_decile: float
     difference: Interval | None = None
@@ -52,11 +53,11 @@ class IndicatorAgainstBaseline(NamedTuple):
             interval; None where it is undefined.
     """
 
-    tests: dict[str, Row]
+    tests: dict[str, Finding]
     differences: dict[str, Interval | None]
 
     @property
-    def test(self) -> Row:
+    def test(self) -> Finding:
         """The first policy's row, for what is the same for all of them."""
         return next(iter(self.tests.values()))
 
@@ -68,8 +69,8 @@ def judged_policies(results: StudyResults) -> tuple[str, ...]:
 
 def cells_against_baseline(results: StudyResults) -> dict[str, list[CellAgainstBaseline]]:
     """Return, table by table, every cell of every policy; the policies of a cell one by one."""
-    found: dict[str, dict[Setting, list[Row]]] = {}
-    for cell in rows_of(results.performance):
+    found: dict[str, dict[Setting, list[Cell]]] = {}
+    for cell in cells_of(results.performance):
         if cell.kind != "policy" and cell.n_seeds:
             found.setdefault(cell.table, {}).setdefault(cell.arm.setting, []).append(cell)
     return {
@@ -82,7 +83,9 @@ def cells_against_baseline(results: StudyResults) -> dict[str, list[CellAgainstB
     }
 
 
-def _cell_against_baseline(results: StudyResults, cell: Row, baseline: Row) -> CellAgainstBaseline:
+def _cell_against_baseline(
+    results: StudyResults, cell: Cell, baseline: Cell
+) -> CellAgainstBaseline:
     p = cell.by_seed
     summaries = spi.interquartile_mean(p), spi.worst_decile(p)
     is_baseline = cell is baseline or baseline.policy != judged_policies(results)[0]
@@ -109,8 +112,8 @@ def _ratio(baseline: NDArray[np.float64], performance: NDArray[np.float64]) -> I
 def indicators_against_baseline(results: StudyResults) -> Iterator[IndicatorAgainstBaseline]:
     """Yield every question that more than one policy was asked, with the differences."""
     baseline = judged_policies(results)[0]
-    asked: dict[object, dict[str, Row]] = {}
-    for test in rows_of(results.indicators):
+    asked: dict[object, dict[str, Finding]] = {}
+    for test in findings_of(results.indicators):
         if test.kind != "policy":
             asked.setdefault((test.table, test.compared.question), {})[test.policy] = test
     for tests in asked.values():
@@ -123,7 +126,7 @@ def indicators_against_baseline(results: StudyResults) -> Iterator[IndicatorAgai
             yield IndicatorAgainstBaseline(tests, differences)
 
 
-def _difference(results: StudyResults, baseline: Row, test: Row) -> Interval | None:
+def _difference(results: StudyResults, baseline: Finding, test: Finding) -> Interval | None:
     if baseline.estimate is None or test.estimate is None or not results.plan.paired:
         return None
 
@@ -186,7 +189,7 @@ class Agreement:
     mean_relative_error: float
     mean_log_error: float | None
     mean_interval_width: float | None
-    disorder: tuple[tuple[Row, Row], ...]
+    disorder: tuple[tuple[Cell, Cell], ...]
     largest_ordered: int
 
 
@@ -209,7 +212,7 @@ def agreement(policy: str, cells: pd.DataFrame) -> Agreement:
     # Beyond the peak the published fall is within one run's noise.
     sizes = cells[cells["kind"] == "size"]
     largest = 0 if sizes.empty else int(sizes["value"].iloc[sizes["published"].argmax()])
-    ordered = rows_of(sizes[sizes["value"] <= largest].sort_values("published", kind="stable"))
+    ordered = cells_of(sizes[sizes["value"] <= largest].sort_values("published", kind="stable"))
     return Agreement(
         policy,
         cells,

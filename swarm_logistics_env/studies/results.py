@@ -15,10 +15,10 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparisons import Arm, Reference, load_reference
-from .indicator_table import indicator_table
+from .indicator_table import Finding, findings_of, indicator_table
 from .judged_comparisons import CONFIDENCE, CellKey, judge_all
 from .metadata import Declaration
-from .performance_table import Row, performance_table, rows_of
+from .performance_table import Cell, cells_of, performance_table
 from .plan import Plan
 from .until_clear import standing
 
@@ -61,7 +61,7 @@ class StudyResults:
     late_margin: bool = False
 
     @cached_property
-    def by_arm(self) -> dict[CellKey, Row]:
+    def by_arm(self) -> dict[CellKey, Cell]:
         """The rows of `performance` by policy, table and arm."""
         return _by_arm(self.performance)
 
@@ -118,8 +118,8 @@ def judge(
     )
 
 
-def _by_arm(performance: pd.DataFrame) -> dict[CellKey, Row]:
-    return {(row.policy, row.table, row.arm): row for row in rows_of(performance)}
+def _by_arm(performance: pd.DataFrame) -> dict[CellKey, Cell]:
+    return {(row.policy, row.table, row.arm): row for row in cells_of(performance)}
 
 
 class Demand(NamedTuple):
@@ -137,7 +137,7 @@ class Demand(NamedTuple):
             0; None: it is not asked, or the pilot shows no spread.
     """
 
-    test: Row
+    test: Finding
     effect: float | None
     seeds: int | None = None
     least_power: float | None = None
@@ -162,10 +162,10 @@ def demands(
     Raises:
         IndicatorError: effect not finite, power outside (0, 1).
     """
-    return tuple(_demand(test, effect, power) for test in rows_of(results.indicators))
+    return tuple(_demand(test, effect, power) for test in findings_of(results.indicators))
 
 
-def _demand(test: Row, effect: float | None, power: float) -> Demand:
+def _demand(test: Finding, effect: float | None, power: float) -> Demand:
     estimate = test.estimate
     if effect is None and not math.isnan(test.published):
         effect = test.published

@@ -16,7 +16,7 @@ from swarm_logistics_env.tasks.task import Task
 
 from .engines import Engine, engine_named
 from .importing import imported_plan
-from .metadata import Declaration, Metadata, of_existing, rows_of
+from .metadata import Declaration, Metadata, notes_of, of_existing
 from .plan import Plan, make_plan
 from .presets import load_preset
 from .results import StudyResults, judge
@@ -175,7 +175,7 @@ class Study:
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
-            store.note(rows_of(self.specification, plan.code, plan.identities, declared))
+            store.note(notes_of(self.specification, plan.code, plan.identities, declared))
             done = store.succeeded()
             kept = sum(run.key in done for run in whole)
             played: dict[str, str | None] = {}  # by key, the error of each run that is played now

@@ -11,9 +11,8 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.gate import Gate, answers
+from swarm_logistics_env.studies.gate import Gate, answers, match
 from swarm_logistics_env.studies.judged_comparisons import same_runs
-from swarm_logistics_env.studies.matching import match
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome

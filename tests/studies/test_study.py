@@ -23,7 +23,7 @@ from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.report_files import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.indicator_table import INDICATORS
-from swarm_logistics_env.studies.metadata import Declaration, rows_of
+from swarm_logistics_env.studies.metadata import Declaration, notes_of
 from swarm_logistics_env.studies.performance_table import PERFORMANCE
 from swarm_logistics_env.studies.runs import Run, Shard
 from swarm_logistics_env.studies.store import FILE_NAME, Store, export
@@ -272,7 +272,7 @@ def test_a_study_of_the_same_name_that_asks_something_else_is_refused(
     declared = Study(out=tmp_path, **fields).specification
     with Store(tmp_path / FILE_NAME) as store:
         covers = Declaration.model_validate(declared)
-        store.note(rows_of(declared, declared.played.code(), {}, covers))
+        store.note(notes_of(declared, declared.played.code(), {}, covers))
         notes = store.notes()
     other = Study(out=tmp_path, **{**fields, field: value})
     for ask in (other.run, other.exploratory_because):
