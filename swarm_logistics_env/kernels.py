@@ -107,10 +107,8 @@ def _part(compiled: Any, compile_it: Callable[[], Any]) -> Any:
 class _PartCompiler(Compiler):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)  # type: ignore[no-untyped-call]  # numba's
-        state: Any = self.state
-        state.library = _PartLibrary(
-            state.targetctx.codegen(), state.func_id.func_qualname if state.func_id else "part"
-        )
+        state, part = cast("tuple[Any, Any]", (self.state, _PartLibrary))
+        state.library = part(state.targetctx.codegen(), "part")
         state.flags.no_cpython_wrapper = True
 
 
