@@ -158,7 +158,10 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
 
     kept = Path(compiled.stats.cache_path)
     kept.mkdir(parents=True, exist_ok=True)
-    with FileLock(kept / "swarm_logistics_env.lock"):
+    with contextlib.ExitStack() as held:
+        # A file system may know no locks: then two processes may compile the same.
+        with contextlib.suppress(OSError, NotImplementedError):
+            held.enter_context(FileLock(kept / "swarm_logistics_env.lock"))
         yield
 
 
