@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import config, event, types
+from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
@@ -94,12 +95,13 @@ def _compile(compiled: Any, signature: Any) -> Any:
 
 def _part(compiled: Any, compile_it: Callable[[], Any]) -> Any:
     """Compile what another kernel calls: LLVM is to optimise it there alone, not before as well."""
-    compiler, known = compiled._compiler, set(compiled.overloads)
+    compiler, cache, known = compiled._compiler, compiled._cache, set(compiled.overloads)
     compiler.pipeline_class, compiled._insert = _PartCompiler, lambda *_: None
+    compiled._cache = NullCache()
     try:
         return compile_it()
     finally:
-        compiler.pipeline_class = Compiler
+        compiler.pipeline_class, compiled._cache = Compiler, cache
         del compiled._insert
         _parts.setdefault(compiled, set()).update(set(compiled.overloads) - known)
 
@@ -150,10 +152,10 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
             _warn_of_no_cache()
             yield
             return
-        # numba looks at the file's time alone, not at the kernels and constants of other files.
-        compiled._cache._cache_file._source_stamp = _digest_for(
-            Path(compiled.py_func.__code__.co_filename).parent
-        )
+        folder = Path(compiled.py_func.__code__.co_filename).parent
+        if folder.is_relative_to(_HERE):
+            # numba looks at the file's time alone, not at kernels and constants of other files.
+            compiled._cache._cache_file._source_stamp = _digest_for(folder)
     from filelock import FileLock
 
     kept = Path(compiled.stats.cache_path)

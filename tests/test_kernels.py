@@ -131,3 +131,9 @@ def test_a_kernel_that_another_one_called_can_be_called_from_python() -> None:
 
     assert [outer(3.0), inner(3.0), outer(4.0), inner(5.0)] == [8.0, 4.0, 10.0, 6.0]
     assert inner(1) == 2.0  # another signature
+
+    @kernels.kernel
+    def counting(number: int) -> float:
+        return inner(number > 0)  # and one more, which only this kernel asks for
+
+    assert (counting(3), inner(True)) == (2.0, 2.0)
