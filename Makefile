@@ -50,7 +50,7 @@ tables: $(STUDY)/installed
 test: check
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --numprocesses=2 --cov --cov-append --cov-report= \
-		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends)"
+		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends or in_a_run or delivers_with or kept_though)"
 	$(DEV)/bin/python -m coverage report --fail-under=92
 
 # For every commit, within a minute: types beside the tests of rules and statistics, kernels interpreted.
