@@ -53,7 +53,7 @@ test: check
 		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends or in_a_run or delivers_with or kept_though)"
 	$(DEV)/bin/python -m coverage report --fail-under=92
 
-# For every commit, within a minute: types beside the tests of rules and statistics, kernels interpreted.
+# For every commit, within a minute: mypy runs beside the fastest tests, which interpret the kernels.
 quick: $(DEV)/installed
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/ruff format --check .

@@ -245,7 +245,7 @@ class _Report(event.Listener):
 def _warn_of_no_cache() -> None:
     warnings.warn(
         "compiled code can be kept nowhere, so every process compiles for itself, which takes "
-        "some ten seconds: set NUMBA_CACHE_DIR to a folder that can be written",
+        "about 13 seconds: set NUMBA_CACHE_DIR to a folder that can be written",
         stacklevel=8,
     )
 

@@ -39,9 +39,6 @@ PLAYED = {
 }
 
 
-pytestmark = pytest.mark.xdist_group("judging")  # its studies are played once
-
-
 @pytest.fixture(scope="module")
 def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory with a study for each entry of `PLAYED`."""
