@@ -7,15 +7,10 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import gymnasium
 import pettingzoo
-
-from swarm_logistics_env.episode import Episode, run_episode
-from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
 
 if TYPE_CHECKING:
     from swarm_logistics_env import (
@@ -27,6 +22,9 @@ if TYPE_CHECKING:
         testing,
         wrappers,
     )
+    from swarm_logistics_env.episode import Episode, run_episode
+    from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
+    from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
 
     __version__: str
 
@@ -50,10 +48,15 @@ __all__ = [
 GYMNASIUM_ID = "SwarmLogistics-v0"
 PETTINGZOO_ID = "swarm_logistics_v0"
 
-# Imported when first asked for, so that a training script does not pay for a study's machinery.
-_LAZY = frozenset(
-    {"adapters", "policies", "spi", "studies", "swarm_logistics_v0", "testing", "wrappers"}
-)
+# The module of each name, imported when the name is first asked for: the world imports the compiler
+# of its kernels, and a training script does not pay for a study's machinery.
+_MODULES = dict.fromkeys(("Episode", "run_episode"), "episode") | {
+    "FAILURE_MODES": "warehouse",
+    "Fault": "warehouse",
+    "SCENARIO_PRESETS": "scenario",
+    "Scenario": "scenario",
+    "Warehouse": "warehouse",
+}
 
 
 def _register() -> None:
@@ -74,9 +77,14 @@ def _register() -> None:
 _register()
 
 
-def __getattr__(name: str) -> ModuleType | str:
+def __getattr__(name: str) -> object:
     if name == "__version__":
         return importlib.metadata.version("swarm-logistics-env")
-    if name in _LAZY:
-        return importlib.import_module(f"{__name__}.{name}")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = importlib.import_module(f"{__name__}.{_MODULES.get(name, name)}")
+    return getattr(module, name) if name in _MODULES else module
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
