@@ -17,6 +17,7 @@ import pytest
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.verdict import frame_of_verdicts
 from swarm_logistics_env.tasks import Outcome
 
 FROZEN = Path(__file__).parent / "frozen"
@@ -44,24 +45,23 @@ def shipped_policies() -> Study:
 STUDIES = (paper, quick, shipped_policies)
 
 
-def conditions(study: Study) -> Iterator[tuple[str, dict[int, str]]]:
-    """Yield every condition in words, and the keys of its runs by seed."""
-    plan = study.plan()
-    for condition in plan.conditions:
-        fields = condition.scenario.model_dump(mode="json")
-        default = Scenario().model_dump(mode="json")
+def conditions(study: Study) -> Iterator[tuple[str, str]]:
+    """Yield every condition in words, and the key of its case."""
+    default = Scenario().model_dump(mode="json")
+    for case in study.plan().cases:
+        fields = case.scenario.model_dump(mode="json")
         words = {
-            "policy": condition.policy.label,
+            "policy": case.policy.title,
             "scenario": {k: v for k, v in fields.items() if v != default[k]},
-            "faults": [f.model_dump(mode="json") for f in condition.faults],
-            "behaviour": condition.behaviour,
+            "faults": [f.model_dump(mode="json") for f in case.faults],
+            "behaviour": case.behaviour,
         }
-        yield json.dumps(words), {s: condition.run(plan.code, s).key for s in plan.seeds}
+        yield json.dumps(words), case.key
 
 
 def verdicts(results: StudyResults) -> list[dict[str, Any]]:
     """Return the words and numbers of every comparison, to nine digits."""
-    rows = results.indicators.to_dict("records")
+    rows = frame_of_verdicts(results.verdicts).to_dict("records")
     return [
         {name: row[name] for name in WORDS}
         | {name: None if row[name] != row[name] else float(f"{row[name]:.9g}") for name in NUMBERS}
@@ -78,9 +78,9 @@ def freeze(study: Study, *, times: bool) -> dict[str, Any]:
     study.run(processes=2)
     results = study.findings()
     runs: dict[str, list[dict[str, Any]]] = {}
-    for words, keys in conditions(study):
-        for seed, key in keys.items():
-            found = results.outcomes[key]
+    for words, case in conditions(study):
+        for seed in study.plan().seeds:
+            found = results.outcomes[case, seed]
             assert found.error is None
             run = {
                 "seed": seed,
@@ -98,12 +98,10 @@ def freeze(study: Study, *, times: bool) -> dict[str, Any]:
 def test_verdicts_follow_from_the_frozen_runs(named: Any) -> None:
     expected, study = frozen(named.__name__), named()
     outcomes = {}
-    for words, keys in conditions(study):
+    for words, case in conditions(study):
         for run in expected["runs"][words]:
             times = run.get("times")
-            key = keys[run["seed"]]
-            outcomes[key] = Outcome(
-                key,
+            outcomes[case, run["seed"]] = Outcome(
                 delivery_times=np.array(times or []),
                 untimed=run["P"] if times is None else None,
                 all_delivered=run["all_delivered"],
@@ -138,12 +136,12 @@ def test_runs_played_anew_equal_the_frozen_ones(name: str, study: Study) -> None
     expected = frozen(name)["runs"]
     study.run()
     outcomes = study.findings().outcomes
-    for words, keys in conditions(study):
-        for seed, key in keys.items():
+    for words, case in conditions(study):
+        for seed in study.plan().seeds:
             run = next(run for run in expected[words] if run["seed"] == seed)
-            assert outcomes[key].delivered == run["P"], words
+            assert outcomes[case, seed].delivered == run["P"], words
             if "times" in run:
-                assert outcomes[key].delivery_times.tolist() == pytest.approx(run["times"])
+                assert outcomes[case, seed].delivery_times.tolist() == pytest.approx(run["times"])
 
 
 if __name__ == "__main__":

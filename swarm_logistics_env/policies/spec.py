@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import ast
+import copy
 import functools
 import importlib
 import inspect
+import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple, Self
 
-from pydantic import Field, JsonValue, field_validator
+from pydantic import Field, JsonValue, field_validator, model_serializer
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,
+    StableBaselinesModel,
     StableBaselinesPolicy,
     read_card,
     read_policy,
@@ -92,13 +96,19 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     return policy
 
 
+# A task's own policies need not be the warehouse's `Policy`.
+Makers = Mapping[str, Callable[..., Any]]
+NO_MAKERS: Makers = MappingProxyType({})
+
+
 class PolicySpec(Record):
-    """A policy by its text: what it is called, what names its behaviour, whether it runs code.
+    """A policy by its text, or one made in Python: its label, its identity, its trust, its loading.
 
     Args:
-        name: the text, for `load`.
+        name: the text, for `load`; of an object, the name of its class.
         parameters: handed to the policy; whatever TOML and JSON both hold.
         label: how a report calls it; empty: made from name and parameters.
+        made: an object with `act`, where there is no text that makes it.
     """
 
     error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
@@ -106,6 +116,31 @@ class PolicySpec(Record):
     name: str
     parameters: dict[str, JsonValue] = Field(default_factory=dict)
     label: str = ""
+    made: Any = Field(default=None, exclude=True, repr=False)
+
+    @classmethod
+    def of(cls, value: object) -> Self:
+        """Return the policy that a text, a table of fields or an object with `act` stands for.
+
+        Raises:
+            ValueError: it is none of these, or a field of the table cannot be.
+        """
+        if isinstance(value, cls):
+            return value
+        if isinstance(value, dict):
+            return cls(**value)
+        if isinstance(value, str):
+            card_name = called(value)
+            return cls(name=value, label="" if card_name == value else card_name)
+        if not hasattr(value, "act"):
+            raise ValueError(
+                "should be a policy's name, its path, a table of name and parameters, or an object "
+                "with act"
+            )
+        return cls(name=type(value).__name__, made=value)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.label, id(self.made)))
 
     @field_validator("parameters")
     @classmethod
@@ -116,6 +151,12 @@ class PolicySpec(Record):
                 raise ValueError(f"{name!r} is no parameter of a policy")
         return parameters
 
+    @model_serializer
+    def _written(self) -> str | dict[str, JsonValue]:
+        if not (self.parameters or self.label):
+            return self.name
+        return {"name": self.name, "parameters": self.parameters, "label": self.label}
+
     @property
     def title(self) -> str:
         """What people call it: its label, or its name with the parameters given."""
@@ -125,19 +166,57 @@ class PolicySpec(Record):
     @property
     def runs_code(self) -> bool:
         """Whether to load it runs code that its name leads to, so that somebody has to trust it."""
-        return ":" in self.name or self.name.endswith(SB3_SUFFIX)
+        return self.made is None and (":" in self.name or self.name.endswith(SB3_SUFFIX))
 
-    def load(self, *, trust_code: bool = False) -> Policy:
-        """Return the policy; see the function `load`."""
-        return load(self.name, trust_code=trust_code, **self.parameters)
+    def load(self, makers: Makers = NO_MAKERS) -> Policy:
+        """Return the policy as no run has used it: an object is copied, a file read once.
 
-    def identity_of(self, policy: Policy) -> str:
-        """Return text that changes whenever the behaviour of `policy`, made of this, may have."""
-        found = identity(policy)
-        if not self.parameters:
-            return found
+        Args:
+            makers: what makes the policies that a task knows by name; none for the warehouse, to
+                which `NAMES` belong.
+
+        Raises:
+            PolicyError: it cannot be found or built.
+        """
+        if self.made is not None:
+            if not (makers or isinstance(self.made, Policy)):
+                raise PolicyError(f"policy {self.made!r}: should have the methods reset and act")
+            return _copied(self.made)
+        if self.name in makers:
+            try:
+                made: Policy = makers[self.name](**self.parameters)
+            except TypeError as error:
+                raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
+            return made
+        if makers and self.name in NAMES:
+            raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
+        if makers and self.name.endswith(SB3_SUFFIX):
+            return _copied(_model(self.name))
+        return _copied(_loaded(self.name, canonical_json(self.parameters)))
+
+    def identity(self, makers: Makers = NO_MAKERS) -> str:
+        """Return text that changes whenever the policy's behaviour may have; `makers` as `load`."""
+        found = identity(self.load(makers))
         # A class of one's own need not tell its parameters.
-        return canonical_json({"given": self.parameters, "policy": found})
+        return (
+            canonical_json({"given": self.parameters, "policy": found})
+            if self.parameters
+            else found
+        )
+
+
+def _copied(policy: Policy) -> Policy:
+    return copy.deepcopy(policy)
+
+
+@functools.lru_cache(maxsize=8)
+def _model(name: str) -> Policy:
+    return StableBaselinesModel(Path(name))
+
+
+@functools.lru_cache(maxsize=8)
+def _loaded(name: str, parameters: str) -> Policy:
+    return load(name, **json.loads(parameters))
 
 
 class KnownPolicy(NamedTuple):

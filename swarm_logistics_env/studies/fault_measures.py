@@ -5,26 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import compress
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.spi import estimate as words
+from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.resilience import SurvivalCurve
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.warehouse.faults import Fault
 
-from .comparisons import Comparison
-from .indicator_table import Finding, findings_of
-from .judged_comparisons import same_runs
+from .comparison import Comparison
 from .results import StudyResults, Times
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .verdict import Verdict, grouped, same_runs
 
 Pair = tuple[Times, Times]
 Outcomes = tuple[Outcome, ...]
@@ -71,8 +69,8 @@ class Resilience:
 
 def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
-    for comparison in mid_run_faults(results)["compared"]:
-        m, n = comparison.changed.setting.value, comparison.original.condition.size
+    for comparison in mid_run_faults(results):
+        m, n = comparison.changed.setting.value, comparison.n_robots
         faulty, whole = map(results.outcomes_of, (comparison.changed, comparison.original))
         removed = results.outcomes_of(comparison.removed) if comparison.removed else None
         if faulty is None or whole is None or (comparison.removed and removed is None):
@@ -93,14 +91,14 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
             yield Resilience(comparison, *indices, single)
 
 
-def mid_run_faults(results: StudyResults) -> pd.DataFrame:
-    """Return a row of the indicators for every fault in mid-run: FT's, or else R's."""
-    late = results.indicators[results.indicators["onset"] > 0]
-    compares = late["compared"].map(lambda compared: compared.removed is not None)
-    fault = [(one.policy, one.table, one.changed) for one in late["compared"]]
-    with_removed = set(compress(fault, compares))
-    kept = [has or one not in with_removed for has, one in zip(compares, fault)]
-    return late[np.array(kept, dtype=np.bool_)]
+def mid_run_faults(results: StudyResults) -> list[Comparison]:
+    """Return a comparison for every fault in mid-run: FT's, or else R's."""
+    late = [one.compared for one in results.verdicts if one.compared.changed.setting.onset > 0]
+    by_fault = grouped(late, lambda one: (one.policy, one.table, one.changed))
+    return [
+        next((one for one in asked if one.removed is not None), asked[0])
+        for asked in by_fault.values()
+    ]
 
 
 def _times(runs: Outcomes) -> Times:
@@ -144,7 +142,7 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
 
 def _repair_curves(comparison: Comparison, pair: Pair, null: Pair) -> tuple[RepairCurve, ...]:
     onset = comparison.changed.setting.onset
-    end = comparison.original.condition.duration
+    end = comparison.original.case.scenario.duration
     curves = []
     for runs, times in (("fault", pair), ("no fault", null)):
         window = window_of(comparison)
@@ -161,44 +159,50 @@ _STEP = 5.0  # s, between the points of a curve
 
 def window_of(comparison: Comparison) -> float:
     """Return the trailing window [s]: 100, or a third of what is left after the onset, rounded."""
-    left = comparison.original.condition.duration - comparison.changed.setting.onset
+    left = comparison.original.case.scenario.duration - comparison.changed.setting.onset
     return min(_LONGEST_WINDOW, float(round(left / 3)) or left / 3)
 
 
-def rate_curves(results: StudyResults, comparison: Comparison) -> pd.DataFrame:
-    """Return the delivery rates without fault, with the robots removed, and with the fault.
+class RateCurve(NamedTuple):
+    """Deliveries over time of one kind of runs.
 
-    Returns:
-        A table with a row for each kind of `runs` and end of the trailing window, `seconds` [s]:
-        `deliveries` in it, mean over seeds [items], between the limits `low` and `high` of its
-        pointwise 95 % t-interval.
+    Attributes:
+        runs: "no fault", "removed" or "fault".
+        seconds: ends of the trailing window [s], shape (k,).
+        deliveries: in the window, mean over seeds [items], shape (k,).
+        low, high: limits of its pointwise 95 % t-interval, shape (k,); NaN at one seed.
     """
-    import pandas as pd
 
-    window = window_of(comparison)
-    end = comparison.original.condition.duration
+    runs: str
+    seconds: NDArray[np.float64]
+    deliveries: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurve, ...]:
+    """Return the delivery rates without fault, with the robots removed, and with the fault."""
+    window, end = window_of(comparison), comparison.original.case.scenario.duration
     seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
-    rows = []
     arms = {
         "no fault": comparison.original,
         "removed": comparison.removed,
         "fault": comparison.changed,
     }
+    curves = []
     for runs, arm in arms.items():
-        if arm is None:
-            continue
-        counts = np.array(
-            [
-                np.searchsorted(times, seconds, side="right")
-                - np.searchsorted(times, seconds - window, side="right")
-                for times in results.times_of(arm) or ()
+        times = results.times_of(arm) if arm else None
+        if times:
+            counts = [
+                np.searchsorted(one, seconds, side="right")
+                - np.searchsorted(one, seconds - window, side="right")
+                for one in times
             ]
-        )
-        rows += [
-            (runs, second, *spi.mean_interval(column)) for second, column in zip(seconds, counts.T)
-        ]
-    frame = pd.DataFrame(rows, columns=["runs", "seconds", "deliveries", "low", "high"])
-    return frame.astype({"low": float, "high": float})
+            limits = np.array(
+                [spi.mean_interval(column) for column in np.transpose(counts)], dtype=np.float64
+            )
+            curves.append(RateCurve(runs, seconds, *limits.T))
+    return tuple(curves)
 
 
 class ModeBudget(NamedTuple):
@@ -214,7 +218,7 @@ class ModeBudget(NamedTuple):
     compared: Comparison
     tested: tuple[int, ...]
     budget: FaultBudget | None
-    verdict: Verdict | None
+    verdict: words.Verdict | None
 
 
 class AnchoringLoad(NamedTuple):
@@ -236,18 +240,18 @@ class AnchoringLoad(NamedTuple):
 
 def fault_budgets(results: StudyResults) -> Iterator[ModeBudget]:
     """Yield the fault budget of every policy, failure mode and onset."""
-    groups: dict[object, list[Finding]] = {}
-    for test in findings_of(results.indicators):
-        if test.indicator == "R":
-            key = test.policy, test.table, test.factor, test.onset
-            groups.setdefault(key, []).append(test)
-    for tests in groups.values():
-        estimates = {int(test.after): test.estimate for test in tests}
-        known = {m: one for m, one in estimates.items() if one is not None}
-        budget = spi.fault_budget(known) if len(known) == len(estimates) else None
-        last = estimates.get(budget.limit) if budget and budget.limit else None
-        verdict = last.answer if last else None
-        yield ModeBudget(tests[0].compared, tuple(estimates), budget, verdict)
+    asked = [one for one in results.verdicts if one.compared.indicator == "R"]
+
+    def mode(one: Verdict) -> tuple[str, str, str, float]:
+        setting = one.compared.changed.setting
+        return one.compared.policy, one.compared.table, setting.name, setting.onset
+
+    for tests in grouped(asked, mode).values():
+        by_m = {int(test.compared.changed.setting.value): test for test in tests}
+        known = {m: test.estimate for m, test in by_m.items() if test.estimate is not None}
+        budget = spi.fault_budget(known) if len(known) == len(by_m) else None
+        last = known.get(budget.limit) if budget and budget.limit else None
+        yield ModeBudget(tests[0].compared, tuple(by_m), budget, last.answer if last else None)
 
 
 def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
@@ -259,8 +263,8 @@ def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
             continue
         if any(outcome.anchoring_seconds is None for outcome in outcomes):
             continue  # the task does not tell
-        (fault,) = comparison.changed.condition.faults
-        if getattr(fault, "intermittent", None) is not None:
+        (fault,) = comparison.changed.case.faults
+        if not isinstance(fault, Fault) or fault.intermittent is not None:
             continue  # how long each robot had failed is not recorded
         end = fault.onset + (fault.duration or math.inf)
         seconds = np.array([outcome.anchoring_seconds for outcome in outcomes], dtype=np.float64)

@@ -27,11 +27,9 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 
-from .indicator_table import findings_of
-from .judged_comparisons import estimate_of, same_runs
-from .performance_table import Cell, Row, cells_of, played
 from .results import StudyResults
-from .runs import seeds_in_words
+from .specification import seeds_in_words
+from .verdict import Cell, judge_one, same_runs
 
 _Content = tuple[object, ...]  # everything about a condition but its policy
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
@@ -118,22 +116,21 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
 
 def _judged(results: StudyResults) -> _Judged:
     """Return each condition of a judged policy once, by the policy's label and by all but it."""
-    plan = results.plan
     # An ablation's second policy may bear the label of a judged one: its place tells them apart.
     second = {
         (comparison.policy, comparison.table, comparison.changed)
-        for comparison in plan.comparisons
+        for comparison in results.plan.comparisons
         if comparison.definition.compares == "policy"
     }
     found: _Judged = {}
-    for cell in cells_of(results.performance):
+    for cell in results.cells:
         if (cell.policy, cell.table, cell.arm) in second:
             continue
-        condition = cell.arm.condition
-        content = (condition.scenario, condition.faults, condition.behaviour)
+        case = cell.arm.case
         # Imported tables may differ in P at one condition.
-        table = "" if plan.imported_from is None else cell.table
-        found.setdefault(cell.policy, {}).setdefault((*content, table), cell)
+        table = "" if results.plan.imported_from is None else cell.table
+        content = (case.scenario, case.faults, case.behaviour, table)
+        found.setdefault(cell.policy, {}).setdefault(content, cell)
     return found
 
 
@@ -296,9 +293,9 @@ def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -
 def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
     # A comparison tested against several thresholds answers once.
     comparisons = dict.fromkeys(
-        replace(test.compared, threshold=gate.number)
-        for test in findings_of(new.indicators)
-        if test.indicator == gate.subject
+        replace(one.compared, threshold=gate.number)
+        for one in new.verdicts
+        if one.compared.indicator == gate.subject
     )
     labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
     for comparison in comparisons:
@@ -307,10 +304,15 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
             name += f" ({comparison.table})"
         if gate.at not in name:
             continue
-        found = estimate_of(
-            comparison, new.by_arm, paired=new.plan.paired, confidence=new.confidence
-        )
-        yield name, found.value if isinstance(found, Estimate) and found.identical else found
+        where = comparison.policy, comparison.table
+        cells = {arm: new.by_place[*where, arm] for arm in comparison.arms}
+        margin = new.plan.specification.margin
+        found = judge_one(comparison, cells, paired=new.plan.paired, margin=margin)
+        estimate = found.estimate
+        if estimate is None:
+            yield name, str(found.problem)
+        else:
+            yield name, estimate.value if estimate.identical else estimate
 
 
 def _changes(gate: Gate, old: StudyResults, new: StudyResults) -> Iterator[tuple[str, _Found]]:
@@ -326,13 +328,9 @@ def _changes(gate: Gate, old: StudyResults, new: StudyResults) -> Iterator[tuple
 def _change(
     gate: Gate, old: StudyResults, new: StudyResults, matched: Match, seeds: Sequence[int] | None
 ) -> _Found:
-    before, after = matched.before, matched.after
-    problem: str | None = before.problem or after.problem
-    if problem:
-        return problem
-    # Over shared seeds the runs of these alone tell whether P is capped.
-    one: Row = before
-    other: Row = after
+    one, other = matched.before, matched.after
+    if one.problem or other.problem:
+        return str(one.problem or other.problem)
     if seeds is not None:
         if not seeds:
             return (
@@ -340,9 +338,10 @@ def _change(
                 f"the new one {seeds_in_words(new.plan.seeds)}; play one of them on the other's "
                 "seeds"
             )
+        # Over shared seeds the runs of these alone tell whether P is capped.
         one, other = (
-            played([results.outcome(cell.arm, seed) for seed in seeds])
-            for results, cell in ((old, before), (new, after))
+            Cell.of(of.policy, of.table, of.arm, [results.outcome(of.arm, seed) for seed in seeds])
+            for results, of in ((old, one), (new, other))
         )
         if same_runs(one.digests, other.digests):
             return 0.0
@@ -351,9 +350,8 @@ def _change(
             one.by_seed,
             other.by_seed,
             threshold=gate.number,
-            confidence=new.confidence,
             paired=seeds is not None,
-            saturated=[name for name, cell in (("p_o", one), ("p_new", other)) if cell.saturated],
+            saturated=[name for name, of in (("p_o", one), ("p_new", other)) if of.saturated],
         )
     except spi.IndicatorError as error:
         return str(error)

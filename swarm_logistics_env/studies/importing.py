@@ -6,24 +6,23 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
 from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, RecordedScenario
-from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.tasks.task import Case, Outcome
 
-from .comparisons import OTHER_BEHAVIOUR, Arm, Comparison, Setting
-from .metadata import Declaration, Origin, notes_of
+from .comparison import OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .declaration import Declaration, Origin, note
 from .plan import Plan
-from .runs import Condition, StudiedPolicy
+from .runs import FILE_NAME, Runs
 from .specification import Specification
-from .store import new_store, refuse_study_in
 
 
 def import_results(
@@ -51,7 +50,8 @@ def import_results(
     Raises:
         StudyError: the file cannot be read, a row of it cannot be, or nothing is compared in it.
     """
-    refuse_study_in(out, "import")
+    if (out / FILE_NAME).exists():  # before the file is read
+        raise StudyError(f"{out} holds a study already: import into a new directory")
     try:
         trials = read_trials(
             file, columns=columns, ignore=ignore, duration=duration, decimal=decimal
@@ -72,22 +72,23 @@ def import_results(
     specification = Specification(
         name=file_name(file.stem),
         task=RECORDED.name,
-        policies=tuple(dict.fromkeys(row.policy for row in trials.rows)),
+        policies=tuple(
+            PolicySpec(name=name) for name in dict.fromkeys(row.policy for row in trials.rows)
+        ),
         seeds=max(map(len, conditions.values())),
     )
     try:
         _refuse_unused(origin, imported_plan(specification, origin))
     except StudyError as error:
         raise StudyError(f"{file}, {error}") from None
-    with new_store(out) as store:
+    with Runs.new(out, "import") as runs:
         for rows in conditions.values():
-            condition = _condition(origin, rows[0])
+            case = _case(origin, rows[0])
             for number, row in enumerate(rows):
-                run = condition.run(RECORDED.code(), number if row.seed is None else row.seed)
-                store.add(run, _outcome(run.key, row))
+                run = case.run(RECORDED.code(), number if row.seed is None else row.seed)
+                runs.add(run, _outcome(row))
         declared = Declaration.model_validate(specification)
-        notes = notes_of(specification, RECORDED.code(), {}, declared)
-        store.note({**notes, "imported": origin.model_dump_json()})
+        note(runs, specification, RECORDED.code(), {}, declared, origin)
     return len(trials.rows)
 
 
@@ -104,7 +105,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         RECORDED.code(),
         {},
         nulls={
-            (arm.condition.policy.label, title): arm
+            (arm.case.policy.title, title): arm
             for title, arms in tables
             for arm in arms[1:]
             if arm.setting == OTHER_BEHAVIOUR
@@ -137,9 +138,8 @@ def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
                 yield Comparison(title, definition.symbol, original, arm, third)
 
 
-def _condition(origin: Origin, row: Trial) -> Condition:
+def _case(origin: Origin, row: Trial) -> Case:
     identity = f"{row.policy}: {origin.file} ({origin.digest})"
-    studied = StudiedPolicy(row.policy, identity, row.policy)
     scenario = RecordedScenario(
         n_robots=row.n_robots or 0,
         duration=row.duration or 0.0,
@@ -147,15 +147,20 @@ def _condition(origin: Origin, row: Trial) -> Condition:
         parameters=row.parameters,
     )
     fault = RecordedFault(mode=row.fault, robots=row.faulty, onset=row.onset)
-    faults = (fault,) if row.faulty else ()
-    task: Any = RECORDED
-    return Condition(studied, scenario, faults, int(row.fault == REPEATED), task=task)
+    return Case(
+        PolicySpec(name=row.policy),
+        identity,
+        scenario,
+        (fault,) if row.faulty else (),
+        int(row.fault == REPEATED),
+        task=RECORDED,
+    )
 
 
-def _outcome(key: str, row: Trial) -> Outcome:
+def _outcome(row: Trial) -> Outcome:
     if row.times is None:
-        return Outcome(key, untimed=row.performance)
-    return Outcome(key, delivery_times=np.array(row.times), ended_at=row.duration or 0.0)
+        return Outcome(untimed=row.performance)
+    return Outcome(delivery_times=np.array(row.times), ended_at=row.duration or 0.0)
 
 
 _Arms = list[Arm]
@@ -209,7 +214,7 @@ def _all_but(varied: str | None) -> Callable[[Trial], _Fixed]:
 
 def _size_arms(origin: Origin, group: Sequence[Trial]) -> _Arms:
     return [
-        Arm(Setting("size", "n_robots", row.n_robots or 0), _condition(origin, row))
+        Arm(Setting("size", "n_robots", row.n_robots or 0), _case(origin, row))
         for row in sorted(group, key=lambda row: row.n_robots or 0)
     ]
 
@@ -226,7 +231,7 @@ def _fault_arms(origin: Origin, group: Sequence[Trial]) -> _Arms:
     # What faults are measured against stands first, then the pair that shows chance alone.
     ordered = sorted(group, key=lambda row: (row.faulty > 0, row.fault == REPEATED))
     return [
-        Arm(Setting("fault", row.fault, row.faulty, row.onset), _condition(origin, row))
+        Arm(Setting("fault", row.fault, row.faulty, row.onset), _case(origin, row))
         for row in ordered
     ]
 
@@ -240,15 +245,14 @@ def _parameter_arms(origin: Origin, name: str, x_o: float, group: Sequence[Trial
             "and A is relative to x_o: let a row with another value stand first"
         )
     return [
-        Arm(Setting("parameter", name, value), _condition(origin, by_value[value]))
-        for value in values
+        Arm(Setting("parameter", name, value), _case(origin, by_value[value])) for value in values
     ]
 
 
 def _refuse_unused(origin: Origin, plan: Plan) -> None:
-    used = {condition.key for condition in plan.conditions}
+    used = {case.key for case in plan.cases}
     for row in origin.trials:
-        if _condition(origin, row).key not in used:
+        if _case(origin, row).key not in used:
             varied = ", ".join(repr(name) for name, _ in row.parameters)
             hint = f"; columns taken for parameters: {varied}" if varied else ""
             raise StudyError(

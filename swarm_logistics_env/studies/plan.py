@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.spi.definitions import comparing
-from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
+from swarm_logistics_env.tasks.task import Case, Run
 
-from .comparisons import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, load_reference
-from .runs import Condition, Run, StudiedPolicy
-from .specification import Ablation, Factor, Faults, Parameter, Sizes, Specification
+from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, load_reference
+from .specification import Ablation, Factor, Faults, Manner, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -64,19 +63,17 @@ class Plan:
         return tuple(dict.fromkeys(cells))
 
     @cached_property
-    def conditions(self) -> tuple[Condition, ...]:
+    def cases(self) -> tuple[Case, ...]:
         """The conditions to run, each once however many comparisons share it."""
-        by_key = {arm.condition.key: arm.condition for _, _, arm in self.cells}
-        return tuple(by_key.values())
+        return tuple({arm.case.key: arm.case for _, _, arm in self.cells}.values())
 
-    def runs(self) -> Iterator[Run]:
-        """Yield every run, seed by seed, so that an interrupted study has complete seeds."""
-        for seed in self.seeds:
-            for condition in self.conditions:
-                yield condition.run(self.code, seed)
+    @cached_property
+    def runs(self) -> tuple[Run, ...]:
+        """Every run, seed by seed, so that an interrupted study has complete seeds."""
+        return tuple(case.run(self.code, seed) for seed in self.seeds for case in self.cases)
 
     def __str__(self) -> str:
-        asked, run = len(self.cells), len(self.conditions)
+        asked, run = len(self.cells), len(self.cases)
         start = self.specification.first_seed
         first = f" from {start} on" if start else ""
         most = "at most " if self.specification.until_clear else ""
@@ -106,19 +103,15 @@ def make_plan(
     """
     load_reference(specification.reference)  # a name that is wrong is told before anything is run
     known: dict[str, str] = {}
+    task = specification.played
 
-    def policy_of(part: str, source: object) -> StudiedPolicy:
-        if identities is None:
-            identity = policy_identity(source, specification.played.policies)
-            policy = StudiedPolicy(policy_label(source), identity, source)
-        elif part in identities:
-            policy = StudiedPolicy(policy_label(source), identities[part], source)
-        else:
+    def case_of(part: str, policy: PolicySpec) -> Case:
+        if identities is not None and part not in identities:
             raise StudyError(f"the study does not know the identity of its {part}")
-        known[part] = policy.identity
-        return policy
+        known[part] = identities[part] if identities else policy.identity(task.policies)
+        return Case(policy, known[part], specification.scenario, task=task)
 
-    asked = _asked(specification, policy_of)
+    asked = _asked(specification, case_of)
     # What two factors ask alike is asked once, or Holm's family would count it twice.
     comparisons = tuple(
         dict.fromkeys(one for one in asked if one.indicator in specification.indicators)
@@ -132,7 +125,7 @@ def make_plan(
         )
     # Only comparisons with the robots removed have a time to come back, which needs the null.
     nulls = {
-        (one.policy, one.table): Arm(OTHER_BEHAVIOUR, replace(one.original.condition, behaviour=1))
+        (one.policy, one.table): Arm(OTHER_BEHAVIOUR, replace(one.original.case, behaviour=1))
         for one in comparisons
         if one.removed and one.changed.setting.onset
     }
@@ -144,7 +137,7 @@ def _refuse_one_name_for_two(comparisons: Sequence[Comparison]) -> None:
     for comparison in comparisons:
         for arm in comparison.arms:
             place = comparison.policy, comparison.table, arm.setting
-            if found.setdefault(place, arm.condition.key) != arm.condition.key:
+            if found.setdefault(place, arm.case.key) != arm.case.key:
                 raise StudyError(
                     f"title = {comparison.table!r} heads {str(arm.setting)!r} under two different "
                     "conditions: each factor should have a title of its own"
@@ -152,23 +145,23 @@ def _refuse_one_name_for_two(comparisons: Sequence[Comparison]) -> None:
 
 
 def _asked(
-    specification: Specification, policy_of: Callable[[str, object], StudiedPolicy]
+    specification: Specification, case_of: Callable[[str, PolicySpec], Case]
 ) -> Iterator[Comparison]:
     lesser = [
-        (ablation, policy_of(f"ablation {number}", ablation.policy))
+        (ablation, case_of(f"ablation {number}", ablation.policy))
         for number, ablation in enumerate(specification.ablations, start=1)
     ]
-    for source in specification.policies:
-        policy = policy_of(f"policy {policy_label(source)}", source)
+    for policy in specification.policies:
+        base = case_of(f"policy {policy.title}", policy)
         for sizes in specification.sizes:
-            yield from _scalability(specification, sizes, policy)
+            yield from _scalability(specification, sizes, base)
         for faults in specification.faults:
-            yield from _robustness(specification, faults, policy)
+            yield from _robustness(specification, faults, base)
         for parameter in specification.parameters:
-            yield from _adaptability(specification, parameter, policy)
+            yield from _adaptability(specification, parameter, base)
         for ablation, part in lesser:
-            if part.identity != policy.identity:
-                yield from _ablation(specification, ablation, policy, part)
+            if part.identity != base.identity:
+                yield from _ablation(specification, ablation, base, part)
 
 
 def _title(factor: Factor, general: str, manner: str = "") -> str:
@@ -176,13 +169,13 @@ def _title(factor: Factor, general: str, manner: str = "") -> str:
     return factor.title or (f"{general} ({', '.join(changes)})" if changes else general)
 
 
-def _scalability(asked: Specification, sizes: Sizes, policy: StudiedPolicy) -> Iterator[Comparison]:
+def _scalability(asked: Specification, sizes: Sizes, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons between neighbouring swarm sizes."""
     task, table = asked.played, _title(sizes, "Scalability")
     arms = {}
     for size in sizes.values:
         scenario = task.vary(asked.scenario, {**sizes.scenario, "n_robots": size})
-        arms[size] = Arm(Setting("size", "n_robots", size), Condition(policy, scenario, task=task))
+        arms[size] = Arm(Setting("size", "n_robots", size), replace(base, scenario=scenario))
     steps = list(zip(sizes.values, sizes.values[1:]))
     for definition in comparing("size"):
         for small, large in steps:
@@ -200,9 +193,7 @@ def _scalability(asked: Specification, sizes: Sizes, policy: StudiedPolicy) -> I
                 )
 
 
-def _robustness(
-    asked: Specification, faults: Faults, policy: StudiedPolicy
-) -> Iterator[Comparison]:
+def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Comparison]:
     """Yield the indicators of every mode, m and onset.
 
     An indicator that needs robots removed is left out where the task cannot remove any.
@@ -221,14 +212,12 @@ def _robustness(
                 f"faults.onsets = {onset:g} s: should be less than duration = "
                 f"{scenario.duration:g} s, or nothing fails"
             )
-    original = Arm(NO_FAULT, Condition(policy, scenario, task=task))
+    original = Arm(NO_FAULT, replace(base, scenario=scenario))
 
-    def arm(mode: str, m: int, onset: float, duration: float | None, manner: dict[str, Any]) -> Arm:
-        fault = task.fault(mode, m, onset, duration)
-        if manner:
-            fault = fault.replace(**manner)
-        condition = Condition(policy, scenario, (fault,), task=task)
-        return Arm(Setting("fault", mode, m, onset), condition)
+    def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Manner) -> Arm:
+        fault = task.fault(mode, m, onset, lasts, **manner)
+        case = replace(base, scenario=scenario, faults=(fault,))
+        return Arm(Setting("fault", mode, m, onset), case)
 
     wanted = [one for one in comparing("fault") if one.symbol in asked.indicators]
     if task.removed is None:
@@ -240,16 +229,13 @@ def _robustness(
             yield Comparison(table, definition.symbol, original, failed, third)
 
 
-def _adaptability(
-    asked: Specification, parameter: Parameter, policy: StudiedPolicy
-) -> Iterator[Comparison]:
+def _adaptability(asked: Specification, parameter: Parameter, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
     name, task = parameter.name, asked.played
     table, arms = _title(parameter, f"Adaptability to {name}"), []
     for value in parameter.values:
         scenario = task.vary(asked.scenario, {**parameter.scenario, name: value})
-        condition = Condition(policy, scenario, task=task)
-        arms.append(Arm(Setting("parameter", name, value), condition))
+        arms.append(Arm(Setting("parameter", name, value), replace(base, scenario=scenario)))
     original, *changed = arms
     for definition in comparing("parameter"):
         for arm in changed:
@@ -257,13 +243,18 @@ def _adaptability(
 
 
 def _ablation(
-    asked: Specification, ablation: Ablation, policy: StudiedPolicy, lesser: StudiedPolicy
+    asked: Specification, ablation: Ablation, base: Case, lesser: Case
 ) -> Iterator[Comparison]:
-    task, table = asked.played, _title(ablation, "Ablation")
-    scenario = task.vary(asked.scenario, ablation.scenario)
+    table, scenario = (
+        _title(ablation, "Ablation"),
+        asked.played.vary(asked.scenario, ablation.scenario),
+    )
     whole, part = (
-        Arm(Setting("policy", one.label, scenario.n_robots), Condition(one, scenario, task=task))
-        for one in (policy, lesser)
+        Arm(
+            Setting("policy", case.policy.title, scenario.n_robots),
+            replace(case, scenario=scenario),
+        )
+        for case in (base, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".
     threshold = -ablation.fall if ablation.fall else 0.0

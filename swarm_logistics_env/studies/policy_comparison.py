@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,15 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 
-from .comparisons import Comparison, Setting
-from .indicator_table import Finding, findings_of
-from .performance_table import Cell, cells_of, groups_of
 from .results import StudyResults
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .verdict import Cell, Verdict, grouped
 
 
 class CellAgainstBaseline(NamedTuple):
     """P of one policy in one cell, beside that of the baseline, the study's first policy.
 
     Attributes:
-        cell: the policy's row in the table of performances.
+        cell: of the policy.
         interquartile_mean, worst_decile: these statistics of its P [items].
         difference: its P minus the baseline's, paired by seed, with 95 % interval [items]; None
             for the baseline itself, or if runs are missing or share no seeds.
@@ -48,96 +43,81 @@ class IndicatorAgainstBaseline(NamedTuple):
     """One question asked of every policy.
 
     Attributes:
-        tests: rows of the table of indicators by policy, the baseline first.
+        tests: the verdicts by policy, the baseline first.
         differences: each further policy's indicator less the baseline's with 95 % jackknife
             interval; None where it is undefined.
     """
 
-    tests: dict[str, Finding]
+    tests: dict[str, Verdict]
     differences: dict[str, Interval | None]
 
     @property
-    def test(self) -> Finding:
-        """The first policy's row, for what is the same for all of them."""
+    def test(self) -> Verdict:
+        """The first policy's verdict, for what is the same for all of them."""
         return next(iter(self.tests.values()))
-
-
-def judged_policies(results: StudyResults) -> tuple[str, ...]:
-    """Return the labels of the study's policies, the baseline first."""
-    return tuple(dict.fromkeys(results.indicators["policy"]))
 
 
 def cells_against_baseline(results: StudyResults) -> dict[str, list[CellAgainstBaseline]]:
     """Return, table by table, every cell of every policy; the policies of a cell one by one."""
-    found: dict[str, dict[Setting, list[Cell]]] = {}
-    for cell in cells_of(results.performance):
-        if cell.kind != "policy" and cell.n_seeds:
-            found.setdefault(cell.table, {}).setdefault(cell.arm.setting, []).append(cell)
+    known = [c for c in results.cells if c.arm.setting.kind != "policy" and c.n_seeds]
     return {
         table: [
-            _cell_against_baseline(results, cell, cells[0])
-            for cells in by_setting.values()
+            _against_baseline(results, cell, cells[0])
+            for cells in grouped(here, lambda cell: cell.arm.setting).values()
             for cell in cells
         ]
-        for table, by_setting in found.items()
+        for table, here in grouped(known, lambda cell: cell.table).items()
     }
 
 
-def _cell_against_baseline(
-    results: StudyResults, cell: Cell, baseline: Cell
-) -> CellAgainstBaseline:
-    p = cell.by_seed
+def _against_baseline(results: StudyResults, cell: Cell, baseline: Cell) -> CellAgainstBaseline:
+    p, p_o = cell.by_seed, baseline.by_seed
     summaries = spi.interquartile_mean(p), spi.worst_decile(p)
-    is_baseline = cell is baseline or baseline.policy != judged_policies(results)[0]
+    is_baseline = cell is baseline or baseline.policy != results.policies[0]
     if is_baseline or cell.problem or baseline.problem or not results.plan.paired:
         return CellAgainstBaseline(cell, *summaries)
-    return CellAgainstBaseline(
-        cell,
-        *summaries,
-        t_interval(p - baseline.by_seed),
-        _ratio(baseline.by_seed, p),
-        spi.probability_of_improvement(baseline.by_seed, p),
-    )
+    ratio = None
+    if p_o.any():  # else there is nothing to divide by
+        value, low, high = (
+            None if x is None else 1.0 + x for x in _limits(spi.relative_change(p_o, p))
+        )
+        ratio = None if value is None else Interval(value, low, high)
+    improvement = spi.probability_of_improvement(p_o, p)
+    return CellAgainstBaseline(cell, *summaries, t_interval(p - p_o), ratio, improvement)
 
 
-def _ratio(baseline: NDArray[np.float64], performance: NDArray[np.float64]) -> Interval | None:
-    try:
-        change = spi.relative_change(baseline, performance)
-    except spi.IndicatorError:  # nothing to divide by
-        return None
-    low, high = (None if limit is None else 1.0 + limit for limit in (change.low, change.high))
-    return Interval(1.0 + change.value, low, high)
+def _limits(estimate: spi.Estimate) -> tuple[float, float | None, float | None]:
+    return estimate.value, estimate.low, estimate.high
 
 
 def indicators_against_baseline(results: StudyResults) -> Iterator[IndicatorAgainstBaseline]:
     """Yield every question that more than one policy was asked, with the differences."""
-    baseline = judged_policies(results)[0]
-    asked: dict[object, dict[str, Finding]] = {}
-    for test in findings_of(results.indicators):
-        if test.kind != "policy":
-            asked.setdefault((test.table, test.compared.question), {})[test.policy] = test
-    for tests in asked.values():
+    baseline = results.policies[0]
+    compared = [one for one in results.verdicts if one.compared.changed.setting.kind != "policy"]
+    for tests in grouped(compared, lambda v: (v.compared.table, v.compared.question)).values():
         if len(tests) > 1:
+            by_policy = {test.compared.policy: test for test in tests}
+            first = by_policy.get(baseline)
             differences = {
-                policy: _difference(results, tests[baseline], test) if baseline in tests else None
-                for policy, test in tests.items()
+                policy: _difference(results, first, test) if first else None
+                for policy, test in by_policy.items()
                 if policy != baseline
             }
-            yield IndicatorAgainstBaseline(tests, differences)
+            yield IndicatorAgainstBaseline(by_policy, differences)
 
 
-def _difference(results: StudyResults, baseline: Finding, test: Finding) -> Interval | None:
+def _difference(results: StudyResults, baseline: Verdict, test: Verdict) -> Interval | None:
     if baseline.estimate is None or test.estimate is None or not results.plan.paired:
         return None
 
-    def value(compared: Comparison, seeds: NDArray[np.intp]) -> float:
-        key = compared.policy, compared.table
-        return compared.estimate(lambda arm: results.by_arm[*key, arm].by_seed[seeds]).value
+    def value(one: Verdict, seeds: NDArray[np.intp]) -> float:
+        where = one.compared.policy, one.compared.table
+        samples = {arm: results.by_place[*where, arm].by_seed[seeds] for arm in one.compared.arms}
+        return one.compared.estimate(samples).value
 
     try:
         return jackknife_interval(
-            len(results.plan.seeds),
-            lambda seeds: value(test.compared, seeds) - value(baseline.compared, seeds),
+            len(results.plan.seeds), lambda seeds: value(test, seeds) - value(baseline, seeds)
         )
     except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
         return None
@@ -165,11 +145,11 @@ def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], flo
 
 @dataclass(frozen=True)
 class Agreement:
-    """The figures of one policy.
+    """How near one policy comes to the reference.
 
     Attributes:
         policy: its label.
-        cells: rows of the table of performances, those of the reference's cells.
+        cells: those of the reference's tables.
         misses: those whose published value lies outside our 95 % prediction interval of one run: a
             weak test, which quite different policies pass as well. None at one seed.
         met: those whose published value lies inside the 95 % interval of our mean. None as above.
@@ -183,9 +163,9 @@ class Agreement:
     """
 
     policy: str
-    cells: pd.DataFrame
-    misses: pd.DataFrame | None
-    met: pd.DataFrame | None
+    cells: tuple[Cell, ...]
+    misses: tuple[Cell, ...] | None
+    met: tuple[Cell, ...] | None
     mean_relative_error: float
     mean_log_error: float | None
     mean_interval_width: float | None
@@ -194,37 +174,47 @@ class Agreement:
 
 
 def agreements(results: StudyResults) -> tuple[Agreement, ...]:
-    """Return the figures of every policy all of whose cells have runs; none without reference."""
-    counted = results.performance[results.performance["counted"]]
+    """Return the agreement of every policy all of whose cells have runs; none without reference."""
+    counted = grouped([cell for cell in results.cells if cell.counted], lambda cell: cell.policy)
     return tuple(
         agreement(policy, cells)
-        for policy, cells in groups_of(counted, "policy")
-        if cells["problem"].isna().all()
+        for policy, cells in counted.items()
+        if not any(cell.problem for cell in cells)
     )
 
 
-def agreement(policy: str, cells: pd.DataFrame) -> Agreement:
-    """Return the figures of these cells, all of them with a published value and with runs."""
-    published = cells["published"]
-    ratio = cells["mean"] / published
-    width = cells["prediction_high"] - cells["prediction_low"]
-    has_intervals = bool(width.notna().any())
+def agreement(policy: str, cells: Sequence[Cell]) -> Agreement:
+    """Return the agreement of these cells, all of them with a published value and with runs."""
+    known = [(cell, cell.published) for cell in cells if cell.published is not None]
+    ratio = np.array([cell.mean.value / published for cell, published in known])
+    width = [
+        c.one_run.high - c.one_run.low
+        for c in cells
+        if c.one_run.high and c.one_run.low is not None
+    ]
+    met = [
+        cell
+        for cell, p in known
+        if cell.mean.low is not None and cell.mean.low <= p <= (cell.mean.high or 0.0)
+    ]
     # Beyond the peak the published fall is within one run's noise.
-    sizes = cells[cells["kind"] == "size"]
-    largest = 0 if sizes.empty else int(sizes["value"].iloc[sizes["published"].argmax()])
-    ordered = cells_of(sizes[sizes["value"] <= largest].sort_values("published", kind="stable"))
+    sizes = [(cell, p) for cell, p in known if cell.arm.setting.kind == "size"]
+    largest = max(sizes, key=lambda one: one[1])[0].arm.setting.value if sizes else 0.0
+    ordered = sorted(
+        (one for one in sizes if one[0].arm.setting.value <= largest), key=lambda one: one[1]
+    )
     return Agreement(
         policy,
-        cells,
-        cells[~cells["published_inside"].eq(True)] if has_intervals else None,
-        cells[published.between(cells["low"], cells["high"])] if has_intervals else None,
-        float((ratio - 1.0).abs().mean()),
+        tuple(cells),
+        tuple(cell for cell in cells if not cell.published_inside) if width else None,
+        tuple(met) if width else None,
+        float(np.abs(ratio - 1.0).mean()),
         float(np.abs(np.log(ratio)).mean()) if ratio.all() else None,
-        float(width.mean()) if has_intervals else None,
+        float(np.mean(width)) if width else None,
         tuple(
             (a, b)
-            for a, b in combinations(ordered, 2)
-            if a.published < b.published and a.low > b.high
+            for (a, p), (b, more) in combinations(ordered, 2)
+            if p < more and a.mean.low is not None and a.mean.low > (b.mean.high or np.inf)
         ),
-        largest,
+        int(largest),
     )

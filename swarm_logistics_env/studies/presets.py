@@ -11,7 +11,7 @@ from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, suggest
 
-from .comparisons import NO_FAULT, Question, Reference, Setting
+from .comparison import NO_FAULT, Question, Reference, Setting
 from .specification import Specification, read_study_file
 
 

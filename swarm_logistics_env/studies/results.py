@@ -1,12 +1,11 @@
-"""StudyResults: what the finished runs of a study say, as two tables; the seeds it would need."""
+"""StudyResults: what the finished runs of a study say, in cells and verdicts; the seeds needed."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +13,15 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.tasks.task import Outcome
 
-from .comparisons import Arm, Reference, load_reference
-from .indicator_table import Finding, findings_of, indicator_table
-from .judged_comparisons import CONFIDENCE, CellKey, judge_all
-from .metadata import Declaration
-from .performance_table import Cell, cells_of, performance_table
+from .comparison import Arm, Reference, load_reference
+from .declaration import Declaration
 from .plan import Plan
+from .runs import Outcomes
 from .until_clear import standing
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .verdict import Cell, Verdict, judge_one, under_holm
 
 Times = tuple[NDArray[np.float64], ...]
+Place = tuple[str, str, Arm]  # of a cell: policy, table, arm
 
 
 @dataclass(frozen=True)
@@ -36,14 +32,11 @@ class StudyResults:
         plan: of the study; of one that runs until it is clear, over the seeds that all conditions
             share.
         reference: what the study is compared with; None: nothing.
-        performance: P of every policy and condition; its columns are those of
-            `performance_table.PERFORMANCE`, with P seed by seed in `by_seed`.
-        indicators: every comparison; its columns are those of `indicator_table.INDICATORS`.
+        cells: P of every policy and condition, in the order of the report.
+        verdicts: on every comparison, in the order of the plan.
         exploratory: whether the seeds are not those that were declared at the study's start, or the
             look is none of them, so that the verdicts' error level is not the nominal one.
-        outcomes: of the plan's runs, by key: delivery times and what else P does not tell.
-        confidence: confidence level of the indicators' intervals and verdicts; above 0.95 at a
-            declared look, so that all looks together err in 5 %.
+        outcomes: of the plan's runs: delivery times and what else P does not tell.
         looks: numbers of seeds at which comparisons may stop, of a study that runs until it is
             clear.
         late_margin: whether another margin of equivalence was declared before the first run, so
@@ -52,22 +45,26 @@ class StudyResults:
 
     plan: Plan
     reference: Reference | None
-    performance: pd.DataFrame
-    indicators: pd.DataFrame
+    cells: tuple[Cell, ...]
+    verdicts: tuple[Verdict, ...]
     exploratory: bool
-    outcomes: Mapping[str, Outcome]
-    confidence: float = CONFIDENCE
+    outcomes: Outcomes = field(repr=False)
     looks: tuple[int, ...] = ()
     late_margin: bool = False
 
     @cached_property
-    def by_arm(self) -> dict[CellKey, Cell]:
-        """The rows of `performance` by policy, table and arm."""
-        return _by_arm(self.performance)
+    def by_place(self) -> dict[Place, Cell]:
+        """The cells by policy, table and arm."""
+        return {(one.policy, one.table, one.arm): one for one in self.cells}
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """Labels of the policies that are judged, the baseline first."""
+        return tuple(dict.fromkeys(one.compared.policy for one in self.verdicts))
 
     def outcome(self, arm: Arm, seed: int) -> Outcome | None:
         """Return what an arm's run at a seed gave; None: it failed, or is missing."""
-        found = self.outcomes.get(arm.condition.run(self.plan.code, seed).key)
+        found = self.outcomes.get((arm.case.key, seed))
         return None if found is None or found.error is not None else found
 
     def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...] | None:
@@ -84,33 +81,52 @@ class StudyResults:
         return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)
 
 
-def judge(
-    plan: Plan,
-    outcomes: Mapping[str, Outcome],
-    declared: Declaration | None = None,
-) -> StudyResults:
-    """Judge a plan by the outcomes of its runs, keyed by run.
+def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -> StudyResults:
+    """Judge a plan by the outcomes of its runs.
 
     Args:
         plan: of the study.
-        outcomes: of its runs, by key.
+        outcomes: of its runs, by the key of the case and the seed.
         declared: what was declared before the first run; None: what the plan says.
     """
     margin = plan.specification.margin
     reference = load_reference(plan.specification.reference)
-    exploratory = declared is not None and not declared.covers(plan)
     looks = declared.looks if declared else plan.specification.looks
-    found = None
+    exploratory = declared is not None and not declared.covers(plan)
+    verdicts: Sequence[Verdict] = ()
     if plan.specification.until_clear:
         found = standing(plan, outcomes)
         plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
-    performance = performance_table(plan, outcomes, reference)
-    judged = found.judged if found else judge_all(plan, _by_arm(performance))
+        verdicts = found.verdicts
+    cells = tuple(
+        Cell.of(
+            policy,
+            table,
+            arm,
+            [outcomes.get((arm.case.key, seed)) for seed in plan.seeds],
+            paired=plan.paired,
+            reference=reference,
+        )
+        for policy, table, arm in plan.cells
+    )
+    by_table: dict[tuple[str, str], dict[Arm, Cell]] = {}
+    for one in cells:
+        by_table.setdefault((one.policy, one.table), {})[one.arm] = one
+    verdicts = verdicts or [
+        *under_holm(
+            [
+                judge_one(
+                    each, by_table[each.policy, each.table], paired=plan.paired, margin=margin
+                )
+                for each in plan.comparisons
+            ]
+        )
+    ]
     return StudyResults(
         plan,
         reference,
-        performance,
-        indicator_table(judged, reference, margin),
+        cells,
+        tuple(_beside(reference, one) for one in verdicts),
         exploratory=exploratory,
         outcomes=outcomes,
         looks=looks,
@@ -118,15 +134,22 @@ def judge(
     )
 
 
-def _by_arm(performance: pd.DataFrame) -> dict[CellKey, Cell]:
-    return {(row.policy, row.table, row.arm): row for row in cells_of(performance)}
+def _beside(reference: Reference | None, verdict: Verdict) -> Verdict:
+    """Return a verdict with what the study or its reference claims, and what was published."""
+    claimed, published = verdict.compared.claim, None
+    if reference:
+        known = reference.estimate(verdict.compared)
+        published = known.value if known else None
+        if claimed is None:
+            claimed = reference.claims.get(verdict.compared.question)
+    return replace(verdict, claimed=claimed, published=published)
 
 
 class Demand(NamedTuple):
     """The number of seeds that one comparison needs.
 
     Attributes:
-        test: the row of the pilot's table of indicators.
+        test: the pilot's verdict.
         effect: assumed true value of the indicator: the one named, or the published one.
         seeds: for a verdict at that effect with the wanted power on average; None: `problem` says
             why.
@@ -137,7 +160,7 @@ class Demand(NamedTuple):
             0; None: it is not asked, or the pilot shows no spread.
     """
 
-    test: Finding
+    test: Verdict
     effect: float | None
     seeds: int | None = None
     least_power: float | None = None
@@ -162,17 +185,16 @@ def demands(
     Raises:
         IndicatorError: effect not finite, power outside (0, 1).
     """
-    return tuple(_demand(test, effect, power) for test in findings_of(results.indicators))
+    return tuple(_demand(test, effect, power) for test in results.verdicts)
 
 
-def _demand(test: Finding, effect: float | None, power: float) -> Demand:
+def _demand(test: Verdict, effect: float | None, power: float) -> Demand:
     estimate = test.estimate
-    if effect is None and not math.isnan(test.published):
-        effect = test.published
+    effect = test.published if effect is None else effect
     if estimate is None:
         return Demand(test, effect, problem=test.problem)
     detectable = spi.minimum_detectable_effect(estimate, power)
-    equivalence = test.equivalence_test
+    equivalence = test.equivalence
     unchanged = spi.seeds_for_equivalence(equivalence, power) if equivalence else None
     if effect is None:
         no_effect = "no effect is named"

@@ -1,154 +1,374 @@
-"""Conditions, known by their content, the runs that one condition needs, and shards of runs."""
+"""Runs: what was played, one row a run, in one SQLite file that many processes may open."""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import KW_ONLY, dataclass, field
-from functools import cached_property
-from itertools import islice, pairwise
-from typing import Any, Self
+import json
+import os
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
 
-from swarm_logistics_env import streams
+from pydantic import TypeAdapter
+
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import canonical_json
-from swarm_logistics_env.tasks.task import DEFAULT, Task
+from swarm_logistics_env.records import becoming, canonical_json
+from swarm_logistics_env.tasks.task import Outcome, Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FILE_NAME = "study.sqlite"
+SCHEMA_VERSION = 4
+TIMEOUT = 60.0  # s, for other processes that write
+APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
+
+_SCHEMA = (
+    "CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
+    """CREATE TABLE runs (
+        key TEXT PRIMARY KEY,    -- digest of all that decides the outcome
+        run TEXT NOT NULL,       -- JSON: policy, conditions, code and seed
+        failed INTEGER NOT NULL,
+        outcome TEXT NOT NULL,   -- JSON: all of it but the wall time
+        wall_seconds REAL NOT NULL
+    )""",
+)
+# A run that failed before is replaced, one that succeeded stays.
+_REPLACE = """ON CONFLICT (key) DO UPDATE SET failed = excluded.failed, outcome = excluded.outcome,
+    wall_seconds = excluded.wall_seconds WHERE runs.failed"""
+_CLASH = """SELECT key, json_extract(runs.run, '$.seed') FROM main.runs JOIN other.runs AS theirs
+    USING (key) WHERE NOT (runs.failed OR theirs.failed) AND runs.outcome != theirs.outcome"""
+
+# SQLite's codes of a write that did not fit: of the file itself, of its log, of the log's index.
+_FULL = (
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_IOERR_WRITE,
+    sqlite3.SQLITE_IOERR_SHMSIZE,
+    sqlite3.SQLITE_IOERR_SHMOPEN,
+)
+_OUTCOME = TypeAdapter(Outcome)
+
+Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the seed
 
 
-@dataclass(frozen=True)
-class StudiedPolicy:
-    """A policy as a study knows it.
-
-    Attributes:
-        label: how the report calls it.
-        identity: stable text of its class, parameters and weights; two of one identity are one.
-        source: what makes it, for `policy_choice.policy_of`.
-    """
-
-    label: str
-    identity: str
-    source: object = field(compare=False, repr=False)
+class FullDiskError(StudyError):
+    """A store that cannot be written, because there is no room on its disk."""
 
 
-@dataclass(frozen=True)
-class Condition:
-    """All of a run but its seed. Conditions of equal content have equal keys and share runs.
+class Runs:
+    """The finished runs of a study. A run is kept from the moment that `add` returns.
 
-    Attributes:
-        policy, scenario, faults: what is played, under which conditions of the task's own types.
-        behaviour: 0: the policy's randomness follows from the run's seed; another number: from
-            that number as well, so that the same worlds are met by another behaviour.
-        task: that plays it.
-    """
+    Every error of SQLite becomes a StudyError that names the file.
 
-    policy: StudiedPolicy
-    scenario: Any
-    faults: tuple[Any, ...] = ()
-    behaviour: int = 0
-    _: KW_ONLY
-    task: Task = field(compare=False, repr=False)
-
-    @property
-    def size(self) -> int:
-        """Swarm size N."""
-        return int(self.scenario.n_robots)
-
-    @property
-    def duration(self) -> float:
-        """Time at which a run ends at the latest [s]."""
-        return float(self.scenario.duration)
-
-    @cached_property
-    def scenario_json(self) -> str:
-        """The scenario as canonical JSON."""
-        return canonical_json(self.scenario.model_dump(mode="json"))
-
-    @cached_property
-    def faults_json(self) -> str:
-        """The faults as canonical JSON, in the order in which they were given."""
-        return canonical_json([fault.model_dump(mode="json") for fault in self.faults])
-
-    @cached_property
-    def key(self) -> str:
-        """Digest of scenario, faults, policy identity and behaviour, 64 hexadecimal digits."""
-        return _digest(*self._content)
-
-    @property
-    def _content(self) -> tuple[str, ...]:
-        # Behaviour 0 and the warehouse add nothing, so that keys of older stores stay valid.
-        other = (str(self.behaviour),) if self.behaviour else ()
-        if self.task.name != DEFAULT:
-            other = (*other, f"task {self.task.name}")
-        return (self.scenario_json, self.faults_json, self.policy.identity, *other)
-
-    def run(self, code: str, seed: int) -> Run:
-        """Return the run of this condition at one seed, under one version of the code."""
-        return Run(_digest(*self._content, code, str(seed)), self, code, seed)
-
-
-@dataclass(frozen=True)
-class Run:
-    """One episode to play. `key` is the digest of everything that decides its outcome."""
-
-    key: str
-    condition: Condition
-    code: str
-    seed: int
-
-    @property
-    def policy_seed(self) -> int:
-        """Seed of the policy's own randomness."""
-        behaviour = self.condition.behaviour
-        if not behaviour:
-            return self.seed
-        # 31 bits: policies hand it to generators of all kinds.
-        return streams.key(self.seed, "other behaviour", behaviour) & 0x7FFFFFFF
-
-
-@dataclass(frozen=True)
-class Shard:
-    """Part `number` of `count`, counted from 1.
+    Args:
+        path: the file, made where it is missing; None: kept in memory only.
+        read_only: write nothing, neither into the file nor beside it.
 
     Raises:
-        StudyError: there is no such part.
+        StudyError: the file is not a store, or its schema is not this version's.
     """
 
-    number: int
-    count: int
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.number <= self.count:
-            raise StudyError(f"shard {self}: should be i/n with i from 1 to n")
+    def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
+        self.path = path
+        self._read_only = read_only
+        place = str(path or ":memory:")
+        if path is not None and read_only:
+            _refuse_unmerged(path)
+            # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
+            place = f"{path.absolute().as_uri()}?immutable=1"
+        with self._explained():
+            # Autocommit: transactions are opened by hand, one per run.
+            self._connection = sqlite3.connect(
+                place, timeout=TIMEOUT, isolation_level=None, uri=read_only
+            )
+            try:
+                self._prepare()
+            except BaseException:
+                self._connection.close()
+                raise
 
     @classmethod
-    def parse(cls, text: str) -> Self:
-        """Return the shard that "i/n" means."""
-        match = re.fullmatch(r"(\d+)/(\d+)", text)
-        if match is None:
-            raise StudyError(f"shard {text}: should be i/n, e.g. 2/8")
-        return cls(int(match[1]), int(match[2]))
+    def existing(cls, directory: Path) -> Self:
+        """Open the store of a study that was run before; to read, where it may not be written.
 
-    def __str__(self) -> str:
-        return f"{self.number}/{self.count}"
+        Raises:
+            StudyError: there is none.
+        """
+        path = directory / FILE_NAME
+        if not path.is_file():
+            raise StudyError(f"no study in {directory}: there is no file {path}")
+        if os.access(path, os.W_OK) and os.access(directory, os.W_OK):
+            with contextlib.suppress(FullDiskError):  # which it can be read on
+                return cls(path)
+        return cls(path, read_only=True)
 
-    @property
-    def directory(self) -> str:
-        """Name of the directory of its store: shards on one disk never share a file."""
-        return f"shard-{self.number}-of-{self.count}"
+    @classmethod
+    @contextmanager
+    def new(cls, out: Path, way: str) -> Iterator[Self]:
+        """Yield an empty store; what was written into it is that of `out` once the block ends well.
 
-    def of(self, runs: Iterable[Run]) -> Iterator[Run]:
-        """Yield every n-th run from the i-th on."""
-        # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
-        return islice(runs, self.number - 1, None, self.count)
+        Killed or failed before, it leaves nothing that looks like a store.
+
+        Args:
+            way: what is done, for errors, e.g. "merge".
+
+        Raises:
+            StudyError: `out` holds a study, or cannot be written.
+        """
+        if (out / FILE_NAME).exists():
+            raise StudyError(f"{out} holds a study already: {way} into a new directory")
+        unfinished = out / f"{FILE_NAME}.unfinished"
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            unfinished.unlink(missing_ok=True)
+        except OSError as error:
+            raise StudyError(f"cannot write to {out}: {error.strerror}") from error
+        try:
+            with cls(unfinished) as runs:
+                yield runs
+            unfinished.rename(out / FILE_NAME)
+        finally:
+            for left in out.glob(f"{unfinished.name}*"):
+                left.unlink()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    def __len__(self) -> int:
+        ((count,),) = self._read("SELECT count(*) FROM runs")
+        return int(count)
+
+    def add(self, run: Run, outcome: Outcome) -> None:
+        """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
+        result = _OUTCOME.dump_json(outcome, exclude={"wall_seconds"}).decode()
+        failed = outcome.error is not None
+        row = (run.key, canonical_json(_described(run)), failed, result, outcome.wall_seconds)
+        with self._transaction():
+            self._connection.execute(f"INSERT INTO runs VALUES (?, ?, ?, ?, ?) {_REPLACE}", row)
+
+    def absorb(self, path: Path) -> None:
+        """Add the runs of another store, to which `add`'s rule applies.
+
+        Raises:
+            StudyError: the file is not a store, or has another result of a run that is here.
+        """
+        Runs(path).close()
+        with self._explained():
+            self._connection.execute("ATTACH ? AS other", (str(path),))
+        try:
+            with self._transaction():
+                for key, seed in self._read(_CLASH):
+                    raise StudyError(
+                        f"{path} has another result than the stores before it for the run {key} "
+                        f"(seed {seed}), of the same scenario, policy and code"
+                    )
+                self._connection.execute(
+                    f"INSERT INTO runs SELECT * FROM other.runs WHERE true {_REPLACE}"
+                )
+        finally:
+            self._connection.execute("DETACH other")
+
+    def succeeded(self) -> set[str]:
+        """Return the keys of the runs that need not run again."""
+        return {key for (key,) in self._read("SELECT key FROM runs WHERE NOT failed")}
+
+    def outcomes(self, runs: Iterable[Run]) -> dict[tuple[str, int], Outcome]:
+        """Return the outcomes of those of `runs` that finished, by the case's key and the seed."""
+        wanted = {run.key: (run.case.key, run.seed) for run in runs}
+        with self._sound():
+            return {
+                wanted[key]: _OUTCOME.validate_json(outcome)
+                for key, outcome in self._read("SELECT key, outcome FROM runs")
+                if key in wanted
+            }
+
+    def frame(self, keys: Iterable[str] | None = None) -> pd.DataFrame:
+        """Return one row a run, sorted by key, without wall times.
+
+        Args:
+            keys: of the runs wanted; None: all.
+
+        Returns:
+            The columns `run` (key), `policy`, `policy_identity`, `task`, `scenario`, `faults`,
+            `behaviour`, `code`, `seed`, `delivered` and those of `Outcome`; `delivery_times` are
+            lists [s]; the fields of an outcome are None where the run failed.
+        """
+        import pandas as pd
+
+        wanted = None if keys is None else set(keys)
+        found = []
+        with self._sound():
+            for key, run, text in self._read("SELECT key, run, outcome FROM runs ORDER BY key"):
+                if wanted is None or key in wanted:
+                    outcome = _OUTCOME.validate_json(text)
+                    result = json.loads(text) | {"delivered": outcome.delivered}
+                    if outcome.error is not None:
+                        result = dict.fromkeys(result) | {"error": outcome.error}
+                    found.append({"run": key} | json.loads(run) | result)
+        return pd.DataFrame(found, dtype=object)
+
+    def note(self, notes: Mapping[str, str]) -> None:
+        """Note facts about the study, by name; earlier ones of these names are replaced."""
+        with self._transaction():
+            self._connection.executemany(
+                "INSERT OR REPLACE INTO notes VALUES (?, ?)", notes.items()
+            )
+
+    def notes(self) -> dict[str, str]:
+        """Return what was noted about the study, by name."""
+        return {row[0]: row[1] for row in self._read("SELECT name, value FROM notes")}
+
+    def _read(self, query: str) -> list[tuple[str, ...]]:
+        with self._explained():
+            return self._connection.execute(query).fetchall()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """Keep all that the block writes or, if it fails, nothing of it."""
+        with self._explained():
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+            except BaseException:
+                if self._connection.in_transaction:
+                    self._connection.execute("ROLLBACK")
+                raise
+            self._connection.execute("COMMIT")
+
+    @contextmanager
+    def _sound(self) -> Iterator[None]:
+        try:
+            yield
+        except (TypeError, ValueError) as error:  # of JSON and of pydantic
+            reason = str(error).splitlines()[-1].strip()
+            raise StudyError(
+                f"the store {self.path} is damaged: a run in it does not read ({reason})"
+            ) from error
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            reason = f"cannot use the store {self.path}: {error}"
+            if getattr(error, "sqlite_errorcode", None) in _FULL:
+                raise FullDiskError(f"{reason}: there is no room on its disk") from error
+            raise StudyError(reason) from error
+
+    def _prepare(self) -> None:
+        # One moment's answers: another process may be making the tables.
+        self._connection.execute("BEGIN")
+        try:
+            ((version,),) = self._read("PRAGMA user_version")
+            ((application,),) = self._read("PRAGMA application_id")
+            tables = self._read("SELECT 1 FROM sqlite_master")
+        finally:
+            if self._connection.in_transaction:  # a full disk has ended it already
+                self._connection.execute("ROLLBACK")
+        is_ours = int(application) == APPLICATION_ID
+        if not is_ours and tables:
+            raise StudyError(f"{self.path} is a database, but not the store of a study")
+        if is_ours and int(version) != SCHEMA_VERSION:
+            raise StudyError(
+                f"{self.path} has store schema {version}, this version of the package reads "
+                f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
+            )
+        if self._read_only:
+            if not is_ours:
+                raise StudyError(
+                    f"{self.path} may not be written: should be a store of schema "
+                    f"{SCHEMA_VERSION} to be read there; copy it to where it may"
+                )
+            return
+        # A process that is killed loses nothing; a power cut at most the latest runs.
+        self._change_to_wal()
+        self._connection.execute("PRAGMA synchronous = NORMAL")
+        if is_ours:
+            return
+        with self._transaction():
+            # Another process may have made the tables since: two shards start at once.
+            if not self._read("SELECT 1 FROM sqlite_master"):
+                for statement in _SCHEMA:
+                    self._connection.execute(statement)
+                self._connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+                self._connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+    def _change_to_wal(self) -> None:
+        give_up = time.monotonic() + TIMEOUT
+        while True:
+            try:
+                self._connection.execute("PRAGMA journal_mode = WAL")
+            except sqlite3.OperationalError as error:
+                # When two processes change a new file at once, SQLite refuses one without waiting.
+                if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:
+                    raise
+                time.sleep(0.01)
+            else:
+                return
 
 
-def _digest(*parts: str) -> str:
-    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+def _described(run: Run) -> dict[str, object]:
+    """Return what a store says of a run besides its outcome, as JSON holds it."""
+    case = run.case
+    return {
+        "policy": case.policy.title,
+        "policy_identity": case.identity,
+        "task": case.task.name,
+        "scenario": case.scenario.model_dump(mode="json"),
+        "faults": [fault.model_dump(mode="json") for fault in case.faults],
+        "behaviour": case.behaviour,
+        "code": run.code,
+        "seed": run.seed,
+    }
 
 
-def seeds_in_words(seeds: Sequence[int]) -> str:
-    """Return ascending seeds as ranges, e.g. "0 to 3, 8"; at least one."""
-    breaks = [place for place, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
-    parts = [seeds[a:b] for a, b in pairwise([0, *breaks, len(seeds)])]
-    return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)
+def _refuse_unmerged(path: Path) -> None:
+    log = path.with_name(f"{path.name}-wal")
+    if log.is_file() and log.stat().st_size:
+        raise StudyError(
+            f"{path} may not be written, and its latest runs are still in {log.name}: copy both "
+            "to where they may"
+        )
+
+
+def export(runs: Runs, path: Path) -> tuple[int, str]:
+    """Write every stored run, sorted by key, without wall times, as CSV.
+
+    Returns:
+        How many runs, and the SHA-256 of the file.
+
+    Raises:
+        StudyError: another suffix, or the file cannot be written.
+    """
+    if path.suffix != ".csv":
+        raise StudyError(f"cannot export to {path}: should end in .csv")
+    frame = runs.frame()
+    for name in ("scenario", "faults", "failed_robots") if len(frame) else ():
+        frame[name] = frame[name].map(canonical_json)
+    if len(frame):
+        frame["delivery_times"] = frame["delivery_times"].map(
+            lambda times: " ".join(map(repr, times)), na_action="ignore"
+        )
+    write_csv(path, frame)
+    return len(frame), hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def write_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write a table as CSV with Unix line ends; floats in shortest exact form.
+
+    Raises:
+        StudyError: the file cannot be written.
+    """
+    with becoming(path, StudyError) as part:
+        table.to_csv(part, index=False, lineterminator="\n")

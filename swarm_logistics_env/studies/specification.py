@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar, TypeVar
 
 from pydantic import (
     AfterValidator,
     BeforeValidator,
+    ConfigDict,
     Field,
+    JsonValue,
     NonNegativeFloat,
+    PlainSerializer,
     PositiveFloat,
     PositiveInt,
+    SkipValidation,
     ValidationInfo,
     field_validator,
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.policies.spec import PolicySpec, called
 from swarm_logistics_env.records import FileName, Record, each_of, file_name, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.tasks.policy_choice import PolicySource, policy_name, runs_code, told_apart
-from swarm_logistics_env.tasks.task import DEFAULT, Task, TaskSource, refuse_untrusted, task_of
+from swarm_logistics_env.tasks.task import DEFAULT, Conditions, Task, refuse_untrusted, task_of
 
-ScenarioFields = dict[str, Any]
+Fields = dict[str, JsonValue]
+Manner = dict[str, float | tuple[float, float]]
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
@@ -32,11 +40,45 @@ HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10
 
 
+T = TypeVar("T")
+
+
+def _task(source: object) -> object:
+    task_of(source)
+    return source
+
+
+def _told_apart(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec, ...]:
+    """Return policies; files with the same name on their cards are called by their paths."""
+    counts = Counter(policy.title for policy in policies)
+    found = tuple(
+        policy.replace(label=policy.name)
+        if counts[policy.label] > 1 and policy.label == called(policy.name)
+        else policy
+        for policy in policies
+    )
+    for title, count in Counter(policy.title for policy in found).items():
+        if count > 1:
+            raise ValueError(f"policy {title!r} is given twice")
+    return found
+
+
+PolicySource = Annotated[PolicySpec, BeforeValidator(PolicySpec.of)]
+# A task's name, its import path or, in Python, the task itself.
+TaskSource = Annotated[
+    str | Task,
+    BeforeValidator(_task),
+    SkipValidation,
+    PlainSerializer(lambda source: source if isinstance(source, str) else source.name),
+]
+
+
 class _Part(Record):
+    model_config = ConfigDict(arbitrary_types_allowed=True)
     error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
 
 
-def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
+def _each_once(values: tuple[T, ...]) -> tuple[T, ...]:
     if len(set(values)) < len(values):
         raise ValueError("should hold each value once")
     return values
@@ -54,7 +96,7 @@ class Factor(_Part):
     """
 
     title: str = ""
-    scenario: ScenarioFields = Field(default_factory=dict)
+    scenario: Fields = Field(default_factory=dict)
 
 
 class Sizes(Factor):
@@ -99,10 +141,10 @@ class Faults(Factor):
     intermittent: tuple[PositiveFloat, PositiveFloat] | None = None
 
     @property
-    def manner(self) -> dict[str, Any]:
+    def manner(self) -> Manner:
         """The fields of a fault that say how it fails, as far as they are given."""
-        given = {"factor": self.factor, "intermittent": self.intermittent}
-        return {name: value for name, value in given.items() if value is not None}
+        given: Manner = {} if self.factor is None else {"factor": self.factor}
+        return given if self.intermittent is None else {**given, "intermittent": self.intermittent}
 
     def __str__(self) -> str:
         """Return in words how long, how far and how steadily robots fail; empty: for good."""
@@ -175,11 +217,11 @@ class Specification(_Part):
     name: FileName = "study"
     task: TaskSource = DEFAULT
     policies: Annotated[
-        tuple[PolicySource, ...], Field(min_length=1), AfterValidator(told_apart)
-    ] = ("swarm-dt",)
+        tuple[PolicySource, ...], Field(min_length=1), AfterValidator(_told_apart)
+    ] = (PolicySpec(name="swarm-dt"),)
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
-    scenario: Any = Field(default_factory=dict)
+    scenario: Annotated[Conditions, SkipValidation] = Field(default={}, validate_default=True)
     sizes: Annotated[tuple[Sizes, ...], BeforeValidator(each_of(Sizes))] = ()
     faults: Annotated[tuple[Faults, ...], BeforeValidator(each_of(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(each_of(Parameter))] = ()
@@ -281,16 +323,18 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
             it is unknown or cannot be.
     """
     fields = read_table(path, "study file", StudyError)
-    refuse_untrusted(fields.get("task"), path, trust_code=trust_code)
+    refuse_untrusted(path, fields.get("task"), trust_code=trust_code)
     try:
         specification = Specification(**{"name": file_name(path.stem), **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise StudyError(f"{path}: {error}") from error
-    named = [*specification.policies, *(ablation.policy for ablation in specification.ablations)]
-    for policy in filter(runs_code, named):
-        if not trust_code:
-            raise StudyError(
-                f"{path}: policy {policy_name(policy)!r} is code, which runs when it is loaded: "
-                "should be a policy's name, or be allowed by --trust-code (trust_code=True)"
-            )
+    named = (*specification.policies, *(ablation.policy for ablation in specification.ablations))
+    refuse_untrusted(path, None, named, trust_code=trust_code)
     return specification
+
+
+def seeds_in_words(seeds: Sequence[int]) -> str:
+    """Return ascending seeds as ranges, e.g. "0 to 3, 8"; at least one."""
+    breaks = [place for place, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
+    parts = [seeds[a:b] for a, b in pairwise([0, *breaks, len(seeds)])]
+    return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)

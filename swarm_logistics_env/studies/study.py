@@ -2,48 +2,28 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.tasks.task import Task
+from swarm_logistics_env.tasks.task import Run, Task
 
-from .engines import Engine, engine_named
+from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
-from .metadata import Declaration, Metadata, notes_of, of_existing
 from .plan import Plan, make_plan
+from .play import Engine, Shard, Tally, engine_named, play
 from .presets import load_preset
 from .results import StudyResults, judge
-from .runs import Run, Shard
+from .runs import FILE_NAME, Runs
 from .specification import Specification, read_study_file
-from .store import FILE_NAME, Store
 from .until_clear import standing
+from .verdict import frame_of_cells, frame_of_verdicts
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-@dataclass(frozen=True)
-class Tally:
-    """The numbers of one call of `Study.run`.
-
-    Attributes:
-        played: runs played now; failed: those of them that failed; kept: found in the store.
-        seconds: wall-clock time [s].
-        error: what the first that failed raised, without its traceback; None: none failed.
-    """
-
-    played: int
-    failed: int
-    kept: int
-    seconds: float
-    error: str | None = None
 
 
 class Study:
@@ -69,7 +49,7 @@ class Study:
         self.specification = Specification(**fields)
         self.out = None if out is None else Path(out)
         self._plan: Plan | None = None
-        self._memory: Store | None = None
+        self._memory: Runs | None = None
 
     @classmethod
     def preset(cls, name: str, *, out: str | Path | None = None, **fields: Any) -> Self:
@@ -115,7 +95,7 @@ class Study:
                 found.
         """
         out = Path(out)
-        noted = of_existing(out)
+        noted = StoredStudy.existing(out)
         specification = noted.specification.read(out, task=task, trust_code=trust_code)
         study = cls._of(specification, out)
         if noted.imported is not None:
@@ -175,47 +155,33 @@ class Study:
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
-            store.note(notes_of(self.specification, plan.code, plan.identities, declared))
+            note(store, self.specification, plan.code, plan.identities, declared)
             done = store.succeeded()
             kept = sum(run.key in done for run in whole)
-            played: dict[str, str | None] = {}  # by key, the error of each run that is played now
-            while missing := self._missing(whole, store, played):
-                seconds += self._play(missing, engine, store, played)
+            tried: set[str] = set()
+            errors: list[str] = []
+            # A run that failed in this call is not tried again.
+            while missing := self._missing(whole, store, tried):
+                outcomes, took = play(missing, engine, store, self.specification.name)
+                tried |= {run.key for run in missing}
+                errors += [one.error for one in outcomes if one.error is not None]
+                seconds += took
                 if not self.specification.until_clear:
                     break
-        errors = [error for error in played.values() if error is not None]
-        return Tally(len(played), len(errors), kept, seconds, errors[0] if errors else None)
+        error = errors[0].strip().splitlines()[-1] if errors else None
+        return Tally(len(tried), len(errors), kept, seconds, error)
 
-    def _runs(self, shard: Shard | None) -> list[Run]:
-        return list(shard.of(self.plan().runs()) if shard else self.plan().runs())
+    def _runs(self, shard: Shard | None) -> Sequence[Run]:
+        return shard.of(self.plan().runs) if shard else self.plan().runs
 
-    def _missing(self, whole: list[Run], store: Store, played: Collection[str]) -> list[Run]:
-        """Return what is to be played next; a run that failed in this call is not tried again."""
+    def _missing(self, whole: Sequence[Run], store: Runs, tried: Collection[str]) -> list[Run]:
+        """Return what is to be played next, but for what was tried already."""
         if not self.specification.until_clear:
             done = store.succeeded()
             return [run for run in whole if run.key not in done]
-        outcomes = store.outcomes(whole)
-        kept = {k: o for k, o in outcomes.items() if o.error is None or k in played}
-        return list(standing(self.plan(), kept).wanted)
-
-    def _play(
-        self, runs: list[Run], engine: Engine, store: Store, played: dict[str, str | None]
-    ) -> float:
-        """Play runs and add them to `played`; return how long it took [s]."""
-        policies = Counter(run.condition.policy.label for run in runs)
-        progress = ProgressBar(self.specification.name, len(runs), "runs", parts=policies)
-        done, failed = Counter[str](), 0
-        finished = engine(runs)
-        # Closed at once where this stops early, so that no worker outlives it.
-        with closing(finished), progress:
-            for run, outcome in finished:
-                store.add(run, outcome)
-                error = outcome.error
-                played[run.key] = error and error.strip().splitlines()[-1]
-                failed += error is not None
-                done[run.condition.policy.label] += 1
-                progress.reach(done.total(), f"{failed} failed", done)
-        return progress.seconds
+        played = store.succeeded() | set(tried)
+        outcomes = store.outcomes(run for run in whole if run.key in played)
+        return list(standing(self.plan(), outcomes).wanted)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.
@@ -255,30 +221,21 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            noted = Metadata.of(store)
-            return judge(plan, store.outcomes(plan.runs()), noted.declared if noted else None)
+            noted = StoredStudy.of(store)
+            return judge(plan, store.outcomes(plan.runs), noted.declared if noted else None)
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error."""
-        import pandas as pd
-
-        wanted = {run.key for run in self.plan().runs()}
         with self._store(existing=True) as store:
-            return pd.DataFrame(row for row in store.rows() if row["run"] in wanted)
+            return store.frame(run.key for run in self.plan().runs)
 
     def performance(self) -> pd.DataFrame:
-        """Return one row per policy and condition: mean P, its intervals, P seed by seed.
-
-        The columns are those of `performance_table.PERFORMANCE`.
-        """
-        return self.findings().performance
+        """Return one row per policy and condition: mean P and its intervals (`CELL_COLUMNS`)."""
+        return frame_of_cells(self.findings().cells)
 
     def indicators(self) -> pd.DataFrame:
-        """Return one row per comparison: indicator, interval, verdicts, claim.
-
-        The columns are those of `indicator_table.INDICATORS`.
-        """
-        return self.findings().indicators
+        """Return one row per comparison: indicator, interval, verdicts (`VERDICT_COLUMNS`)."""
+        return frame_of_verdicts(self.findings().verdicts)
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
         """Write report.md, cells.csv and claims.csv into a directory; return their paths.
@@ -289,16 +246,16 @@ class Study:
         Raises:
             StudyError: nothing has been run, there is no directory, or it cannot be written.
         """
-        from swarm_logistics_env.report.report_files import write_report
+        from swarm_logistics_env.report.write import write_report
 
         directory = self.out if path is None else Path(path)
         if directory is None:
             raise StudyError("report needs a path: the study is kept in memory")
         return write_report(self.findings(), directory)
 
-    def _own_metadata(self, store: Store) -> Metadata | None:
+    def _own_metadata(self, store: Runs) -> StoredStudy | None:
         """Return what the store says of this study; raise StudyError if it is another one's."""
-        noted = Metadata.of(store)
+        noted = StoredStudy.of(store)
         if noted is None:
             return None
         if noted.imported is not None:
@@ -318,22 +275,22 @@ class Study:
         return noted
 
     @contextmanager
-    def _store(self, *, existing: bool = False) -> Iterator[Store]:
+    def _store(self, *, existing: bool = False) -> Iterator[Runs]:
         if self.out is not None:
             if existing:
-                opened = Store.existing(self.out)
+                opened = Runs.existing(self.out)
             else:
                 try:
                     self.out.mkdir(parents=True, exist_ok=True)
                 except OSError as error:
                     raise StudyError(f"cannot write to {self.out}: {error.strerror}") from error
-                opened = Store(self.out / FILE_NAME)
+                opened = Runs(self.out / FILE_NAME)
             with opened:
                 yield opened
             return
         if self._memory is None:
             if existing:
                 raise StudyError("nothing has been run: call run() first")
-            self._memory = Store(None)
+            self._memory = Runs(None)
             finalize(self, self._memory.close)
         yield self._memory

@@ -11,25 +11,17 @@ Everything follows from the outcomes, so a study that was killed goes on as if i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.equivalence import ALPHA
-from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.tasks.task import Case, Run
 
-from .comparisons import Arm, Comparison
-from .judged_comparisons import (
-    CONFIDENCE,
-    CellKey,
-    Judged,
-    judge_one,
-    level_at,
-)
-from .performance_table import Played, played
+from .comparison import CONFIDENCE, Arm, Comparison
 from .plan import Plan
-from .runs import Condition, Run
+from .runs import Outcomes
+from .verdict import Cell, Level, Verdict, grouped, judge_one
 
 MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"
@@ -40,62 +32,62 @@ class Standing:
     """The state of the comparisons of a study at its latest look.
 
     Attributes:
-        judged: every comparison, as it was when it stopped or at the last complete look.
+        verdicts: on every comparison, as it was when it stopped or at the last complete look.
         wanted: the runs that the next look needs; empty: everything is clear, or the most seeds
             are played.
         shared_seeds: number of seeds that every condition has, counted at the looks.
     """
 
-    judged: tuple[Judged, ...]
+    verdicts: tuple[Verdict, ...]
     wanted: tuple[Run, ...]
     shared_seeds: int
 
 
-def standing(plan: Plan, outcomes: Mapping[str, Outcome]) -> Standing:
-    """Return the state of a plan's comparisons after these outcomes, keyed by run."""
-    runs = _Runs(plan, outcomes)
-    families: dict[tuple[str, str], list[Comparison]] = {}
-    for comparison in plan.comparisons:
-        families.setdefault(comparison.family, []).append(comparison)
+def standing(plan: Plan, outcomes: Outcomes) -> Standing:
+    """Return the state of a plan's comparisons after these outcomes."""
+    runs = _Looks(plan, outcomes)
+    families = grouped(plan.comparisons, lambda comparison: comparison.family)
     found = [_Family(members, runs) for members in families.values()]
     first = plan.specification.looks[0]
-    wanted = {run.key: run for c in plan.conditions for run in runs.missing(c, first)}
+    wanted = {run.key: run for case in plan.cases for run in runs.missing(case, first)}
     for family in found:
         wanted |= family.wanted
-    shared = [n for n in runs.looks if not any(runs.missing(c, n) for c in plan.conditions)]
-    judged = {comparison: one for family in found for comparison, one in family.judged().items()}
+    shared = [n for n in runs.looks if not any(runs.missing(case, n) for case in plan.cases)]
+    verdicts = {comparison: one for family in found for comparison, one in family.judged().items()}
     return Standing(
-        tuple(judged[comparison] for comparison in plan.comparisons),
+        tuple(verdicts[comparison] for comparison in plan.comparisons),
         tuple(wanted.values()),
         max(shared, default=first),
     )
 
 
-class _Runs:
-    """The runs of a plan, each hashed once, and what they gave."""
+class _Looks:
+    """The outcomes of a plan, as far as each look sees them."""
 
-    def __init__(self, plan: Plan, outcomes: Mapping[str, Outcome]) -> None:
+    def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
         self.plan = plan
         self.declared = plan.specification.looks
         self.looks = [look for look in self.declared if look <= len(plan.seeds)]
         self._outcomes = outcomes
-        self._runs: dict[str, list[Run]] = {}
 
-    def of(self, condition: Condition, n_seeds: int) -> list[Run]:
-        if condition.key not in self._runs:
-            self._runs[condition.key] = [
-                condition.run(self.plan.code, seed) for seed in self.plan.seeds
-            ]
-        return self._runs[condition.key][:n_seeds]
+    def missing(self, case: Case, n_seeds: int) -> list[Run]:
+        seeds = self.plan.seeds[:n_seeds]
+        return [
+            case.run(self.plan.code, seed)
+            for seed in seeds
+            if (case.key, seed) not in self._outcomes
+        ]
 
-    def missing(self, condition: Condition, n_seeds: int) -> list[Run]:
-        return [run for run in self.of(condition, n_seeds) if run.key not in self._outcomes]
+    def cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
+        seeds = self.plan.seeds[:n_seeds]
+        return {
+            arm: Cell.of("", "", arm, [self._outcomes.get((arm.case.key, seed)) for seed in seeds])
+            for arm in comparison.arms
+        }
 
-    def cells(self, comparison: Comparison, n_seeds: int) -> dict[CellKey, Played]:
-        def cell(arm: Arm) -> Played:
-            return played([self._outcomes.get(r.key) for r in self.of(arm.condition, n_seeds)])
-
-        return {(comparison.policy, comparison.table, arm): cell(arm) for arm in comparison.arms}
+    def alpha(self, look: int, alpha: float) -> float:
+        """Return what is spent of an error up to a look, counted from 0."""
+        return spi.look_alphas(self.declared, alpha, spending=SPENDING)[look]
 
 
 class _Family:
@@ -105,11 +97,11 @@ class _Family:
         wanted: the runs that its next look needs and that are not played yet, by their keys.
     """
 
-    def __init__(self, members: Sequence[Comparison], runs: _Runs) -> None:
+    def __init__(self, members: Sequence[Comparison], runs: _Looks) -> None:
         self.wanted: dict[str, Run] = {}
         self._members = members
         self._runs = runs
-        self._found: dict[Comparison, Judged] = {}
+        self._found: dict[Comparison, Verdict] = {}
         self._look: dict[Comparison, int] = {}  # the last at which each was judged
         self._open = list(members)
         for look in range(len(runs.looks)):
@@ -120,66 +112,69 @@ class _Family:
         """Judge what is open at a look; return whether its runs are there."""
         n_seeds = self._runs.looks[look]
         # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
-        playing = [c for c in self._open if not self._is_blocked(c)]
+        playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
         for comparison in playing:
             for arm in comparison.arms:
-                missing = self._runs.missing(arm.condition, n_seeds)
+                missing = self._runs.missing(arm.case, n_seeds)
                 self.wanted.update((run.key, run) for run in missing)
         complete = not self.wanted
         if not (complete or look == 0):
             return False
-        level = level_at(look, self._runs.declared, SPENDING)
+        # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
+        # side of the margin.
+        confidence = 1 - self._runs.alpha(look, 1 - CONFIDENCE)
+        level = Level(confidence, self._runs.alpha(look, 2 * ALPHA) / 2)
+        margin = self._runs.plan.specification.margin
         for comparison in playing:
             cells = self._runs.cells(comparison, n_seeds)
-            self._found[comparison] = judge_one(comparison, cells, self._runs.plan, level)
+            self._found[comparison] = judge_one(
+                comparison, cells, paired=self._runs.plan.paired, margin=margin, level=level
+            )
             self._look[comparison] = look
         if complete:
             self._stop_clear_ones(look, n_seeds)
         return complete
 
-    def _is_blocked(self, comparison: Comparison) -> bool:
-        return comparison in self._found and isinstance(self._found[comparison].estimate, str)
-
     def _stop_clear_ones(self, look: int, n_seeds: int) -> None:
         p_values: dict[Comparison, float] = {}
         for comparison in list(self._open):
             estimate = self._found[comparison].estimate
-            if isinstance(estimate, str):
+            if estimate is None:
                 continue
             if estimate.identical:  # nothing to test, at any number of seeds
                 self._stop(comparison, n_seeds)
             elif estimate.p_value is not None:
                 p_values[comparison] = estimate.p_value
         for comparison in sorted(p_values, key=lambda c: p_values[c]):
-            level = self._level(look, len(self._open))
+            level = self._level(look)
             if not p_values[comparison] < level:
                 break
-            self._settle(comparison, level)
+            self._settle(comparison, p_values[comparison], level)
             self._stop(comparison, n_seeds)
         for comparison in self._open:
             if comparison in p_values:
-                self._settle(comparison, self._level(look, len(self._open)))
+                self._settle(comparison, p_values[comparison], self._level(look))
 
-    def _level(self, look: int, n_open: int) -> float:
-        alpha = (1 - CONFIDENCE) / n_open
-        return spi.look_alphas(self._runs.declared, alpha, spending=SPENDING)[look]
+    def _level(self, look: int) -> float:
+        return self._runs.alpha(look, (1 - CONFIDENCE) / len(self._open))
 
-    def _settle(self, comparison: Comparison, level: float) -> None:
+    def _settle(self, comparison: Comparison, p: float, level: float) -> None:
         """Note p on the scale on which 0.05 decides, and the verdict under Holm."""
         one = self._found[comparison]
-        assert isinstance(one.estimate, Estimate)
-        p = one.estimate.p_value or 0.0
+        decided = one.estimate is not None and p < level
         self._found[comparison] = replace(
             one,
             p_holm=min(1.0, p * (1 - CONFIDENCE) / level),
-            verdict_holm=one.estimate.verdict_for(p) if p < level else "inconclusive",
+            verdict_holm=one.estimate.verdict_for(p)
+            if one.estimate and decided
+            else "inconclusive",
         )
 
     def _stop(self, comparison: Comparison, n_seeds: int) -> None:
         self._open.remove(comparison)
         self._found[comparison] = replace(self._found[comparison], stopped_at=n_seeds)
 
-    def judged(self) -> dict[Comparison, Judged]:
+    def judged(self) -> dict[Comparison, Verdict]:
         """Return every comparison, with the equivalences under Holm, each at its own look."""
         tests = {c: self._found[c].equivalence for c in self._members}
         if None in tests.values():  # not asked, or one is blocked
@@ -189,9 +184,9 @@ class _Family:
         def ratio(comparison: Comparison) -> float:
             """Return p as a multiple of the level that it needs."""
             test, look = tests[comparison], self._look[comparison]
-            looks = self._runs.declared
-            alphas = spi.look_alphas(looks, 2 * ALPHA / len(left), spending=SPENDING)
-            return 1.0 if test is None or test.p_value is None else test.p_value / alphas[look] * 2
+            if test is None or test.p_value is None:
+                return 1.0
+            return test.p_value / self._runs.alpha(look, 2 * ALPHA / len(left)) * 2
 
         shown = {c for c in self._members if c not in left}
         while left and ratio(first := min(left, key=ratio)) < 1.0:

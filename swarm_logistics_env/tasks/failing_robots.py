@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pettingzoo import ParallelEnv
 from pettingzoo.utils.wrappers import BaseParallelWrapper
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.errors import FaultError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
+
+from .parallel_policies import Env, Value
 
 REMOVED = "removed"
 FAILURE_MODES = {
@@ -77,9 +78,9 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
 
     def __init__(
         self,
-        env: ParallelEnv[Any, Any, Any],
+        env: Env,
         faults: Iterable[RobotFault],
-        failures: Mapping[str, Any],
+        failures: Mapping[str, Value],
         period: float = 1.0,
         rows: Mapping[str, int] | None = None,
     ) -> None:
@@ -96,12 +97,12 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
                 raise FaultError(f"{fault.robots} robots fail of {len(self._rows)}")
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        self, seed: int | None = None, options: dict[str, Value] | None = None
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
         """Begin an episode; the seed also decides which robots fail. None: the next seed."""
         self._seed = self._seed + 1 if seed is None else seed
         self._steps = 0
-        self._last: dict[str, Any] = {}
+        self._last: dict[str, Value] = {}
         self._noise: dict[str, np.random.Generator] = {}
         size = max(self._rows.values()) + 1
         self._failing = [
@@ -110,7 +111,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         observations, infos = self.env.reset(seed=seed, options=options)
         return self._observed(observations), infos
 
-    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+    def step(self, actions: dict[str, Value]) -> tuple[dict[str, Value], ...]:
         """Step with the actions that failing robots execute; observations as they sense them."""
         executed = {agent: self._executed(agent, action) for agent, action in actions.items()}
         observations, *others = self.env.step(executed)
@@ -121,7 +122,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         time, row = self._steps * self._period, self._rows[agent]
         return {fault.mode for fault, rows in self._failing if row in rows and fault.active(time)}
 
-    def _executed(self, agent: str, action: Any) -> Any:
+    def _executed(self, agent: str, action: Value) -> Value:
         modes = self._modes(agent)
         if "silent" in modes:
             action = self._failures["silent"]
@@ -130,10 +131,10 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._last[agent] = action
         return action
 
-    def _observed(self, observations: dict[str, Any]) -> dict[str, Any]:
+    def _observed(self, observations: dict[str, Value]) -> dict[str, Value]:
         return {agent: self._sensed(agent, value) for agent, value in observations.items()}
 
-    def _sensed(self, agent: str, value: Any) -> Any:
+    def _sensed(self, agent: str, value: Value) -> Value:
         modes = self._modes(agent)
         if "blind" in modes:
             return _each(value, lambda part: np.zeros_like(part)[()])
@@ -143,7 +144,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
             return _each(value, lambda part: self._with_noise(agent, part))
         return value
 
-    def _with_noise(self, agent: str, part: Any) -> Any:
+    def _with_noise(self, agent: str, part: Value) -> Value:
         clean = np.asarray(part)
         if not np.issubdtype(clean.dtype, np.floating):
             raise SetupError(
@@ -154,7 +155,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         return (clean + noise).astype(clean.dtype)
 
 
-def _each(value: Any, change: Any) -> Any:
+def _each(value: Value, change: Value) -> Value:
     """Return an observation with each array or number in it changed."""
     if isinstance(value, dict):
         return {name: _each(part, change) for name, part in value.items()}

@@ -14,7 +14,9 @@ from pettingzoo import ParallelEnv
 from swarm_logistics_env import streams
 from swarm_logistics_env.errors import PolicyError, StudyError
 
-Env: TypeAlias = ParallelEnv[Any, Any, Any]
+# An observation, an action or an info: PettingZoo leaves their types to each environment.
+Value: TypeAlias = Any
+Env: TypeAlias = ParallelEnv[str, Value, Value]
 
 
 class RandomActions:
@@ -32,7 +34,7 @@ class RandomActions:
             if space is not None:
                 space.seed(streams.key(seed, "random action", row) & 0x7FFFFFFF)
 
-    def act(self, observations: NDArray[np.float32]) -> list[Any]:
+    def act(self, observations: NDArray[np.float32]) -> list[Value]:
         """Return an action for each row."""
         return [None if space is None else space.sample() for space in self._spaces]
 
@@ -57,7 +59,7 @@ def agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str |
 
 
 def observation_rows(
-    env: Env, agents: Sequence[str | None], observations: Mapping[str, Any]
+    env: Env, agents: Sequence[str | None], observations: Mapping[str, Value]
 ) -> NDArray[np.float32]:
     """Return observations as rows (N, D), flattened; those of absent robots are zero.
 
@@ -75,7 +77,9 @@ def observation_rows(
     return rows
 
 
-def agent_actions(env: Env, agents: Sequence[str | None], actions: Any) -> dict[str, Any]:
+def agent_actions(
+    env: Env, agents: Sequence[str | None], actions: Sequence[Value]
+) -> dict[str, Value]:
     """Return the rows of actions by agent, each of its action space's type.
 
     Raises:
@@ -84,7 +88,7 @@ def agent_actions(env: Env, agents: Sequence[str | None], actions: Any) -> dict[
     if len(actions) != len(agents):
         raise PolicyError(f"{len(actions)} actions for {len(agents)} robots")
     present = set(env.agents)
-    found: dict[str, Any] = {}
+    found: dict[str, Value] = {}
     for row, agent in enumerate(agents):
         if agent is None or agent not in present:
             continue

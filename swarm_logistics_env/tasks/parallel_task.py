@@ -1,12 +1,14 @@
-"""Any PettingZoo parallel environment as a task."""
+"""Value PettingZoo parallel environment as a task."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from importlib.metadata import packages_distributions, version
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from gymnasium.spaces import flatten
@@ -14,14 +16,32 @@ from pettingzoo.utils.wrappers import BaseParallelWrapper
 from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
 from swarm_logistics_env.errors import FaultError, StudyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.policies.policy import function_digest, without_prose
+from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 from swarm_logistics_env.records import Record
 
-from .code_version import environment_version
 from .failing_robots import FAILURE_MODES, REMOVED, FailingRobots, RobotFault, failing_rows
-from .parallel_policies import Env, RandomActions, agent_actions, agents_by_row, observation_rows
+from .parallel_policies import (
+    Env,
+    RandomActions,
+    Value,
+    agent_actions,
+    agents_by_row,
+    observation_rows,
+)
 from .performance import Gain, SumOfRewards, in_words, name_of, performance_of
-from .policy_choice import policy_of
-from .task import Outcome, Playable
+from .task import Case, Conditions, Outcome
+
+# These files decide what a run in somebody else's environment gives.
+ENVIRONMENT_SOURCES = (
+    "streams.py",
+    "tasks/failing_robots.py",
+    "tasks/parallel_policies.py",
+    "tasks/parallel_task.py",
+    "tasks/performance.py",
+    "tasks/tuple_env.py",
+)
+_environments: dict[str, str] = {}
 
 NEEDS = {
     "silent": "the action that counts as none",
@@ -42,11 +62,10 @@ class ParallelScenario(Record):
     n_robots: PositiveInt
     duration: PositiveFloat
 
-    def conditions(self) -> Iterator[tuple[str, str, str]]:
-        """Yield name, value, and unit or meaning of each."""
-        units = {"n_robots": "robots", "duration": "s"}
-        for name, value in self.model_dump().items():
-            yield name, str(value), units.get(name, "argument of the environment")
+    def conditions(self) -> list[tuple[str, str, str]]:
+        """Return name, value, and unit or meaning of each."""
+        units, other = {"n_robots": "robots", "duration": "s"}, "argument of the environment"
+        return [(n, str(value), units.get(n, other)) for n, value in self.model_dump().items()]
 
 
 class ParallelTask:
@@ -95,17 +114,17 @@ class ParallelTask:
         n_robots: int,
         steps: int,
         size: str = "n_robots",
-        parameters: Mapping[str, Any] = MappingProxyType({}),
+        parameters: Mapping[str, Value] = MappingProxyType({}),
         performance: Gain = _REWARDS,
         references: tuple[float, float] | None = None,
-        failures: Mapping[str, Any] = MappingProxyType({}),
+        failures: Mapping[str, Value] = MappingProxyType({}),
         period: float = 1.0,
-        policies: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        policies: Makers = NO_MAKERS,
     ) -> None:
         self.name, self._make_env, self._size = name, make_env, size
         self._parameters, self._failures = dict(parameters), dict(failures)
         self._gain, self._references, self._period = performance, references, period
-        self.policies: dict[str, Callable[..., Any]] = {"random": RandomActions, **policies}
+        self.policies: Makers = {"random": RandomActions, **policies}
         self._refuse()
         self.removed = REMOVED if REMOVED in failures else None
         self.performance = in_words(performance, references)
@@ -132,22 +151,23 @@ class ParallelTask:
             repr(settings), (self._make_env, self._gain), lambda: self._made(self.default, ())
         )
 
-    def vary(self, base: ParallelScenario, fields: Mapping[str, Any]) -> ParallelScenario:
+    def vary(self, base: Conditions, fields: Mapping[str, object]) -> ParallelScenario:
         """Return a scenario with some fields changed.
 
         Raises:
             StudyError: a field is unknown or cannot be.
         """
-        given = base.model_dump()
-        for name, value in fields.items():
-            if name not in given:
-                raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, given)}")
-            if self._numeric(name):
-                value = self._number(name, value)
-            given[name] = value
-        return ParallelScenario(**given)
+        assert isinstance(base, ParallelScenario)
+        for name in fields:
+            if name not in (known := base.model_dump()):
+                raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, known)}")
+        return base.replace(
+            **{n: self._number(n, x) if self._numeric(n) else x for n, x in fields.items()}
+        )
 
-    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> RobotFault:
+    def fault(
+        self, mode: str, robots: int, onset: float, duration: float | None, **manner: object
+    ) -> RobotFault:
         """Return the fault of some robots from `onset` on, for `duration` [s] or for good.
 
         Raises:
@@ -162,19 +182,22 @@ class ParallelTask:
                 f"task {self.name}: robots are removed from the start, not from {onset:g} s on, so "
                 'FT is not defined here: should be asked for R alone, indicators = ["R"]'
             )
-        return RobotFault(mode=mode, robots=robots, onset=onset, duration=duration)
+        return RobotFault(mode=mode, robots=robots, onset=onset, duration=duration).replace(
+            **manner
+        )
 
-    def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
+    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one run; see `Task.play`."""
-        scenario, faults = condition.scenario, condition.faults
-        n_robots = scenario.n_robots
+        scenario, n_robots = case.scenario, case.scenario.n_robots
+        assert isinstance(scenario, ParallelScenario)
+        faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
         absent = {
             row
             for fault in faults
             if fault.mode == REMOVED
             for row in failing_rows(seed, n_robots, fault.robots)
         }
-        player: Any = policy_of(policy, self.policies)
+        player: Value = case.policy.load(self.policies)
         env = self._made(scenario, tuple(sorted(absent)))
         try:
             agents = agents_by_row(env, n_robots, absent)
@@ -207,7 +230,6 @@ class ParallelTask:
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
         result = Outcome(
-            "",
             ended_at=len(gains) * self._period,
             failed_robots=failed,
             anchoring_seconds=None,
@@ -241,7 +263,7 @@ class ParallelTask:
         return int(value)
 
     def _refuse(self) -> None:
-        needed: dict[str, Callable[[Any], bool]] = {
+        needed: dict[str, Callable[[Value], bool]] = {
             "silent": lambda value: value is not None,
             "noisy": lambda value: isinstance(value, int | float) and value > 0,
             REMOVED: lambda value: isinstance(value, str),
@@ -265,13 +287,13 @@ class _Recorded(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is u
         self._hash = hashlib.blake2b(digest_size=16)
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        self, seed: int | None = None, options: dict[str, Value] | None = None
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
         observations, infos = self.env.reset(seed=seed, options=options)
         self._add(observations, {})
         return observations, infos
 
-    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+    def step(self, actions: dict[str, Value]) -> tuple[dict[str, Value], ...]:
         observations, rewards, *others = self.env.step(actions)
         self._add(observations, rewards)
         return observations, rewards, *others
@@ -282,13 +304,44 @@ class _Recorded(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is u
         self._hash.update(np.array(gains).tobytes())
         return self._hash.hexdigest()
 
-    def _add(self, observations: dict[str, Any], rewards: dict[str, Any]) -> None:
+    def _add(self, observations: dict[str, Value], rewards: dict[str, Value]) -> None:
         for agent in sorted(observations):
             space = self.env.observation_space(agent)
             self._hash.update(np.asarray(flatten(space, observations[agent])).tobytes())
         self._hash.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
 
 
-def _failed(seed: int, n_robots: int, faults: tuple[RobotFault, ...]) -> tuple[int, ...]:
+def _failed(seed: int, n_robots: int, faults: Sequence[RobotFault]) -> tuple[int, ...]:
     most = max((fault.robots for fault in faults), default=0)
     return failing_rows(seed, n_robots, most)
+
+
+def environment_version(
+    settings: str, functions: Iterable[object], make: Callable[[], Value]
+) -> str:
+    """Return a digest of what decides a run in a parallel environment, and its libraries' versions.
+
+    Args:
+        settings: of the task; one process answers once for the same settings.
+        functions: of the task, whose modules count.
+        make: makes the environment, whose classes tell which libraries it comes from.
+    """
+    if settings not in _environments:
+        package = Path(__file__).parents[1]
+        digest = hashlib.sha256(settings.encode())
+        for name in ENVIRONMENT_SOURCES:
+            digest.update(without_prose((package / name).read_text(encoding="utf-8")).encode())
+        for function in functions:
+            digest.update(function_digest(function).encode())
+        env = make()
+        try:
+            modules = {kind.__module__.partition(".")[0] for kind in type(env.unwrapped).__mro__}
+        finally:
+            env.close()
+        modules.discard(package.name)  # its own code is known by its sources
+        installed = packages_distributions()
+        names = sorted({name for module in modules for name in installed.get(module, ())})
+        versions = ", ".join(f"{name} {version(name)}" for name in names)
+        digest.update(versions.encode())
+        _environments[settings] = f"{digest.hexdigest()[:16]} ({versions})"
+    return _environments[settings]

@@ -6,14 +6,13 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
-
-from pettingzoo import ParallelEnv
 
 from swarm_logistics_env.errors import StudyError
 
+from .parallel_policies import Env, Value
+
 # What one step adds to P: of the environment after the step, its rewards and its infos.
-Gain = Callable[[ParallelEnv[Any, Any, Any], Mapping[str, Any], Mapping[str, Any]], float]
+Gain = Callable[[Env, Mapping[str, Value], Mapping[str, Value]], float]
 
 REMEDY = (
     "the indicators are ratios, so P needs a true zero: give another measure (performance=a "
@@ -32,9 +31,7 @@ class SumOfRewards:
 
     shared: bool = False
 
-    def __call__(
-        self, env: ParallelEnv[Any, Any, Any], rewards: Mapping[str, Any], infos: Mapping[str, Any]
-    ) -> float:
+    def __call__(self, env: Env, rewards: Mapping[str, Value], infos: Mapping[str, Value]) -> float:
         """Return what one step adds."""
         return _total(rewards.values(), self.shared)
 
@@ -51,9 +48,7 @@ class SumOfInfos:
     key: str
     shared: bool = False
 
-    def __call__(
-        self, env: ParallelEnv[Any, Any, Any], rewards: Mapping[str, Any], infos: Mapping[str, Any]
-    ) -> float:
+    def __call__(self, env: Env, rewards: Mapping[str, Value], infos: Mapping[str, Value]) -> float:
         """Return what one step adds."""
         return _total((info[self.key] for info in infos.values() if self.key in info), self.shared)
 
@@ -103,7 +98,7 @@ def performance_of(gains: list[float], references: tuple[float, float] | None) -
     return score
 
 
-def _total(values: Iterable[Any], shared: bool) -> float:
+def _total(values: Iterable[Value], shared: bool) -> float:
     numbers = [float(value) for value in values]
     if not shared:
         return math.fsum(numbers)

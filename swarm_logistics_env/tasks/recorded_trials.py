@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.records import Record
 
-from .task import Outcome, Playable
+from .task import Case, Conditions, Outcome
 
 
 class RecordedScenario(Record):
@@ -51,7 +52,7 @@ class RecordedTrials:
     removed: str | None = "removed"
     performance = "what the file holds for each trial"
     default = RecordedScenario()
-    policies: Mapping[str, Callable[..., Any]] = MappingProxyType({})
+    policies = NO_MAKERS
     fields: Mapping[str, str] = MappingProxyType({})
     failure_modes: Mapping[str, str] = MappingProxyType({})
 
@@ -59,15 +60,18 @@ class RecordedTrials:
         """Return a word in place of a code version: none made these runs."""
         return "imported"
 
-    def vary(self, base: RecordedScenario, fields: Mapping[str, Any]) -> RecordedScenario:
-        """Return `base` with some fields changed."""
+    def vary(self, base: Conditions, fields: Mapping[str, object]) -> RecordedScenario:
+        """Return the scenario of a file, of which nothing is varied by a study."""
+        assert isinstance(base, RecordedScenario)
         return base.replace(**fields)
 
-    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> RecordedFault:
+    def fault(
+        self, mode: str, robots: int, onset: float, duration: float | None, **_: object
+    ) -> RecordedFault:
         """Return the fault; how long it lasted is not recorded."""
         return RecordedFault(mode=mode, robots=robots, onset=onset)
 
-    def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
+    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Raise: what was recorded cannot be played again.
 
         Raises:

@@ -1,25 +1,47 @@
-"""What a study can play: a task, what playing it once gives, and the tasks by name."""
+"""What a study plays: a task, a case of it, a run of a case, and the outcome of a run."""
 
 from __future__ import annotations
 
+import hashlib
 import importlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Protocol, runtime_checkable
+import time
+import traceback
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, PlainSerializer
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, NonNegativeFloat, PlainSerializer
+from pydantic.dataclasses import dataclass as validated
 
+from swarm_logistics_env import streams
 from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.policies.spec import Makers, PolicySpec
+from swarm_logistics_env.records import canonical_json
 
 
-@dataclass(frozen=True)
+def _ascending(times: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
+        raise ValueError("should ascend")
+    return times
+
+
+Times = Annotated[
+    NDArray[np.float64],
+    BeforeValidator(lambda times: np.asarray(times, dtype=np.float64)),
+    AfterValidator(_ascending),
+    PlainSerializer(lambda times: times.tolist()),
+]
+
+
+@validated(frozen=True, config=ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False))
 class Outcome:
     """What one run gave: an episode's result, or the traceback of the error that ended it.
 
     Attributes:
-        run: key of the run.
         delivery_times: [s], ascending, shape (delivered,); its length is the paper's P.
         ended_at: [s].
         all_delivered: whether no item was left, so that more robots could not have delivered more.
@@ -32,16 +54,15 @@ class Outcome:
         untimed: P, 0 or more, where no times are known; None: the number of times is P.
     """
 
-    run: str
-    delivery_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    ended_at: float = 0.0
+    delivery_times: Times = field(default_factory=lambda: np.empty(0))
+    ended_at: NonNegativeFloat = 0.0
     all_delivered: bool = False
     failed_robots: tuple[int, ...] = ()
-    anchoring_seconds: float | None = 0.0
+    anchoring_seconds: NonNegativeFloat | None = 0.0
     digest: str | None = None
     error: str | None = None
-    wall_seconds: float = 0.0
-    untimed: float | None = None
+    wall_seconds: NonNegativeFloat = 0.0
+    untimed: NonNegativeFloat | None = None
 
     @property
     def delivered(self) -> float:
@@ -49,29 +70,45 @@ class Outcome:
         return len(self.delivery_times) if self.untimed is None else self.untimed
 
 
-class Playable(Protocol):
-    """What a task needs of a condition."""
+class Conditions(Protocol):
+    """A scenario of a task: a record (`records.Record`) that says how many robots, and how long."""
 
     @property
-    def scenario(self) -> Any:
-        """What is held fixed during a run, of the task's own type."""
+    def n_robots(self) -> int:
+        """Swarm size N."""
 
     @property
-    def faults(self) -> tuple[Any, ...]:
-        """What fails during a run, of the task's own type."""
+    def duration(self) -> float:
+        """Time at which a run ends at the latest [s]."""
+
+    def model_dump(self, *, mode: str = "python") -> dict[str, object]:
+        """Return its fields."""
+
+    def conditions(self) -> list[tuple[str, str, str]]:
+        """Return rows of name, value, and unit with meaning, for the report."""
+
+
+class TaskFault(Protocol):
+    """A fault of a task: a record that says which robots fail, how, and from when on."""
+
+    @property
+    def mode(self) -> str:
+        """Its failure mode."""
+
+    @property
+    def onset(self) -> float:
+        """When it begins [s]."""
+
+    def model_dump(self, *, mode: str = "python") -> dict[str, object]:
+        """Return its fields."""
 
 
 @runtime_checkable
 class Task(Protocol):
     """Something that a policy can be tested in.
 
-    Its scenarios and faults are records (`records.Record`), so that a store can keep them as JSON.
-    A scenario has the fields `n_robots`, the swarm size N, and `duration`, the time at which a run
-    ends at the latest [s]; and `conditions()`: rows of name, value, and unit with meaning, for the
-    report.
-
     Attributes:
-        name: part of a condition's identity, but for the warehouse's.
+        name: part of a case's identity, but for the warehouse's.
         removed: the failure mode that takes robots away, for the paper's P_S; None: the task cannot
             start without a robot, so FT is not asked.
         performance: what P is, as a sentence for the report.
@@ -82,11 +119,11 @@ class Task(Protocol):
     performance: str
 
     @property
-    def default(self) -> Any:
+    def default(self) -> Conditions:
         """The scenario from which a study's own is varied."""
 
     @property
-    def policies(self) -> Mapping[str, Callable[..., Any]]:
+    def policies(self) -> Makers:
         """What makes each policy of the task's own, by name; `policies.load` knows the others."""
 
     @property
@@ -100,27 +137,118 @@ class Task(Protocol):
     def code(self) -> str:
         """Return a text that changes whenever the task's runs may have changed."""
 
-    def vary(self, base: Any, fields: Mapping[str, Any]) -> Any:
+    def vary(self, base: Conditions, fields: Mapping[str, object]) -> Conditions:
         """Return a scenario with some fields changed.
 
         Raises:
             SwarmLogisticsError: a field is unknown or cannot be.
         """
 
-    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> Any:
+    def fault(
+        self, mode: str, robots: int, onset: float, duration: float | None, **manner: object
+    ) -> TaskFault:
         """Return the fault of some robots from `onset` on, for `duration` [s] or for good.
+
+        Args:
+            manner: further fields of the task's own faults.
 
         Raises:
             SwarmLogisticsError: the task cannot let robots fail so.
         """
 
-    def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
-        """Play one run of a policy, as `policy_choice` knows it, and return what it gave.
+    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
+        """Play one run of a case, by a policy that no other run has used; return what it gave.
 
         Args:
             seed: of the world.
             policy_seed: of the policy's own randomness.
         """
+
+
+@dataclass(frozen=True)
+class Case:
+    """All of a run but its seed. Cases of equal content have equal keys and share runs.
+
+    Attributes:
+        policy: that is played.
+        identity: of the policy: two of one identity are one.
+        scenario, faults: the conditions, of the task's own types.
+        behaviour: 0: the policy's randomness follows from the run's seed; another number: from
+            that number as well, so that the same worlds are met by another behaviour.
+        task: that plays it.
+    """
+
+    policy: PolicySpec
+    identity: str
+    scenario: Conditions
+    faults: tuple[TaskFault, ...] = ()
+    behaviour: int = 0
+    _: KW_ONLY
+    task: Task = field(compare=False, repr=False)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    @cached_property
+    def content(self) -> tuple[str, ...]:
+        """What decides its outcomes: scenario and faults as JSON, identity, behaviour and task."""
+        # Behaviour 0 and the warehouse add nothing.
+        other = (str(self.behaviour),) if self.behaviour else ()
+        if self.task.name != DEFAULT:
+            other = (*other, f"task {self.task.name}")
+        scenario = canonical_json(self.scenario.model_dump(mode="json"))
+        faults = canonical_json([fault.model_dump(mode="json") for fault in self.faults])
+        return (scenario, faults, self.identity, *other)
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of the content, 64 hexadecimal digits."""
+        return _digest(*self.content)
+
+    def run(self, code: str, seed: int) -> Run:
+        """Return the run of this case at one seed, under one version of the code."""
+        return Run(self, code, seed)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One episode to play: a case at a seed, by one version of the code."""
+
+    case: Case
+    code: str
+    seed: int
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of everything that decides its outcome, 64 hexadecimal digits."""
+        return _digest(*self.case.content, self.code, str(self.seed))
+
+    @property
+    def policy_seed(self) -> int:
+        """Seed of the policy's own randomness."""
+        behaviour = self.case.behaviour
+        if not behaviour:
+            return self.seed
+        # 31 bits: policies hand it to generators of all kinds.
+        return streams.key(self.seed, "other behaviour", behaviour) & 0x7FFFFFFF
+
+    def play(self) -> Outcome:
+        """Play it; whatever goes wrong in it is its outcome."""
+        start, task = time.perf_counter(), self.case.task
+        try:
+            if self.code != (code := task.code()):
+                raise StudyError(
+                    f"this process runs code version {code}, the study {self.code}: "
+                    "the package changed while the study ran"
+                )
+            outcome = task.play(self.case, self.seed, self.policy_seed)
+        except Exception:  # noqa: BLE001 - kept as the run's outcome, and blocks the verdict
+            outcome = Outcome(error=traceback.format_exc())
+        return replace(outcome, wall_seconds=time.perf_counter() - start)
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 DEFAULT = "warehouse"
@@ -136,7 +264,7 @@ def task_of(source: object) -> Task:
     Raises:
         StudyError: there is none.
     """
-    found: Any = source
+    found = source
     if isinstance(source, str):
         module, colon, attribute = NAMES.get(source, source).partition(":")
         if not colon:
@@ -152,26 +280,20 @@ def task_of(source: object) -> Task:
     return found
 
 
-def refuse_untrusted(source: object, place: object, *, trust_code: bool) -> None:
-    """Raise StudyError if a file, `place`, names a task whose module would run when it is loaded.
+def refuse_untrusted(
+    place: Path, task: str | None, policies: tuple[PolicySpec, ...] = (), *, trust_code: bool
+) -> None:
+    """Raise StudyError if what a file names would run code when it is loaded.
 
     Args:
-        trust_code: whether it may.
+        place: the file.
+        task, policies: that it names.
+        trust_code: whether they may.
     """
-    if isinstance(source, str) and ":" in source and not trust_code:
+    said = [f"task {task!r}"] if task is not None and ":" in task else []
+    said += [f"policy {policy.name!r}" for policy in policies if policy.runs_code]
+    if said and not trust_code:
         raise StudyError(
-            f"{place}: task {source!r} is code, which runs when it is loaded: should be a task's "
-            "name, or be allowed by --trust-code (trust_code=True)"
+            f"{place}: {said[0]} is code, which runs when it is loaded: should be a name that the "
+            "package knows, or be allowed by --trust-code (trust_code=True)"
         )
-
-
-def _checked(source: object) -> object:
-    task_of(source)
-    return source
-
-
-def _written(source: object) -> str:
-    return source if isinstance(source, str) else task_of(source).name
-
-
-TaskSource = Annotated[Any, BeforeValidator(_checked), PlainSerializer(_written)]

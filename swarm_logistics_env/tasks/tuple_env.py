@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import gymnasium
-from pettingzoo import ParallelEnv
 
 from swarm_logistics_env.errors import SetupError
 
+from .parallel_policies import Env, Value
 
-class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo's is untyped
+
+class TupleEnv(Env):  # type: ignore[misc]  # PettingZoo's is untyped
     """The parallel form of a Gymnasium environment with a tuple entry for each agent.
 
     All agents are there from the first step to the last. A reward that is one number is given to
@@ -23,10 +24,10 @@ class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo'
         SetupError: its spaces are no tuples.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"name": "tuple_env", "is_parallelizable": True}
+    metadata: ClassVar[dict[str, Value]] = {"name": "tuple_env", "is_parallelizable": True}
 
-    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        parts: list[tuple[Any, ...]] = []
+    def __init__(self, env: gymnasium.Env[Value, Value]) -> None:
+        parts: list[tuple[Value, ...]] = []
         for space in (env.observation_space, env.action_space):
             if not isinstance(space, gymnasium.spaces.Tuple):
                 raise SetupError(f"{env}: space {space} should be a Tuple, one part an agent")
@@ -40,38 +41,38 @@ class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo'
         self.agents: list[str] = []
 
     @property
-    def unwrapped(self) -> Any:
+    def unwrapped(self) -> Value:
         """The environment below all wrappers."""
         return self.env.unwrapped
 
-    def observation_space(self, agent: str) -> Any:
+    def observation_space(self, agent: str) -> Value:
         """Return the space of an agent's observations."""
         return self.observation_spaces[agent]
 
-    def action_space(self, agent: str) -> Any:
+    def action_space(self, agent: str) -> Value:
         """Return the space of an agent's actions."""
         return self.action_spaces[agent]
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        self, seed: int | None = None, options: dict[str, Value] | None = None
+    ) -> tuple[dict[str, Value], dict[str, dict[str, Value]]]:
         """Begin an episode."""
         observations, info = self.env.reset(seed=seed, options=options)
         self.agents = self.possible_agents[:]
         return dict(zip(self.agents, observations)), self._infos(info)
 
     def step(
-        self, actions: dict[str, Any]
+        self, actions: dict[str, Value]
     ) -> tuple[
-        dict[str, Any],
+        dict[str, Value],
         dict[str, float],
         dict[str, bool],
         dict[str, bool],
-        dict[str, dict[str, Any]],
+        dict[str, dict[str, Value]],
     ]:
         """Step all agents."""
         agents = self.agents
-        rewards: Any
+        rewards: Value
         observations, rewards, terminated, truncated, info = self.env.step(
             tuple(actions[agent] for agent in agents)
         )
@@ -87,7 +88,7 @@ class TupleEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo'
             infos,
         )
 
-    def _infos(self, info: dict[str, Any]) -> dict[str, Any]:
+    def _infos(self, info: dict[str, Value]) -> dict[str, Value]:
         by_agent = set(info) == set(self.agents)
         return {agent: info[agent] if by_agent else info for agent in self.agents}
 

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play, run_episode
+from swarm_logistics_env.policies.policy import code_digest
+from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import Fault
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
 
-from .code_version import code_version
-from .policy_choice import policy_of
-from .task import Outcome, Playable
+from .task import Case, Conditions, Outcome, Run
 
-__all__ = ["WAREHOUSE", "Fault", "Scenario", "WarehouseTask"]
+
+def code_version() -> str:
+    """Return the digest of the code that decides an episode, 16 hexadecimal digits.
+
+    Its modules are those that the warehouse and `run_episode` use; policies have identities of
+    their own. Docstrings, comments on lines of their own and blank lines do not count.
+    """
+    return code_digest(Play, Warehouse)
 
 
 class WarehouseTask:
@@ -31,7 +37,7 @@ class WarehouseTask:
     removed: str | None = "removed"
     performance = "the number of items delivered in the order requested"
     default = Scenario()
-    policies: Mapping[str, Callable[..., Any]] = MappingProxyType({})
+    policies = NO_MAKERS
 
     @property
     def fields(self) -> dict[str, str]:
@@ -52,7 +58,7 @@ class WarehouseTask:
         """Return the version of the simulation."""
         return code_version()
 
-    def vary(self, base: Scenario, fields: Mapping[str, Any]) -> Scenario:
+    def vary(self, base: Conditions, fields: Mapping[str, object]) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.
 
         Raises:
@@ -61,31 +67,33 @@ class WarehouseTask:
         changes = dict(fields)
         if "preset" in changes:
             base = Scenario.preset(str(changes.pop("preset")))
+        assert isinstance(base, Scenario)
         return base.replace(**changes)
 
-    def fault(self, mode: str, robots: int, onset: float, duration: float | None) -> Fault:
-        """Return the fault of some robots from `onset` on, for `duration` [s] or for good."""
-        return Fault(mode, robots, onset=onset, duration=duration)
+    def fault(
+        self, mode: str, robots: int, onset: float, duration: float | None, **manner: object
+    ) -> Fault:
+        """Return the fault of some robots from `onset` on; `manner` is its further fields."""
+        return Fault(mode, robots, onset=onset, duration=duration).replace(**manner)
 
-    def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
+    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one episode; see `Task.play`."""
+        scenario, faults = _of_the_warehouse(case)
         # A policy of its own: one that remembers must not make rows depend on the order of runs.
-        episode = run_episode(
-            condition.scenario,
-            policy_of(policy, self.policies),
-            seed,
-            condition.faults,
-            policy_seed,
-        )
+        episode = run_episode(scenario, case.policy.load(), seed, faults, policy_seed)
         return Outcome(
-            "",
-            delivery_times=np.asarray(episode.delivery_times, dtype=np.float64),
-            ended_at=float(episode.ended_at),
-            all_delivered=bool(episode.all_delivered),
-            failed_robots=tuple(int(robot) for robot in episode.failed_robots),
-            anchoring_seconds=float(episode.anchoring_seconds),
+            delivery_times=episode.delivery_times,
+            ended_at=episode.ended_at,
+            all_delivered=episode.all_delivered,
+            failed_robots=episode.failed_robots,
+            anchoring_seconds=episode.anchoring_seconds,
             digest=episode.digest,
         )
+
+
+def _of_the_warehouse(case: Case) -> tuple[Scenario, tuple[Fault, ...]]:
+    assert isinstance(case.scenario, Scenario)
+    return case.scenario, tuple(fault for fault in case.faults if isinstance(fault, Fault))
 
 
 WAREHOUSE = WarehouseTask()
@@ -117,19 +125,15 @@ class Recording:
     digest: str
 
 
-def record_run(source: object, condition: Playable, seed: int, policy_seed: int) -> Recording:
+def record_run(run: Run) -> Recording:
     """Play a run of the warehouse again and return where everything was.
-
-    Args:
-        source: the policy, as `policy_of` takes it.
-        condition: its scenario and faults.
-        seed, policy_seed: as `Task.play`.
 
     Raises:
         PolicyError: the policy cannot be found or built, or returned what is no command.
     """
-    play = Play(condition.scenario, policy_of(source), seed, condition.faults, policy_seed)
-    state, scenario = play.world.state, condition.scenario
+    scenario, faults = _of_the_warehouse(run.case)
+    play = Play(scenario, run.case.policy.load(), run.seed, faults, run.policy_seed)
+    state = play.world.state
     every = max(1, round(1.0 / (FRAME_RATE * scenario.control_period)))
     digest = hashlib.blake2b(digest_size=16)
     frames = []

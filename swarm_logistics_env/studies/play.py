@@ -1,45 +1,125 @@
-"""Engines: what plays the runs. Whichever does, the outcomes are the same; their order is not."""
+"""Playing: what plays runs, in this process, in many or on Ray, and keeps each in a store.
+
+Whichever engine plays them, the outcomes are the same; their order is not.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import pickle
+import re
 import signal
 import threading
-import time
 import traceback
-from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from itertools import islice
 from multiprocessing.connection import Connection
 from types import ModuleType
-from typing import Any
+from typing import Self
 from unittest.mock import patch
 
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.kernels import QUIET
-from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.progress_bar import ProgressBar
+from swarm_logistics_env.tasks.task import Case, Outcome, Run
 
 from .plan import Plan
-from .runs import Condition, Run
+from .runs import Runs
 
-# Simulated seconds that are played to know how long a study takes.
-PILOT = 3.0
+Played = Generator[tuple[Run, Outcome], None, None]
+Engine = Callable[[Iterable[Run]], Played]
+NAMES = ("local", "process", "ray")
+PILOT = 3.0  # simulated seconds that are played to know how long a study takes
 
-Engine = Callable[[Iterable[Run]], Generator[tuple[Run, Outcome], None, None]]
+
+@dataclass(frozen=True)
+class Tally:
+    """The numbers of one call of `Study.run`.
+
+    Attributes:
+        played: runs played now; failed: those of them that failed; kept: found in the store.
+        seconds: wall-clock time [s].
+        error: what the first that failed raised, without its traceback; None: none failed.
+    """
+
+    played: int
+    failed: int
+    kept: int
+    seconds: float
+    error: str | None = None
 
 
-def serial(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+@dataclass(frozen=True)
+class Shard:
+    """Part `number` of `count`, counted from 1.
+
+    Raises:
+        StudyError: there is no such part.
+    """
+
+    number: int
+    count: int
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.number <= self.count:
+            raise StudyError(f"shard {self}: should be i/n with i from 1 to n")
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the shard that "i/n" means."""
+        match = re.fullmatch(r"(\d+)/(\d+)", text)
+        if match is None:
+            raise StudyError(f"shard {text}: should be i/n, e.g. 2/8")
+        return cls(int(match[1]), int(match[2]))
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    @property
+    def directory(self) -> str:
+        """Name of the directory of its store: shards on one disk never share a file."""
+        return f"shard-{self.number}-of-{self.count}"
+
+    def of(self, runs: Iterable[Run]) -> list[Run]:
+        """Return every n-th run from the i-th on."""
+        # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
+        return list(islice(runs, self.number - 1, None, self.count))
+
+
+def play(
+    runs: Sequence[Run], engine: Engine, store: Runs, title: str
+) -> tuple[list[Outcome], float]:
+    """Play runs and keep each in the store at once; show a progress bar.
+
+    Returns:
+        The outcomes, as they finished, and how long it took [s].
+    """
+    progress = ProgressBar(
+        title, len(runs), "runs", parts=Counter(run.case.policy.title for run in runs)
+    )
+    outcomes: list[Outcome] = []
+    done, finished = Counter[str](), engine(runs)
+    # Closed at once where this stops early, so that no worker outlives it.
+    with closing(finished), progress:
+        for run, outcome in finished:
+            store.add(run, outcome)
+            outcomes.append(outcome)
+            done[run.case.policy.title] += 1
+            failed = sum(each.error is not None for each in outcomes)
+            progress.reach(len(outcomes), f"{failed} failed", done)
+    return outcomes, progress.seconds
+
+
+def serial(runs: Iterable[Run]) -> Played:
     """Play the runs one after the other in this process."""
     for run in runs:
-        yield run, execute(run)
-
-
-NAMES = ("local", "process", "ray")
+        yield run, run.play()
 
 
 def engine_named(name: str, processes: int | None = None, address: str | None = None) -> Engine:
@@ -69,23 +149,6 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
     return Cluster(address, processes)
 
 
-def execute(run: Run) -> Outcome:
-    """Play a run; whatever goes wrong in it is its outcome."""
-    start = time.perf_counter()
-    condition = run.condition
-    try:
-        code = condition.task.code()
-        if run.code != code:
-            raise StudyError(
-                f"this process runs code version {code}, the study {run.code}: "
-                "the package changed while the study ran"
-            )
-        outcome = condition.task.play(condition.policy.source, condition, run.seed, run.policy_seed)
-    except Exception:  # noqa: BLE001 - kept as the run's row, and blocks the verdict
-        outcome = Outcome("", error=traceback.format_exc())
-    return replace(outcome, run=run.key, wall_seconds=time.perf_counter() - start)
-
-
 # One thread per worker: n workers with n threads each would wait for each other.
 _ONE_THREAD = dict.fromkeys(
     ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
@@ -105,42 +168,38 @@ class ProcessPool:
     def __init__(self, count: int) -> None:
         self.count = count
 
-    def __call__(self, runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+    def __call__(self, runs: Iterable[Run]) -> Played:
         """Yield each run with its outcome, as they finish."""
         waiting = deque(runs)
         while waiting:
-            interrupted: list[Run] = []
             with workers(min(self.count, len(waiting))) as pool:
-                for run, outcome in _played(pool, waiting, self.count):
-                    if outcome is None:
-                        interrupted.append(run)
-                    else:
-                        yield run, outcome
+                interrupted = yield from _played(pool, waiting, self.count)
             for run in interrupted:
                 yield run, _played_alone(run)
 
 
 def _played(
     pool: ProcessPoolExecutor, waiting: deque[Run], at_once: int
-) -> Iterator[tuple[Run, Outcome | None]]:
-    """Yield runs with their outcomes until none waits, or with None once a worker has died."""
+) -> Generator[tuple[Run, Outcome], None, list[Run]]:
+    """Yield runs with their outcomes until none waits; return those that a dead worker played."""
     playing: dict[Future[Outcome], Run] = {}
-    broken = False
-    while playing or (waiting and not broken):
-        while waiting and not broken and len(playing) < at_once:
+    interrupted: list[Run] = []
+    while playing or (waiting and not interrupted):
+        while waiting and not interrupted and len(playing) < at_once:
             message = _pickled(waiting[0])
             try:
-                playing[pool.submit(_play, waiting[0].key, message)] = waiting[0]
+                playing[pool.submit(_play, message)] = waiting[0]
             except BrokenProcessPool:  # a worker died between two runs
-                broken = True
+                interrupted.append(waiting.popleft())
             else:
                 waiting.popleft()
         for future in wait(playing, return_when=FIRST_COMPLETED).done:
+            run = playing.pop(future)
             try:
-                outcome = future.result()
+                yield run, future.result()
             except BrokenProcessPool:
-                broken, outcome = True, None
-            yield playing.pop(future), outcome
+                interrupted.append(run)
+    return interrupted
 
 
 def _played_alone(run: Run) -> Outcome:
@@ -148,17 +207,17 @@ def _played_alone(run: Run) -> Outcome:
     with workers(1) as pool:
         (worker,) = set(multiprocessing.active_children()) - others
         try:
-            return pool.submit(_play, run.key, _pickled(run)).result()
+            return pool.submit(_play, _pickled(run)).result()
         except BrokenProcessPool:
             worker.join()
     code = worker.exitcode or 0
     cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
     error = f"WorkerDied: two worker processes ended in this run, the second by {cause}\n"
-    return Outcome(run.key, error=error)
+    return Outcome(error=error)
 
 
 @contextmanager
-def workers(count: int) -> Iterator[ProcessPoolExecutor]:
+def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
     """Start worker processes, and end them at once with the block, or when this process dies."""
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)
@@ -192,25 +251,8 @@ def _end_with_parent(connection: Connection) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _pickled(run: Run) -> bytes:
-    try:
-        return pickle.dumps(run)
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise StudyError(
-            f"policy {run.condition.policy.label!r} cannot be sent to another process "
-            f"({error}): use one process"
-        ) from error
-
-
-def _play(key: str, message: bytes) -> Outcome:
-    try:
-        return execute(pickle.loads(message))
-    except Exception:  # noqa: BLE001 - a policy that only the parent can import
-        return Outcome(key, error=traceback.format_exc())
-
-
 @contextmanager
-def _interrupts_ignored() -> Iterator[None]:
+def _interrupts_ignored() -> Generator[None, None, None]:
     """Start workers that ignore SIGINT: the parent alone decides how the study stops."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -222,6 +264,25 @@ def _interrupts_ignored() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+def _pickled(run: Run, dumps: Callable[[Run], bytes] = pickle.dumps) -> bytes:
+    try:
+        return dumps(run)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise StudyError(
+            f"policy {run.case.policy.title!r} cannot be sent to another process "
+            f"({str(error).splitlines()[0]}): use one process"
+        ) from error
+
+
+def _play(message: bytes) -> Outcome:
+    os.environ[QUIET] = "1"
+    try:
+        run: Run = pickle.loads(message)
+    except Exception:  # noqa: BLE001 - a policy that only the parent can import
+        return Outcome(error=traceback.format_exc())
+    return run.play()
+
+
 def expected_seconds(plan: Plan) -> float:
     """Return how long a study takes at most on one process of this machine [s].
 
@@ -231,37 +292,30 @@ def expected_seconds(plan: Plan) -> float:
     Raises:
         StudyError: a policy fails in its first seconds.
     """
-    shortened = {_kind(condition): condition for condition in plan.conditions}
-    pace = {kind: _pace(plan, condition) for kind, condition in shortened.items()}
-    return len(plan.seeds) * sum(pace[_kind(c)] * c.duration for c in plan.conditions)
+    shortened = {_kind(case): case for case in plan.cases}
+    pace = {kind: _pace(plan, case) for kind, case in shortened.items()}
+    return len(plan.seeds) * sum(pace[_kind(c)] * c.scenario.duration for c in plan.cases)
 
 
-def _kind(condition: Condition) -> tuple[str, int]:
-    return condition.policy.identity, condition.size
+def _kind(case: Case) -> tuple[str, int]:
+    return case.identity, case.scenario.n_robots
 
 
-def _pace(plan: Plan, condition: Condition) -> float:
+def _pace(plan: Plan, case: Case) -> float:
     """Return the wall time of a simulated second [s]."""
-    duration = min(PILOT, condition.duration)
-    scenario = condition.task.vary(condition.scenario, {"duration": duration})
-    run = Condition(condition.policy, scenario, task=condition.task).run(plan.code, 0)
-    outcomes = [execute(run) for _ in range(2)]  # the first may compile
+    duration = min(PILOT, case.scenario.duration)
+    scenario = case.task.vary(case.scenario, {"duration": duration})
+    run = replace(case, scenario=scenario, faults=()).run(plan.code, 0)
+    outcomes = [run.play() for _ in range(2)]  # the first may compile
     for outcome in outcomes:
         if outcome.error is not None:
             reason = outcome.error.strip().splitlines()[-1]
-            raise StudyError(
-                f"policy {condition.policy.label!r} fails in its first seconds: {reason}"
-            )
+            raise StudyError(f"policy {case.policy.title!r} fails in its first seconds: {reason}")
     return min(outcome.wall_seconds for outcome in outcomes) / duration
 
 
 RETRIES = 1  # after a worker's death, as local processes do
 QUEUED_PER_CORE = 2  # so that no core waits for this process
-
-
-def _execute_quietly(run: Run) -> Outcome:
-    os.environ[QUIET] = "1"
-    return execute(run)
 
 
 class Cluster:
@@ -283,25 +337,28 @@ class Cluster:
         self.address = address
         self.cores = cores
 
-    def __call__(self, runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+    def __call__(self, runs: Iterable[Run]) -> Played:
         """Yield each run with its outcome, as they finish."""
-        waiting = iter(runs)
-        first = next(waiting, None)
-        if first is None:
+        waiting = deque(runs)
+        if not waiting:
             return
         ray, ours = self._connected()
-        pending: dict[Any, Run] = {}
+        pending: dict[object, Run] = {}
         try:
-            play = ray.remote(num_cpus=1, max_retries=RETRIES)(_execute_quietly)
+            sent = ray.remote(num_cpus=1, max_retries=RETRIES)(_play)
             # A policy travels with every run, so only a few runs are sent at a time.
             limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
-            pending[_submitted(play, first)] = first
-            while pending:
-                while len(pending) < limit and (run := next(waiting, None)) is not None:
-                    pending[_submitted(play, run)] = run
+            while pending or waiting:
+                while waiting and len(pending) < limit:
+                    message = _pickled(waiting[0], ray.cloudpickle.dumps)
+                    pending[sent.remote(message)] = waiting.popleft()
                 for task in ray.wait(list(pending), num_returns=1)[0]:
                     run = pending.pop(task)
-                    yield run, _outcome(ray, task, run)
+                    try:
+                        outcome = ray.get(task)
+                    except ray.exceptions.RayError:  # its worker died twice
+                        outcome = Outcome(error=traceback.format_exc())
+                    yield run, outcome
         finally:
             for task in pending:
                 ray.cancel(task, force=True)
@@ -331,21 +388,3 @@ class Cluster:
             reason = str(error).strip().splitlines()[0]
             raise StudyError(f"no Ray cluster at {self.address}: {reason}") from error
         return ray, True
-
-
-def _submitted(play: Any, run: Run) -> Any:
-    try:
-        return play.remote(run)
-    except TypeError as error:
-        raise StudyError(
-            f"policy {run.condition.policy.label!r} cannot be sent to another process "
-            f"({str(error).splitlines()[0]}): use the engine local"
-        ) from error
-
-
-def _outcome(ray: ModuleType, task: Any, run: Run) -> Outcome:
-    try:
-        outcome: Outcome = ray.get(task)
-    except ray.exceptions.RayError:  # its worker died twice, or cannot import the policy
-        return Outcome(run.key, error=traceback.format_exc())
-    return outcome

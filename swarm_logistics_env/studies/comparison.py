@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
-from swarm_logistics_env.spi.equivalence import Equivalence, equivalence
+from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.tasks.task import Case
 
-from .runs import Condition
-
-Performance = Callable[["Arm"], NDArray[np.float64]]
+CONFIDENCE = 0.95  # of intervals and verdicts, unless a look of a study makes it larger
 
 
 class Setting(NamedTuple):
@@ -48,10 +47,10 @@ OTHER_BEHAVIOUR = Setting("fault", "other behaviour", 0)
 
 @dataclass(frozen=True)
 class Arm:
-    """A condition in the part that it plays in a comparison."""
+    """A case in the part that it plays in a comparison."""
 
     setting: Setting
-    condition: Condition
+    case: Case
 
 
 class Question(NamedTuple):
@@ -88,7 +87,7 @@ class Comparison:
     @property
     def policy(self) -> str:
         """Label of the policy that is judged."""
-        return self.original.condition.policy.label
+        return self.original.case.policy.title
 
     @property
     def definition(self) -> Definition:
@@ -118,6 +117,11 @@ class Comparison:
         return dict(zip(self.definition.performances, arms))
 
     @property
+    def n_robots(self) -> int:
+        """Swarm size N of the original condition."""
+        return self.original.case.scenario.n_robots
+
+    @property
     def label(self) -> str:
         """The step in words, e.g. "N 5 -> 10" or "FM1, m = 2"."""
         before, after = self.original.setting, self.changed.setting
@@ -128,62 +132,69 @@ class Comparison:
         return str(after)
 
     def estimate(
-        self, performance: Performance, *, saturated: Collection[Arm] = (), **options: Any
+        self,
+        performance: Mapping[Arm, NDArray[np.float64]],
+        *,
+        paired: bool = True,
+        saturated: Collection[Arm] = (),
+        identical: bool = False,
+        confidence: float = CONFIDENCE,
     ) -> Estimate:
         """Return the indicator over seeds.
 
         Args:
-            performance: gives the P of an arm, shape (n_seeds,) [items], seed by seed.
+            performance: P of each arm, shape (n_seeds,) [items], seed by seed.
+            paired, confidence: as in `spi.Options`.
             saturated: arms whose P is capped, every item delivered in a run.
-            options: the further `spi.Options`; `identical` is about the original and the changed
-                arm.
+            identical: whether the original and the changed arm gave the same runs.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
         """
         definition, named = self.definition, self.arguments
         before, after = self.original.setting.value, self.changed.setting.value
-        if self.removed:  # the removed robots make the third condition another one by construction
-            options.pop("identical", None)
         return definition.function(
-            **{name: performance(arm) for name, arm in named.items()},
-            **definition.arguments(Change(before, after, self.original.condition.size)),
+            **{name: performance[arm] for name, arm in named.items()},
+            **definition.arguments(Change(before, after, self.n_robots)),
             threshold=self.threshold,
+            paired=paired,
+            confidence=confidence,
             saturated=[name for name, arm in named.items() if arm in saturated],
-            **options,
+            # The removed robots make the third condition another one by construction.
+            **({} if self.removed else {"identical": identical}),
         )
 
     def equivalence(
         self,
-        performance: Performance,
+        performance: Mapping[Arm, NDArray[np.float64]],
         *,
         margin: float,
+        paired: bool = True,
         saturated: Collection[Arm] = (),
         identical: bool = False,
-        **options: Any,
+        alpha: float = ALPHA,
     ) -> Equivalence | None:
         """Return whether P is unchanged within a margin; None for S, which has no such question.
 
         Args:
-            performance, saturated, identical: as in `estimate`.
-            margin: as in `spi.equivalence`.
-            options: its `alpha` and `paired`.
+            performance, paired, saturated, identical: as in `estimate`.
+            margin, alpha: as in `spi.equivalence`.
 
         Raises:
             IndicatorError: the change is undefined, e.g. because mean P_o is 0.
         """
         if self.definition.unchanged(margin) is None:
             return None
-        named = {"p_o": self.original, "p_new": self.changed}
-        if self.removed:
-            named["p_s"] = self.removed
-        samples: dict[str, Any] = {name: performance(arm) for name, arm in named.items()}
+        named = {"p_o": self.original, "p_new": self.changed, "p_s": self.removed}
         return equivalence(
-            **samples,
+            performance[self.original],
+            performance[self.changed],
+            performance[self.removed] if self.removed else None,
             margin=margin,
+            alpha=alpha,
+            paired=paired,
             saturated=[name for name, arm in named.items() if arm in saturated],
             identical=identical and not self.removed,
-            **options,
         )
 
 
@@ -210,7 +221,9 @@ class Reference:
         """Return the published value of an indicator, without interval, where there is one."""
         if any(arm.setting not in self.performance for arm in comparison.arms):
             return None
-        return comparison.estimate(lambda arm: np.array([self.performance[arm.setting]]))
+        return comparison.estimate(
+            {arm: np.array([self.performance[arm.setting]]) for arm in comparison.arms}
+        )
 
 
 def load_reference(name: str | None) -> Reference | None:

@@ -1,4 +1,4 @@
-"""Metadata: what a store says of its study besides the runs, and one study merged of several."""
+"""Declaration: what a store says of its study besides the runs, and one study merged of several."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import to_json
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
@@ -17,10 +17,10 @@ from swarm_logistics_env.spi.trials import Trial
 from swarm_logistics_env.tasks.task import NAMES, Task, refuse_untrusted
 
 from .plan import Plan
-from .runs import seeds_in_words
-from .specification import Specification
-from .store import FILE_NAME, Store, new_store, refuse_study_in
+from .runs import FILE_NAME, Runs
+from .specification import Specification, seeds_in_words
 
+NOTE = "study"
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _Seed = Annotated[int, Field(ge=0, strict=True)]
 _Share = Annotated[float, Field(gt=0, lt=1)]
@@ -52,7 +52,7 @@ class StoredSpecification(BaseModel):
                 "again, as Study.stored(.., task=..)"
             )
         if task is None:
-            refuse_untrusted(self.task, place, trust_code=trust_code)
+            refuse_untrusted(place, self.task, trust_code=trust_code)
         return Specification(**{**self.model_dump(), "task": task or self.task})
 
     def differing(self, asked: Specification, place: Path) -> list[str]:
@@ -142,8 +142,8 @@ class Origin(Record):
     trials: tuple[Trial, ...] = ()
 
 
-class Metadata(BaseModel):
-    """What a store notes of its study; each field is a row of text, in JSON but for the code.
+class StoredStudy(BaseModel):
+    """What a store notes of its study.
 
     Attributes:
         specification: what the study asks.
@@ -155,62 +155,62 @@ class Metadata(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    specification: Json[StoredSpecification]
+    specification: StoredSpecification
     code: str
-    identities: Json[dict[str, str]]
-    declared: Json[Declaration]
-    imported: Json[Origin] | None = None
+    identities: dict[str, str]
+    declared: Declaration
+    imported: Origin | None = None
 
     @classmethod
-    def of(cls, store: Store) -> Self | None:
-        """Return what a store notes; None: nothing yet, or not all that is needed.
+    def of(cls, runs: Runs) -> Self | None:
+        """Return what a store notes; None: nothing yet.
 
         Raises:
-            StudyError: a row does not read.
+            StudyError: it does not read.
         """
-        notes = store.notes()
-        if _missing_in(notes):
-            return None
+        note = runs.notes().get(NOTE)
         try:
-            return cls.model_validate(notes, strict=True)
+            return None if note is None else cls.model_validate_json(note, strict=True)
         except ValidationError as error:
-            name = error.errors()[0]["loc"][0]
+            name = ".".join(map(str, error.errors()[0]["loc"])) or NOTE
             raise StudyError(
-                f"the store {store.path} is damaged: its note {name!r} does not read"
+                f"the store {runs.path} is damaged: its note {name!r} does not read"
             ) from None
 
+    @classmethod
+    def existing(cls, directory: Path) -> Self:
+        """Return what the store of a study that was run or imported notes.
 
-def of_existing(directory: Path) -> Metadata:
-    """Return what the store of a study that was run or imported notes.
-
-    Raises:
-        StudyError: there is none, something is missing in it, or does not read.
-    """
-    with Store.existing(directory) as store:
-        found = Metadata.of(store)
+        Raises:
+            StudyError: there is none, it notes nothing, or the note does not read.
+        """
+        with Runs.existing(directory) as runs:
+            found = cls.of(runs)
         if found is None:
             raise StudyError(
-                f"the store in {directory} does not note its {_missing_in(store.notes())}: run the "
-                "study once more there (finished runs are kept), then it will"
+                f"the store in {directory} does not note its study: run the study once more there "
+                "(finished runs are kept), then it will"
             )
         return found
 
 
-def _missing_in(notes: Mapping[str, object]) -> str | None:
-    needed = (name for name, field in Metadata.model_fields.items() if field.is_required())
-    return next((name for name in needed if name not in notes), None)
-
-
-def notes_of(
-    specification: object, code: str, identities: Mapping[str, str], declared: Declaration
-) -> dict[str, str]:
-    """Return the rows that `Metadata.of` reads, of a study that is played."""
-    notes = {
+def note(
+    runs: Runs,
+    specification: Specification | StoredSpecification,
+    code: str,
+    identities: Mapping[str, str],
+    declared: Declaration,
+    imported: Origin | None = None,
+) -> None:
+    """Note a study in its store, for `StoredStudy.of`."""
+    fields = {
         "specification": specification,
+        "code": code,
         "identities": dict(identities),
         "declared": declared,
+        "imported": imported,
     }
-    return {"code": code, **{name: to_json(value).decode() for name, value in notes.items()}}
+    runs.note({NOTE: to_json(fields).decode()})
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
@@ -226,25 +226,24 @@ def merge(directories: Sequence[Path], out: Path) -> int:
         StudyError: a store cannot be read, they are not of one study, two of them have different
             results of one run, or `out` holds a study.
     """
-    refuse_study_in(out, "merge")
-    stored = {directory: of_existing(directory) for directory in directories}
-    first, one = next(iter(stored.items()))
-    for directory, other in stored.items():
-        if other.imported is not None:
-            raise StudyError(f"{directory} was imported: only studies that were run are merged")
-        if differing := _differing(one, other):
-            raise StudyError(
-                f"{first} and {directory} differ in {', '.join(differing)}: should be shards of "
-                "one study"
-            )
-    with new_store(out) as store:
+    with Runs.new(out, "merge") as runs:
+        stored = {directory: StoredStudy.existing(directory) for directory in directories}
+        first, one = next(iter(stored.items()))
+        for directory, other in stored.items():
+            if other.imported is not None:
+                raise StudyError(f"{directory} was imported: only studies that were run are merged")
+            if differing := _differing(one, other):
+                raise StudyError(
+                    f"{first} and {directory} differ in {', '.join(differing)}: should be shards "
+                    "of one study"
+                )
         for directory in directories:
-            store.absorb(directory / FILE_NAME)
-        store.note(notes_of(one.specification, one.code, one.identities, one.declared))
-        return len(store)
+            runs.absorb(directory / FILE_NAME)
+        note(runs, one.specification, one.code, one.identities, one.declared)
+        return len(runs)
 
 
-def _differing(one: Metadata, other: Metadata) -> list[str]:
+def _differing(one: StoredStudy, other: StoredStudy) -> list[str]:
     """Return in words what two studies do not have in common."""
     mine, theirs = (
         {

@@ -1,0 +1,483 @@
+"""Cells and verdicts: P under each condition, and what every comparison of a study says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi import estimate as words
+from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.tasks.task import Outcome
+
+from .comparison import CONFIDENCE, Arm, Comparison, Reference
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+POWER = 0.8
+UNAFFECTED = "unaffected"
+_UNKNOWN = Interval(np.nan, None, None)
+Item = TypeVar("Item")
+Group = TypeVar("Group")
+
+
+def grouped(items: Iterable[Item], by: Callable[[Item], Group]) -> dict[Group, list[Item]]:
+    """Return the items by what they have in common, in order of appearance."""
+    found: dict[Group, list[Item]] = {}
+    for item in items:
+        found.setdefault(by(item), []).append(item)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """P of one policy under one condition.
+
+    Attributes:
+        policy: label of the policy.
+        table: heading of the report's table.
+        arm: the setting and the case.
+        outcomes: of the runs that succeeded, seed by seed.
+        problem: why runs are missing; None: they are complete.
+        published: P of the reference; None: it has none.
+        counted: whether it is one of the cells of the reference's tables.
+    """
+
+    policy: str
+    table: str
+    arm: Arm
+    outcomes: tuple[Outcome, ...]
+    problem: str | None
+    published: float | None = None
+    counted: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        policy: str,
+        table: str,
+        arm: Arm,
+        found: Sequence[Outcome | None],
+        *,
+        paired: bool = True,
+        reference: Reference | None = None,
+    ) -> Self:
+        """Return a cell from the outcomes of its runs, seed by seed; None: not played."""
+        missing = found.count(None)
+        failed = sum(outcome is not None and outcome.error is not None for outcome in found)
+        if not paired and missing < len(found):
+            missing = 0  # unpaired results need not be equally many everywhere
+        problems = [
+            f"{count} of {len(found)} runs {what}"
+            for count, what in ((failed, "failed"), (missing, "missing"))
+            if count
+        ]
+        return cls(
+            policy,
+            table,
+            arm,
+            tuple(one for one in found if one is not None and one.error is None),
+            ", ".join(problems) or None,
+            reference.performance.get(arm.setting) if reference else None,
+            reference is not None and arm.setting in reference.cells,
+        )
+
+    @cached_property
+    def by_seed(self) -> NDArray[np.float64]:
+        """P seed by seed, shape (n_seeds,)."""
+        return np.array([outcome.delivered for outcome in self.outcomes], dtype=np.float64)
+
+    @property
+    def n_seeds(self) -> int:
+        """Number of runs that succeeded."""
+        return len(self.outcomes)
+
+    @property
+    def digests(self) -> tuple[str | None, ...]:
+        """Digest of each run; equal digests: the same run."""
+        return tuple(outcome.digest for outcome in self.outcomes)
+
+    @property
+    def saturated(self) -> bool:
+        """Whether a run delivered every item, so that P is capped."""
+        return any(outcome.all_delivered for outcome in self.outcomes)
+
+    @cached_property
+    def mean(self) -> Interval:
+        """Mean P with its 95 % interval; NaN: no run."""
+        return spi.mean_interval(self.by_seed) if self.n_seeds else _UNKNOWN
+
+    @cached_property
+    def one_run(self) -> Interval:
+        """Mean P with the 95 % interval of one further run."""
+        return spi.prediction_interval(self.by_seed) if self.n_seeds else _UNKNOWN
+
+    @property
+    def stalled(self) -> float:
+        """Share of runs with less than a quarter of the cell's median P."""
+        return spi.share_stalled(self.by_seed) if self.n_seeds else 0.0
+
+    @property
+    def published_inside(self) -> bool | None:
+        """Whether the published P lies in the interval of one run; None: unknown."""
+        _, low, high = self.one_run
+        if self.published is None or low is None or high is None:
+            return None
+        return low <= self.published <= high
+
+
+Columns = Mapping[str, tuple[type, str]]  # name to type and meaning
+# Columns of cells.csv: type, meaning, and the value of a cell; a number that is missing is NaN.
+_CELL: dict[str, tuple[type, str, Callable[[Cell], object]]] = {
+    "policy": (str, "label of the policy", lambda c: c.policy),
+    "table": (str, "heading of the report's table", lambda c: c.table),
+    "cell": (str, "the condition in words, e.g. N = 10", lambda c: str(c.arm.setting)),
+    "kind": (str, "what is varied: size, fault, parameter or policy", lambda c: c.arm.setting.kind),
+    "factor": (str, "its name: n_robots, a failure mode, a parameter, or a policy",
+               lambda c: c.arm.setting.name),
+    "value": (float, "swarm size N, faulty robots m, or the parameter's value in its unit",
+              lambda c: c.arm.setting.value),
+    "onset": (float, "when the fault begins [s]", lambda c: c.arm.setting.onset),
+    "n_robots": (int, "swarm size N", lambda c: c.arm.case.scenario.n_robots),
+    "published": (float, "P of the reference", lambda c: c.published),
+    "counted": (bool, "whether it is one of the cells of the reference's tables",
+                lambda c: c.counted),
+    "n_seeds": (int, "number of runs that succeeded", lambda c: c.n_seeds),
+    "mean": (float, "mean P, in the unit of the task: items in the warehouse",
+             lambda c: c.mean.value),
+    "low": (float, "lower limit of the 95 % interval of the mean; missing at one seed",
+            lambda c: c.mean.low),
+    "high": (float, "upper limit of it", lambda c: c.mean.high),
+    "prediction_low": (float, "lower limit of the 95 % interval of one further run",
+                       lambda c: c.one_run.low),
+    "prediction_high": (float, "upper limit of it", lambda c: c.one_run.high),
+    "published_inside": (bool, "whether that interval holds the published P; missing: unknown",
+                         lambda c: c.published_inside),
+    "saturated": (bool, "whether a run delivered every item, so that P is capped",
+                  lambda c: c.saturated),
+    "stalled": (float, "share of runs with less than a quarter of the cell's median P",
+                lambda c: c.stalled),
+    "problem": (str, "why runs are missing; missing: they are complete", lambda c: c.problem),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What a study says of one comparison.
+
+    Attributes:
+        compared: what is compared.
+        estimate: the indicator; None: blocked.
+        problem: why it is blocked, e.g. by a failed run; None: it is not.
+        equivalence: whether P is unchanged; None: blocked, or not asked.
+        saturated: whether it rests on a P that is capped.
+        margin: the largest change that counts as none, as a share of P_o.
+        p_holm, verdict_holm: of the estimate under Holm; None: unaffected, or blocked family.
+        equivalence_holm: verdict of the equivalence under Holm; None as `equivalence`.
+        stopped_at: number of seeds at which it was clear, in a study that runs until then; None: it
+            is not, or the study is another.
+        published: the reference's value of the indicator; None: it has none.
+        claimed: whether it is claimed to lie above the threshold; None: nothing is claimed.
+    """
+
+    compared: Comparison
+    estimate: Estimate | None
+    problem: str | None
+    equivalence: Equivalence | None
+    saturated: bool
+    margin: float
+    p_holm: float | None = None
+    verdict_holm: words.Verdict | None = None
+    equivalence_holm: words.Verdict | None = None
+    stopped_at: int | None = None
+    published: float | None = None
+    claimed: bool | None = None
+
+    @property
+    def value(self) -> float | None:
+        """The estimate; None: blocked."""
+        return None if self.estimate is None else self.estimate.value
+
+    @property
+    def interval(self) -> Interval | None:
+        """The estimate with the limits of its interval; None: blocked."""
+        e = self.estimate
+        return None if e is None else Interval(e.value, e.low, e.high)
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Marks on the verdict, see `Estimate`."""
+        return self.estimate.flags if self.estimate else ()
+
+    @property
+    def asked(self) -> str:
+        """What is asked, e.g. "tolerant", "FT > 0.5" or "P falls"."""
+        definition, below = self.compared.definition, self.claimed is False
+        return definition.property_name(self.compared.threshold, claimed_below=below)
+
+    def verdict(self, *, holm: bool) -> str | None:
+        """Return whether it lies above the threshold; "unaffected": equal runs, no evidence."""
+        if self.estimate is None:
+            return None
+        if self.estimate.identical:
+            return UNAFFECTED
+        return self.verdict_holm if holm else self.estimate.verdict
+
+    def claim_verdict(self, *, holm: bool) -> str | None:
+        """Return the verdict on the claim; None: nothing is claimed."""
+        found = self.verdict(holm=holm)
+        if self.claimed is False:
+            return {"supported": "refuted", "refuted": "supported"}.get(found or "", found)
+        return None if self.claimed is None else found
+
+    def answer(self, *, holm: bool) -> str | None:
+        """Return the verdict on the property."""
+        return self.claim_verdict(holm=holm) if self._asks_for_fall else self.verdict(holm=holm)
+
+    @property
+    def _asks_for_fall(self) -> bool:
+        # "P falls" is asked as it is claimed; every other property is one above the threshold.
+        return self.compared.definition.compares == "policy" and self.claimed is False
+
+    @property
+    def claim(self) -> str | None:
+        """What is claimed, e.g. "not tolerant"; None: nothing."""
+        if self.claimed is None:
+            return None
+        return self.asked if self.claimed or self._asks_for_fall else f"not {self.asked}"
+
+    @property
+    def conclusion(self) -> str | None:
+        """The answer under Holm, but "equivalent" if that is inconclusive and P unchanged."""
+        found = self.answer(holm=True)
+        unchanged = self.equivalence_holm == "equivalent"
+        return "equivalent" if found == "inconclusive" and unchanged else found
+
+    @property
+    def unchanged(self) -> str | None:
+        """What is tested for equivalence, e.g. "P_F within 10 % of P_o"; None: nothing."""
+        return self.compared.definition.unchanged(self.margin)
+
+    @cached_property
+    def seeds_needed(self) -> int | None:
+        """Seeds for 80 % power at the published value, on average; None: none can be named."""
+        if self.estimate is None or self.published is None:
+            return None
+        return spi.seeds_for_power(self.estimate, self.published, POWER)
+
+    @property
+    def no_plan(self) -> str | None:
+        """Why no such number can be named."""
+        if self.estimate is None or self.published is None:
+            return None
+        return spi.no_plan_because(self.estimate, self.published)
+
+    @property
+    def least_power(self) -> float | None:
+        """Power that so many seeds keep in at least nine pilots of ten."""
+        if self.estimate is None or self.published is None or self.seeds_needed is None:
+            return None
+        return spi.lower_decile_of_power(self.estimate, self.published, self.seeds_needed)
+
+    @property
+    def detectable(self) -> float | None:
+        """Distance from the threshold that these seeds find with 80 % power."""
+        return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
+
+
+_VERDICT: dict[str, tuple[type, str, Callable[[Verdict], object]]] = {
+    "policy": (str, "label of the policy", lambda v: v.compared.policy),
+    "table": (str, "heading of the report's table", lambda v: v.compared.table),
+    "indicator": (str, "its symbol, e.g. FT", lambda v: v.compared.indicator),
+    "comparison": (str, "the step in words, e.g. N 5 -> 10", lambda v: v.compared.label),
+    "kind": (str, "what differs between the conditions: size, fault, parameter or policy",
+             lambda v: v.compared.changed.setting.kind),
+    "factor": (str, "its name: n_robots, a failure mode, a parameter, or a policy",
+               lambda v: v.compared.changed.setting.name),
+    "before": (float, "its value in the original condition", lambda v:
+               v.compared.original.setting.value),
+    "after": (float, "its value in the changed condition", lambda v:
+              v.compared.changed.setting.value),
+    "onset": (float, "when the fault begins [s]", lambda v: v.compared.changed.setting.onset),
+    "n_robots": (int, "swarm size N of the original condition", lambda v: v.compared.n_robots),
+    "threshold": (float, "what the indicator is tested against", lambda v: v.compared.threshold),
+    "value": (float, "the estimate; missing: blocked", lambda v: v.value),
+    "low": (float, "lower limit of its interval", lambda v: v.estimate and v.estimate.low),
+    "high": (float, "upper limit of its interval", lambda v: v.estimate and v.estimate.high),
+    "confidence": (float, "confidence level of the interval and the verdict",
+                   lambda v: v.estimate and v.estimate.confidence),
+    "probability": (float, "confidence that the indicator lies above the threshold, in [0, 1]",
+                    lambda v: v.estimate and v.estimate.probability),
+    "p_value": (float, "two-sided p, unadjusted", lambda v: v.estimate and v.estimate.p_value),
+    "p_holm": (float, "p adjusted after Holm within the family; missing: blocked or unaffected",
+               lambda v: v.p_holm),
+    "verdict": (str, "whether it lies above the threshold; unaffected: equal runs, no evidence",
+                lambda v: v.verdict(holm=False)),
+    "verdict_holm": (str, "the same after Holm", lambda v: v.verdict(holm=True)),
+    "n_seeds": (float, "number of seeds; missing: blocked", lambda v:
+                v.estimate and v.estimate.n_seeds),
+    "stopped_at": (float, "number of seeds at which it was clear; missing: open, or fixed seeds",
+                   lambda v: v.stopped_at),
+    "pairing_correlation": (float, "correlation of the two performances over seeds",
+                            lambda v: v.estimate and v.estimate.pairing_correlation),
+    "flags": (str, "marks on the verdict, see `Estimate`, with blanks between",
+              lambda v: " ".join(v.flags)),
+    "saturated": (bool, "whether it rests on a P that is capped", lambda v: v.saturated),
+    "property": (str, "what is asked, e.g. tolerant, FT > 0.5 or P falls", lambda v: v.asked),
+    "answer": (str, "verdict on the property", lambda v: v.answer(holm=False)),
+    "answer_holm": (str, "the same after Holm", lambda v: v.answer(holm=True)),
+    "conclusion": (str, "answer_holm, but equivalent if that is inconclusive and P unchanged",
+                   lambda v: v.conclusion),
+    "claim": (str, "what is claimed, e.g. not tolerant; missing: nothing", lambda v: v.claim),
+    "published": (float, "the reference's value of the indicator", lambda v: v.published),
+    "claim_verdict": (str, "verdict on the claim", lambda v: v.claim_verdict(holm=False)),
+    "claim_verdict_holm": (str, "the same after Holm", lambda v: v.claim_verdict(holm=True)),
+    "unchanged": (str, "what is tested for equivalence, e.g. P_F within 10 % of P_o",
+                  lambda v: v.unchanged),
+    "margin": (float, "the largest change that counts as none, as a share of P_o",
+               lambda v: v.equivalence and v.margin),
+    "change": (float, "relative change, e.g. P_F / P_o - 1; of FT (P_F - P_S) / P_o",
+               lambda v: v.equivalence and v.equivalence.change.value),
+    "change_low": (float, "lower limit of its interval, of level 1 - 2 alpha",
+                   lambda v: v.equivalence and v.equivalence.change.low),
+    "change_high": (float, "upper limit of it",
+                    lambda v: v.equivalence and v.equivalence.change.high),
+    "p_unchanged": (float, "p of equivalence; of a larger change p of its being beyond the margin",
+                    lambda v: v.equivalence and v.equivalence.p_value),
+    "equivalence": (str, "verdict on unchanged: equivalent, refuted or inconclusive",
+                    lambda v: v.equivalence and v.equivalence.verdict),
+    "equivalence_holm": (str, "the same after Holm", lambda v: v.equivalence_holm),
+    "detectable": (float, "distance from the threshold that these seeds find with 80 % power",
+                   lambda v: v.detectable),
+    "seeds_for_power_80": (float, "seeds for 80 % power at the published value, on average",
+                           lambda v: v.seeds_needed),
+    "least_power": (float, "power that so many seeds keep in at least nine pilots of ten",
+                    lambda v: v.least_power),
+    "no_plan": (str, "why no such number can be named", lambda v: v.no_plan),
+    "problem": (str, "why the comparison is blocked, e.g. by a failed run", lambda v: v.problem),
+}  # fmt: skip
+
+CELL_COLUMNS: Columns = {name: row[:2] for name, row in _CELL.items()}
+VERDICT_COLUMNS: Columns = {name: row[:2] for name, row in _VERDICT.items()}
+
+
+def frame_of_cells(cells: Iterable[Cell]) -> pd.DataFrame:
+    """Return cells as a table with the columns of `CELL_COLUMNS`, for CSV and for users."""
+    return _frame(list(cells), _CELL)
+
+
+def frame_of_verdicts(verdicts: Iterable[Verdict]) -> pd.DataFrame:
+    """Return verdicts as a table with the columns of `VERDICT_COLUMNS`, for CSV and for users."""
+    return _frame(list(verdicts), _VERDICT)
+
+
+def _frame(
+    rows: Sequence[Item], columns: Mapping[str, tuple[type, str, Callable[[Item], object]]]
+) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(
+        {
+            # Missing texts stay None, which pandas would turn into NaN.
+            name: pd.Series([value(row) for row in rows], dtype=float if kind is float else object)
+            for name, (kind, _, value) in columns.items()
+        }
+    )
+
+
+@dataclass(frozen=True)
+class Level:
+    """The level at which a comparison is judged.
+
+    Attributes:
+        confidence: of the indicator's interval and verdict, in (0, 1).
+        alpha: error of each of the two tests of equivalence, in (0, 0.5).
+    """
+
+    confidence: float = CONFIDENCE
+    alpha: float = ALPHA
+
+
+def judge_one(
+    comparison: Comparison,
+    cells: Mapping[Arm, Cell],
+    *,
+    paired: bool,
+    margin: float,
+    level: Level | None = None,
+) -> Verdict:
+    """Return a comparison's verdict, without what Holm makes of it.
+
+    A comparison that needs a run which failed or is missing is blocked.
+
+    Args:
+        cells: those of the comparison's arms.
+    """
+    level = level or Level()
+    used = {arm: cells[arm] for arm in comparison.arms}
+    saturated = [arm for arm, one in used.items() if one.saturated]
+    estimate, same = None, None
+    problems = [f"{arm.setting}: {one.problem}" for arm, one in used.items() if one.problem]
+    if not problems:
+        before, after = used[comparison.original], used[comparison.changed]
+        identical = comparison.removed is None and same_runs(before.digests, after.digests)
+        samples = {arm: one.by_seed for arm, one in used.items()}
+        try:
+            estimate = comparison.estimate(
+                samples,
+                paired=paired,
+                saturated=saturated,
+                identical=identical,
+                confidence=level.confidence,
+            )
+            same = comparison.equivalence(
+                samples,
+                margin=margin,
+                paired=paired,
+                saturated=saturated,
+                identical=identical,
+                alpha=level.alpha,
+            )
+        except spi.IndicatorError as error:
+            estimate, problems = None, [str(error)]
+    return Verdict(comparison, estimate, "; ".join(problems) or None, same, bool(saturated), margin)
+
+
+def under_holm(found: Sequence[Verdict]) -> Iterator[Verdict]:
+    """Yield verdicts with what Holm makes of them, family by family, in their order.
+
+    A blocked comparison leaves its family without adjusted verdicts: it would be too small.
+    """
+    adjusted: dict[Comparison, Verdict] = {}
+    for family in grouped(found, lambda one: one.compared.family).values():
+        estimates = [one.estimate for one in family if one.estimate]
+        same = [one.equivalence for one in family if one.equivalence]
+        p_values: list[float | None] = [None] * len(family)
+        verdicts: list[words.Verdict | None] = [None] * len(family)
+        unchanged: list[words.Verdict | None] = [None] * len(family)
+        if len(estimates) == len(family):
+            p_values, verdicts = [*spi.adjusted_p_values(estimates)], [*spi.adjust(estimates)]
+        if len(same) == len(family):
+            unchanged = [*spi.adjust(same)]
+        for one, p, verdict, as_before in zip(family, p_values, verdicts, unchanged):
+            adjusted[one.compared] = replace(
+                one,
+                p_holm=p,
+                # One of identical runs is no evidence, and has no verdict.
+                verdict_holm=None if p is None else verdict,
+                equivalence_holm=as_before,
+            )
+    yield from (adjusted[one.compared] for one in found)
+
+
+def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool:
+    """Return whether two conditions gave the same run at every seed, by the digests of the runs."""
+    return list(before) == list(after) and None not in before
