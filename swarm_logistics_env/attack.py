@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import TypeAlias
@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from swarm_logistics_env.errors import SetupError, StudyError, suggest
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi import Estimate, robustness
 from swarm_logistics_env.streams import generator
-from swarm_logistics_env.studies.engines import Engine
-from swarm_logistics_env.studies.judged_comparisons import same_runs
-from swarm_logistics_env.studies.performance_table import Played, played
-from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
-from swarm_logistics_env.studies.store import Store
-from swarm_logistics_env.tasks.policy_choice import policy_identity, policy_label
-from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
+from swarm_logistics_env.studies.play import Engine
+from swarm_logistics_env.studies.runs import Runs
+from swarm_logistics_env.studies.verdict import Cell, same_runs
+from swarm_logistics_env.tasks.task import Case, Outcome
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import ROLES
@@ -258,14 +257,14 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
         StudyError: the directory cannot be used, or a run failed.
     """
     faults = asked.faults()
-    label, identity = policy_label(asked.policy), policy_identity(asked.policy)
-    policy = StudiedPolicy(label, identity, asked.policy)
+    policy = PolicySpec.of(asked.policy)
+    base = Case(policy, policy.identity(), asked.scenario, task=WAREHOUSE)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(f"cannot write to {out}: {error.strerror}") from error
-    with Store(out / STORE) as store:
-        players = _Players(policy, asked.scenario, engine, store)
+    with Runs(out / STORE) as store:
+        players = _Players(base, engine, store)
         play = players.search_play(faults)
         worst, trials = search(faults, play, asked.budget, asked.seed)
         at_random, _ = random_search(faults, play, asked.budget, asked.seed)
@@ -292,7 +291,7 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
     )
 
 
-def _robustness(asked: Attack, sound: Played, failed: Played) -> Estimate:
+def _robustness(asked: Attack, sound: Cell, failed: Cell) -> Estimate:
     return robustness(
         sound.by_seed,
         failed.by_seed,
@@ -306,17 +305,17 @@ def _robustness(asked: Attack, sound: Played, failed: Played) -> Estimate:
 class _Players:
     """Plays faults over seeds; every run is kept in a store and played once."""
 
-    def __init__(
-        self, policy: StudiedPolicy, scenario: Scenario, engine: Engine, store: Store
-    ) -> None:
-        self._policy, self._scenario = policy, scenario
-        self._engine, self._store = engine, store
+    def __init__(self, base: Case, engine: Engine, store: Runs) -> None:
+        self._base, self._engine, self._store = base, engine, store
 
-    def played(self, faults: Sequence[Fault | None], seeds: Sequence[int]) -> list[Played]:
+    def played(self, faults: Sequence[Fault | None], seeds: Sequence[int]) -> list[Cell]:
         """Return the runs of each fault (None: without one) over the seeds."""
         outcomes = self._outcomes([(fault, seed) for fault in faults for seed in seeds])
-        n = len(seeds)
-        return [played(outcomes[place * n : (place + 1) * n]) for place in range(len(faults))]
+        n, arm = len(seeds), Arm(NO_FAULT, self._base)
+        return [
+            Cell.of("", "", arm, outcomes[place * n : (place + 1) * n])
+            for place in range(len(faults))
+        ]
 
     def search_play(self, faults: Sequence[Fault]) -> Play:
         """Return what plays a fault's k-th run with seed k, beside the run without a fault."""
@@ -326,8 +325,8 @@ class _Players:
             sound = self._delivered([(None, seed) for seed in range(max(last + 1, _NAMED_SEEDS))])
             if not sound.any():
                 raise SetupError(
-                    f"{self._policy.label} delivers nothing without faults, so no fault can cost "
-                    "anything: should be another policy, a longer duration or more robots"
+                    f"{self._base.policy.title} delivers nothing without faults, so no fault can "
+                    "cost anything: should be another policy, a longer duration or more robots"
                 )
             failed = self._delivered([(faults[place], seed) for place, seed in pairs])
             return list(failed - sound[[seed for _, seed in pairs]])
@@ -335,14 +334,12 @@ class _Players:
         return play
 
     def _delivered(self, pairs: Sequence[tuple[Fault | None, int]]) -> NDArray[np.float64]:
-        return played(self._outcomes(pairs)).by_seed
+        return np.array([outcome.delivered for outcome in self._outcomes(pairs)], np.float64)
 
     def _outcomes(self, pairs: Sequence[tuple[Fault | None, int]]) -> list[Outcome]:
         code = WAREHOUSE.code()
         runs = [
-            Condition(
-                self._policy, self._scenario, () if fault is None else (fault,), task=WAREHOUSE
-            ).run(code, seed)
+            replace(self._base, faults=() if fault is None else (fault,)).run(code, seed)
             for fault, seed in pairs
         ]
         done = self._store.succeeded()
@@ -352,4 +349,4 @@ class _Players:
             if outcome.error is not None:
                 raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
         outcomes = self._store.outcomes(runs)
-        return [outcomes[run.key] for run in runs]
+        return [outcomes[run.case.key, run.seed] for run in runs]

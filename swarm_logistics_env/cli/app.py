@@ -62,7 +62,7 @@ def attack_command(
     What it finds bounds the worst fault from one side: there may be worse ones.
     """
     from swarm_logistics_env.attack import MODES, Attack, attack
-    from swarm_logistics_env.studies.engines import engine_named
+    from swarm_logistics_env.studies.play import engine_named
 
     asked = Attack(
         policy=policy,
@@ -91,7 +91,7 @@ def _stopped(place: Path) -> None:
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
     from swarm_logistics_env.fault_text import text_of
-    from swarm_logistics_env.report.wording import bracketed
+    from swarm_logistics_env.report.section import bracketed
 
     from .terminal_tables import show_table
 

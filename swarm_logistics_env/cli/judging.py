@@ -1,39 +1,36 @@
-"""`swarm-logistics judge`, `study power` and `study compare`."""
+"""`swarm-logistics judge`: trials of real robots, or a policy."""
 
 from __future__ import annotations
 
+import json
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.definitions import DEFINITIONS
 
 from .application import TrustPolicyOption
 from .study_commands import (
     FullOption,
-    PolicyOption,
     ProcessesOption,
-    TrustCodeOption,
+    in_one_line,
+    run_study,
     show_report,
-    study,
     study_of,
 )
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.studies.gate import Answer
     from swarm_logistics_env.studies.results import StudyResults
 
-
-SYMBOLS = tuple(DEFINITIONS)
-AtOption = Annotated[
-    str, typer.Option(metavar="TEXT", help="Only comparisons whose name holds this.")
-]
+STUDY = "scorecard"
+MOST_SEEDS = 60  # of a policy that is judged
 
 
 def judge_command(
+    context: typer.Context,
     asked: Annotated[
         str,
         typer.Argument(
@@ -45,9 +42,21 @@ def judge_command(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Directory to keep the study, report and tables.tex in; of a policy "
-            "results/scorecards/NAME if not given."
+            help="Directory of the study and its report; results/judged/NAME if not given."
         ),
+    ] = None,
+    seeds: Annotated[
+        int | None,
+        typer.Option(min=3, help=f"Seeds of a policy at most; {MOST_SEEDS} if not given."),
+    ] = None,
+    until_clear: Annotated[
+        bool,
+        typer.Option(
+            "--until-clear/--all-seeds", help="Stop each question where its verdict is clear."
+        ),
+    ] = True,
+    minutes: Annotated[
+        float | None, typer.Option(help="Play for so long; the same command goes on.")
     ] = None,
     columns: Annotated[
         list[str] | None,
@@ -79,46 +88,63 @@ def judge_command(
     full: FullOption = False,
     trust_code: TrustPolicyOption = False,
 ) -> None:
-    """Judge trials of real robots or of another simulator; or a policy, by a score card.
+    """Judge trials of real robots or of another simulator; or a policy, until it is clear.
 
     Columns: robots, fault, faulty, delivered (or performance), and where they apply seed, policy,
     onset, and any parameter; or time, one delivery a row. Without seeds the study is unpaired.
-    A policy is played in the fixed study `scorecard`, in a minute or a few.
+    A policy is played in a warehouse in which delivered items come back, so that P has no cap.
     """
-    from tempfile import TemporaryDirectory
-
-    from swarm_logistics_env.report.document import document
-    from swarm_logistics_env.report.report_files import latex_tables, write_text
+    of_trials = {
+        "--column": columns, "--ignore": ignore, "--duration": duration, "--decimal": decimal,
+        "--setup": setup,
+    }  # fmt: skip
+    of_policy = {"--seeds": seeds, "--minutes": minutes}
+    is_policy = names_policy(asked)
+    for option, given in (of_trials if is_policy else of_policy).items():
+        if given:
+            kind = "a policy" if is_policy else "a file of trials"
+            raise StudyError(f"{option} is not for {kind}, and {asked!r} is one")
+    if is_policy:
+        failed = _judge_policy(
+            asked, out, seeds or MOST_SEEDS, minutes, processes, trust_code,
+            until_clear=until_clear, full=full, command=str(context.obj),
+        )  # fmt: skip
+        raise typer.Exit(1 if failed else 0)
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.importing import import_results
 
-    if names_policy(asked):
-        of_trials = {
-            "--column": columns, "--ignore": ignore, "--duration": duration,
-            "--decimal": decimal, "--setup": setup,
-        }  # fmt: skip
-        for option, given in of_trials.items():
-            if given:
-                raise StudyError(f"{option} is for a file of trials, and {asked!r} is a policy")
-        raise typer.Exit(1 if judge_policy(asked, out, processes, trust_code, full=full) else 0)
-    with TemporaryDirectory() as elsewhere:
-        directory = out or Path(elsewhere) / "study"
-        count = import_results(
-            Path(asked),
-            directory,
-            columns=dict(_pair("--column", text) for text in columns or []),
-            ignore=ignore or (),
-            duration=duration,
-            decimal=decimal or ".",
-            setup=_stated(setup or []),
-        )
-        typer.echo(f"{count} runs in {asked}\n")
-        results = Study.stored(directory).findings()
-        whole = document(results)
-        show_report(results, whole, out, full=full)
-    if out is not None:
-        write_text(out / "tables.tex", latex_tables(whole.summary))
-        typer.echo(f"Written: {out / 'tables.tex'}")
+    directory = out or _free(Path("results", "judged", Path(asked).stem))
+    count = import_results(
+        Path(asked),
+        directory,
+        columns=dict(_pair("--column", text) for text in columns or []),
+        ignore=ignore or (),
+        duration=duration,
+        decimal=decimal or ".",
+        setup=_stated(setup or []),
+    )
+    typer.echo(f"{count} runs in {asked}\n")
+    _finish(Study.stored(directory).findings(), directory, full=full)
+
+
+def _free(directory: Path) -> Path:
+    """Return a directory that holds no study yet: that one, or one with a number."""
+    from swarm_logistics_env.studies.runs import FILE_NAME
+
+    number, free = 1, directory
+    while (free / FILE_NAME).exists():
+        number += 1
+        free = directory.with_name(f"{directory.name}-{number}")
+    return free
+
+
+def _finish(results: StudyResults, out: Path, *, full: bool) -> None:
+    """Print the answer, a sentence for a paper, and what was written."""
+    from swarm_logistics_env.report.answer import in_a_sentence
+
+    show_report(results, out, full=full)
+    typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
+    typer.echo(f"For a paper: {in_a_sentence(results)}")
 
 
 def _stated(texts: list[str]) -> dict[str, str]:
@@ -144,154 +170,6 @@ def _pair(option: str, text: str) -> tuple[str, str]:
     return name, value
 
 
-@study.command("power")
-def power_command(
-    asked: Annotated[
-        str,
-        typer.Argument(
-            metavar="DIR|FILE|PRESET",
-            help="Study that was run; or one to play a pilot of, which is not kept.",
-        ),
-    ],
-    effect: Annotated[
-        float | None,
-        typer.Option(help="Assumed true value of the indicator; the paper's if not given."),
-    ] = None,
-    power: Annotated[float, typer.Option(help="Wanted probability of a verdict.")] = 0.8,
-    indicator: Annotated[
-        str | None, typer.Option(help=f"Only {', '.join(SYMBOLS[:-1])} or {SYMBOLS[-1]}.")
-    ] = None,
-    at: AtOption = "",
-    pilot_seeds: Annotated[int, typer.Option(min=2, help="Seeds of the pilot.")] = 5,
-    policies: PolicyOption = None,
-    processes: ProcessesOption = None,
-    trust_code: TrustCodeOption = False,
-) -> None:
-    """Print how many seeds each verdict needs, from a pilot or a study that was run."""
-    from swarm_logistics_env.report.wording import number
-    from swarm_logistics_env.studies.results import demands
-
-    from .terminal_tables import show_table
-
-    results = _pilot(asked, pilot_seeds, policies, processes, trust_code)
-    rows = []
-    for demand in demands(results, effect, power):
-        comparison = demand.test.compared
-        name = f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}"
-        if indicator not in (None, comparison.indicator) or at not in name:
-            continue
-        rows.append(
-            (
-                comparison.policy,
-                name,
-                number(demand.effect),
-                demand.problem or str(demand.seeds),
-                "–" if demand.least_power is None else f"{demand.least_power:.0%}",
-                number(demand.detectable),
-                number(demand.unchanged, 0),
-            )
-        )
-    if not rows:
-        asked_for = [] if indicator is None else [f"--indicator {indicator}"]
-        asked_for += [f"--at {at!r}"] if at else []
-        made = results.indicators["indicator"].unique()
-        raise StudyError(
-            f"{' '.join(asked_for) or asked}: the study makes no such comparison; "
-            f"it asks about {', '.join(made) or 'nothing'}"
-        )
-    n_seeds = len(results.plan.seeds)
-    columns = (
-        "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power on average",
-        "power in nine pilots of ten at least",
-        f"distance that {n_seeds} seeds find",
-        f"seeds for equivalent at {results.plan.specification.margin:.0%}",
-    )  # fmt: skip
-    show_table(f"Seeds needed, from {n_seeds} seeds", columns, rows)
-
-
-@study.command("compare")
-def compare_command(
-    old: Annotated[
-        Path, typer.Argument(metavar="OLD", help="Directory of the study to compare with.")
-    ],
-    new: Annotated[
-        Path, typer.Argument(metavar="NEW", help="Directory of the study that is judged.")
-    ],
-    fail_if: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="GATE",
-            help=f"[possibly] {'|'.join(SYMBOLS)} <|> NUMBER [at TEXT]; may be "
-            "repeated. change is "
-            "(P_new - P_old) / P_old; the others are NEW's. Plain: fails where it is so beyond "
-            "chance; possibly: where that is not ruled out.",
-        ),
-    ] = None,
-    trust_code: TrustCodeOption = False,
-) -> None:
-    """Compare two studies, condition by condition; end with 1 if a gate fails."""
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.gate import Gate, answers, match
-
-    gates = [Gate.parse(text) for text in fail_if or []]
-    before, after = (
-        Study.stored(directory, trust_code=trust_code).findings() for directory in (old, new)
-    )
-    left_out = match(before, after).notes
-    failed = False
-    # Without a gate the change is shown, and nothing fails.
-    for gate in gates or [Gate.parse("change < 0")]:
-        said = answers(gate, before, after)
-        fails = bool(gates) and any(answer.fails for answer in said)
-        failed |= fails
-        result = "fails" if fails else "passes"
-        title = f"Gate {gate.text!r} {result}" if gates else "Change of P"
-        notes = left_out if gate.subject == "change" else ()
-        _show_answers(title, said, notes, after.confidence)
-    raise typer.Exit(1 if failed else 0)
-
-
-def _pilot(
-    asked: str,
-    seeds: int,
-    policies: list[str] | None,
-    processes: int | None,
-    trust_code: bool,
-) -> StudyResults:
-    import os
-
-    from swarm_logistics_env.studies import Study
-
-    if Path(asked).is_dir():
-        if policies:
-            raise StudyError("--policy is for a pilot: a study that was run has its own policies")
-        return Study.stored(asked, trust_code=trust_code).findings()
-    pilot = study_of(asked, None, seeds, policies, trust_code, until_clear=False)
-    pilot.run(processes=processes or os.cpu_count() or 1)
-    return pilot.findings()
-
-
-def _show_answers(
-    title: str, said: tuple[Answer, ...], left_out: tuple[str, ...], confidence: float
-) -> None:
-    from swarm_logistics_env.report.wording import bracketed, percent
-
-    from .terminal_tables import show_table
-
-    rows = []
-    for answer in said:
-        estimate = answer.estimate
-        value, says = "–", answer.problem or ""
-        if answer.exact is not None:
-            value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
-        if estimate is not None:
-            value = bracketed(estimate, 3)
-            says = f"above {estimate.threshold:g}: {answer.verdict}"
-        rows.append((answer.name, value, says))
-    columns = ("", f"value [{percent(confidence)}]", "verdict under Holm")
-    show_table(title, columns, rows, *left_out)
-
-
 def names_policy(asked: str) -> bool:
     """Return whether the argument of `judge` is a policy, not a file of trials."""
     from swarm_logistics_env.policies import SUFFIXES
@@ -304,47 +182,68 @@ def names_policy(asked: str) -> bool:
     return ":" in asked or not suffix
 
 
-def judge_policy(
-    asked: str, out: Path | None, processes: int | None, trust_code: bool, *, full: bool
+def _judge_policy(
+    asked: str,
+    out: Path | None,
+    seeds: int,
+    minutes: float | None,
+    processes: int | None,
+    trust_code: bool,
+    *,
+    until_clear: bool,
+    full: bool,
+    command: str,
 ) -> int:
-    """Play the study `scorecard` with a policy; print its score card and write the report.
+    """Play the study `scorecard` with a policy until it is clear; return how many runs failed.
 
     Every run is kept at once, so that the same command goes on after an interruption.
-
-    Args:
-        asked: the policy, for `policies.load`.
-        out: directory; None: results/scorecards/ and the policy's name.
-        processes: number of worker processes; None: all cores.
-        trust_code: whether to read a model of stable-baselines3, which executes code in it.
-        full: whether to print the report of the study as well.
-
-    Returns:
-        The number of runs that failed.
-
-    Raises:
-        PolicyError, StudyError: the policy cannot be loaded, or the store cannot be used.
     """
     from swarm_logistics_env.policies import called, load
-    from swarm_logistics_env.report.document import document
-    from swarm_logistics_env.report.figures import slug
-    from swarm_logistics_env.report.report_files import write_report
-    from swarm_logistics_env.report.score_card import STUDY, card_section, score_card
-    from swarm_logistics_env.studies.engines import engine_named
-
-    from .study_commands import in_one_line, run_study, show_report, study_of
-    from .terminal_tables import show
+    from swarm_logistics_env.report.section import slug
+    from swarm_logistics_env.studies.play import engine_named
+    from swarm_logistics_env.studies.specification import FIRST_LOOK
 
     load(asked, trust_code=trust_code)  # what is wrong with it is said before anything is written
-    out = out or Path("results", "scorecards", slug(called(asked)))
-    study = study_of(STUDY, out, None, [asked], trust_code)
+    out = out or Path("results", "judged", slug(called(asked)))
+    looks = until_clear and seeds > FIRST_LOOK
+    study = study_of(STUDY, out, seeds, [asked], trust_code, until_clear=looks)
     typer.echo(f"{study.plan()}, kept in {out}\n")
     count = processes or os.cpu_count() or 1
-    tally = run_study(study, engine_named("process" if count > 1 else "local", count, None))
+    engine = engine_named("process" if count > 1 else "local", count, None)
+    tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
-    show(card_section(score_card(results)))
-    if full:
-        show_report(results, document(results), out, full=True)
-    else:
-        typer.echo(f"Written: {', '.join(map(str, write_report(results, out)))}")
+    _finish(results, out, full=full)
+    if rank := _rank(results):
+        typer.echo(rank)
+    if tally.left:
+        typer.echo(f"Stopped after {minutes:g} minutes; the same command goes on: {command}")
+    elif any(test.conclusion == "inconclusive" for test in results.verdicts):
+        new = shlex.quote(f"{out}-{2 * seeds}")
+        typer.echo(
+            "What is open needs more seeds, from the start: swarm-logistics judge "
+            f"{shlex.quote(asked)} --seeds {2 * seeds} --out {new}"
+        )
     typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}"))
     return tally.failed
+
+
+# P of the shipped policies in the study `scorecard`; `docs/score_cards.py` writes it.
+RECORDED = Path(__file__).parents[1] / "report" / "shipped_score_cards.json"
+
+
+def _rank(results: StudyResults) -> str | None:
+    """Return the place of the policy among the shipped ones, where the intervals allow one."""
+    from swarm_logistics_env.spi import mean_interval
+
+    mine = next(cell for cell in results.cells if cell.arm.setting.name == "none").mean
+    told = json.loads(RECORDED.read_text(encoding="utf-8"))["policies"]
+    beside = {name: mean_interval(one["p"]) for name, one in told.items()}
+    beside.pop(results.policies[0], None)
+    if mine.low is None or mine.high is None:
+        return None
+    above = sum(p.low is not None and p.low > mine.high for p in beside.values())
+    below = sum(p.high is not None and p.high < mine.low for p in beside.values())
+    ordered = sorted(beside.items(), key=lambda one: -one[1].value)
+    others = ", ".join(f"{name} {p.value:.0f}" for name, p in ordered)
+    rank = f"; rank {above + 1} of {len(beside) + 1}" if above + below == len(beside) else ""
+    return f"P of the shipped policies here: {others}{rank}."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,15 +11,16 @@ import typer
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import plain
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 
 if TYPE_CHECKING:
     from swarm_logistics_env.report.document import Document
     from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.engines import Engine
+    from swarm_logistics_env.studies.gate import Answer
+    from swarm_logistics_env.studies.play import Engine, Shard, Tally
     from swarm_logistics_env.studies.results import StudyResults
-    from swarm_logistics_env.studies.runs import Shard
-    from swarm_logistics_env.studies.study import Tally
 
+SYMBOLS = tuple(DEFINITIONS)
 StudyArgument = Annotated[
     str,
     typer.Argument(
@@ -36,7 +39,7 @@ FirstSeedOption = Annotated[
 ]
 PolicyOption = Annotated[
     list[str] | None,
-    typer.Option("--policy", help="Policy to judge (`policies` lists them); may be repeated."),
+    typer.Option("--policy", help="Policy to judge (`list policies`); may be repeated."),
 ]
 TrustCodeOption = Annotated[
     bool,
@@ -59,51 +62,6 @@ def group() -> None:
     """Judge a swarm by its indicators."""
 
 
-@study.command("list")
-def list_command() -> None:
-    """List the studies that come with the package."""
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.presets import PRESETS
-
-    from .terminal_tables import show_table
-
-    rows = []
-    for name in PRESETS:
-        plan = Study.preset(name).plan()
-        asked = dict.fromkeys(table for _, table, _ in plan.cells)
-        n_runs = len(plan.conditions) * len(plan.seeds)
-        rows.append((name, str(len(plan.seeds)), str(n_runs), "; ".join(asked)))
-    line = "`study plan NAME` says how long one takes; `study run NAME` plays it."
-    show_table("Studies", ("name", "seeds", "runs", "tables"), rows, line)
-
-
-@study.command("plan")
-def plan_command(
-    asked: StudyArgument,
-    seeds: SeedsOption = None,
-    first_seed: FirstSeedOption = None,
-    policies: PolicyOption = None,
-    trust_code: TrustCodeOption = False,
-) -> None:
-    """Print the conditions, shared ones once, and what they will take; nothing is run."""
-    from swarm_logistics_env.studies.engines import expected_seconds
-
-    from .terminal_tables import show_table
-
-    plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
-    seconds = expected_seconds(plan)
-    uses: dict[str, list[str]] = {}
-    for _, table, arm in plan.cells:
-        uses.setdefault(arm.condition.key, []).append(f"{table} ({arm.setting})")
-    rows = (
-        (condition.policy.label, str(condition.size), "; ".join(uses[condition.key]))
-        for condition in plan.conditions
-    )
-    show_table("Conditions", ("policy", "N", "stands in"), rows)
-    typer.echo(plan)
-    typer.echo(f"On one process of this machine at most {duration(seconds)}")
-
-
 @study.command("run")
 def run_command(
     asked: StudyArgument,
@@ -111,6 +69,7 @@ def run_command(
         Path | None,
         typer.Option(help="Directory of its store and report; results/NAME if not given."),
     ] = None,
+    policies: PolicyOption = None,
     seeds: Annotated[
         int | None,
         typer.Option(
@@ -128,7 +87,9 @@ def run_command(
         ),
     ] = False,
     first_seed: FirstSeedOption = None,
-    policies: PolicyOption = None,
+    restock: Annotated[
+        bool, typer.Option("--restock", help="Delivered items come back, so that P has no cap.")
+    ] = False,
     processes: ProcessesOption = None,
     engine: Annotated[
         str | None,
@@ -146,10 +107,7 @@ def run_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Play the runs that are missing, then print the answer and write the report."""
-    import os
-
-    from swarm_logistics_env.studies.engines import engine_named
-    from swarm_logistics_env.studies.runs import Shard
+    from swarm_logistics_env.studies.play import Shard, engine_named
     from swarm_logistics_env.studies.specification import FIRST_LOOK
     from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
@@ -163,16 +121,26 @@ def run_command(
             )
         looks = {"until_clear": True}
     chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
-    out = out or Path("results", chosen.specification.name)
+    if restock:
+        task, scenario = chosen.specification.played, chosen.specification.scenario
+        restocked = task.vary(scenario, {"restock": True})
+        chosen.specification = chosen.specification.replace(scenario=restocked)
+    out = out or Path("results", chosen.specification.name + "-restock" * restock)
     chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
     typer.echo(f"{chosen.plan()}\n")
     if warning := chosen.exploratory_because():
         typer.echo(f"{warning}\n")
+    for policy in _saturated(chosen) if policies and not restock else ():
+        typer.echo(
+            f"{policy} delivers every item before the end, so that P is capped and most verdicts "
+            "will be open. With items that come back nothing is capped: add --restock\n"
+        )
     tally = run_study(chosen, player, part)
     if part is None:
-        _show(chosen, full=full)
+        results = chosen.findings()
+        show_report(results, chosen.out, full=full)
     else:
         typer.echo(
             f"When all {part.count} shards are done: swarm-logistics study merge "
@@ -186,6 +154,129 @@ def run_command(
     raise typer.Exit(1 if tally.failed else 0)
 
 
+def _saturated(asked: Study) -> list[str]:
+    """Return the policies that deliver every item of the base scenario at the first seed."""
+    plan = asked.plan()
+    whole = {c.policy.title: c for c in reversed(plan.cases) if not c.faults}
+    if not any(getattr(case.scenario, "n_items", None) for case in whole.values()):
+        return []
+    seed = plan.seeds[0]
+    return [
+        title for title, case in whole.items() if case.run(plan.code, seed).play().all_delivered
+    ]
+
+
+@study.command("plan")
+def plan_command(
+    asked: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE|PRESET|DIR", help="A study; or the directory of one that was run."
+        ),
+    ],
+    policies: PolicyOption = None,
+    seeds: SeedsOption = None,
+    first_seed: FirstSeedOption = None,
+    effect: Annotated[
+        float | None,
+        typer.Option(help="Assumed true value of the indicator; the paper's if not given."),
+    ] = None,
+    power: Annotated[float, typer.Option(help="Wanted probability of a verdict.")] = 0.8,
+    indicator: Annotated[
+        str | None, typer.Option(help=f"Only {', '.join(SYMBOLS[:-1])} or {SYMBOLS[-1]}.")
+    ] = None,
+    at: Annotated[
+        str, typer.Option(metavar="TEXT", help="Only comparisons whose name holds this.")
+    ] = "",
+    pilot: Annotated[
+        int | None,
+        typer.Option(min=2, help="Play so many seeds, which are not kept, for the seeds needed."),
+    ] = None,
+    processes: ProcessesOption = None,
+    trust_code: TrustCodeOption = False,
+) -> None:
+    """Print the conditions and what they take; of a study that was run, the seeds that it needs."""
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.play import expected_seconds
+
+    from .terminal_tables import show_table
+
+    if Path(asked).is_dir():
+        if policies:
+            raise StudyError("--policy is for a pilot: a study that was run has its own policies")
+        results = Study.stored(asked, trust_code=trust_code).findings()
+        _show_power(asked, results, effect, power, indicator, at)
+        return
+    chosen = study_of(
+        asked, None, pilot or seeds, policies, trust_code, first_seed=first_seed,
+        **({"until_clear": False} if pilot else {}),
+    )  # fmt: skip
+    if pilot:
+        chosen.run(processes=processes or os.cpu_count() or 1)
+        _show_power(asked, chosen.findings(), effect, power, indicator, at)
+        return
+    plan = chosen.plan()
+    uses: dict[str, list[str]] = {}
+    for _, table, arm in plan.cells:
+        uses.setdefault(arm.case.key, []).append(f"{table} ({arm.setting})")
+    rows = (
+        (case.policy.title, str(case.scenario.n_robots), "; ".join(uses[case.key]))
+        for case in plan.cases
+    )
+    show_table("Conditions", ("policy", "N", "stands in"), rows)
+    typer.echo(plan)
+    typer.echo(f"On one process of this machine at most {duration(expected_seconds(plan))}")
+
+
+def _show_power(
+    asked: str,
+    results: StudyResults,
+    effect: float | None,
+    power: float,
+    indicator: str | None,
+    at: str,
+) -> None:
+    from swarm_logistics_env.report.section import number
+    from swarm_logistics_env.studies.results import demands
+
+    from .terminal_tables import show_table
+
+    rows = []
+    for demand in demands(results, effect, power):
+        compared = demand.test.compared
+        name = f"{compared.indicator} > {compared.threshold:.3g}, {compared.label}"
+        if indicator not in (None, compared.indicator) or at not in name:
+            continue
+        rows.append(
+            (
+                compared.policy,
+                name,
+                number(demand.effect),
+                demand.problem or str(demand.seeds),
+                "–" if demand.least_power is None else f"{demand.least_power:.0%}",
+                number(demand.detectable),
+                number(demand.unchanged, 0),
+            )
+        )
+    if not rows:
+        asked_for = [] if indicator is None else [f"--indicator {indicator}"]
+        asked_for += [f"--at {at!r}"] if at else []
+        made = dict.fromkeys(test.compared.indicator for test in results.verdicts)
+        raise StudyError(
+            f"{' '.join(asked_for) or asked}: the study makes no such comparison; "
+            f"it asks about {', '.join(made)}"
+        )
+    n_seeds = len(results.plan.seeds)
+    columns = (
+        "policy", "verdict on", "assumed effect", f"seeds for {power:.0%} power on average",
+        "power in nine pilots of ten at least",
+        f"distance that {n_seeds} seeds find",
+        f"seeds for equivalent at {results.plan.specification.margin:.0%}",
+    )  # fmt: skip
+    hint = f"For another effect: swarm-logistics study plan {shlex.quote(asked)} --effect 0.2"
+    show_table(f"Seeds needed, from {n_seeds} seeds", columns, rows, hint)
+
+
 @study.command("report")
 def report_command(
     directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
@@ -197,20 +288,66 @@ def report_command(
 
     stored = Study.stored(directory, trust_code=trust_code)
     typer.echo(f"{stored.plan()}\n")
-    _show(stored, full=full)
+    show_report(stored.findings(), stored.out, full=full)
 
 
-@study.command("export")
-def export_command(
-    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
-    to: Annotated[Path, typer.Option(help="File to write, .csv.")],
+@study.command("compare")
+def compare_command(
+    old: Annotated[
+        Path, typer.Argument(metavar="OLD", help="Directory of the study to compare with.")
+    ],
+    new: Annotated[
+        Path, typer.Argument(metavar="NEW", help="Directory of the study that is judged.")
+    ],
+    fail_if: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="GATE",
+            help=f"[possibly] {'|'.join(SYMBOLS)} <|> NUMBER [at TEXT]; may be "
+            "repeated. change is "
+            "(P_new - P_old) / P_old; the others are NEW's. Plain: fails where it is so beyond "
+            "chance; possibly: where that is not ruled out.",
+        ),
+    ] = None,
+    trust_code: TrustCodeOption = False,
 ) -> None:
-    """Write every stored run as one row, sorted by key, without wall times."""
-    from swarm_logistics_env.studies.store import Store, export
+    """Compare two studies, condition by condition; end with 1 if a gate fails."""
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.gate import Gate, answers, match
 
-    with Store.existing(directory) as store:
-        count, digest = export(store, to)
-    typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
+    gates = [Gate.parse(text) for text in fail_if or []]
+    before, after = (
+        Study.stored(directory, trust_code=trust_code).findings() for directory in (old, new)
+    )
+    left_out = match(before, after).notes
+    failed = False
+    # Without a gate the change is shown, and nothing fails.
+    for gate in gates or [Gate.parse("change < 0")]:
+        said = answers(gate, before, after)
+        fails = bool(gates) and any(answer.fails for answer in said)
+        failed |= fails
+        result = "fails" if fails else "passes"
+        title = f"Gate {gate.text!r} {result}" if gates else "Change of P"
+        _show_answers(title, said, left_out if gate.subject == "change" else ())
+    raise typer.Exit(1 if failed else 0)
+
+
+def _show_answers(title: str, found: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
+    from swarm_logistics_env.report.section import bracketed, said
+
+    from .terminal_tables import show_table
+
+    rows = []
+    for answer in found:
+        estimate = answer.estimate
+        value, says = "–", answer.problem or ""
+        if answer.exact is not None:
+            value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
+        if estimate is not None:
+            value = bracketed(estimate, 3)
+            says = f"above {estimate.threshold:g}: {said(answer.verdict)}"
+        rows.append((answer.name, value, says))
+    show_table(title, ("", "value [95 %]", "verdict under Holm"), rows, *left_out)
 
 
 @study.command("merge")
@@ -219,9 +356,23 @@ def merge_command(
     out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
 ) -> None:
     """Make one store of those that shards or machines have filled."""
-    from swarm_logistics_env.studies.metadata import merge
+    from swarm_logistics_env.studies.declaration import merge
 
     typer.echo(f"{merge(directories, out)} runs in {out}")
+    typer.echo(f"Its report: swarm-logistics study report {shlex.quote(str(out))}")
+
+
+@study.command("export")
+def export_command(
+    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+    to: Annotated[Path, typer.Option(help="File to write, .csv.")],
+) -> None:
+    """Write every stored run as one row, sorted by key, without wall times."""
+    from swarm_logistics_env.studies.runs import Runs, export
+
+    with Runs.existing(directory) as runs:
+        count, digest = export(runs, to)
+    typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
 
 
 def study_of(
@@ -239,6 +390,7 @@ def study_of(
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
+    from swarm_logistics_env.policies.files import SB3_SUFFIX
     from swarm_logistics_env.studies import Study
 
     if seeds is not None:
@@ -248,7 +400,8 @@ def study_of(
     if policies:
         fields["policies"] = tuple(policies)
         for name in policies:
-            if name.endswith(".zip") and not trust_code:
+            # What is typed names a class on purpose; a file may look like any other.
+            if name.endswith(SB3_SUFFIX) and not trust_code:
                 raise StudyError(
                     f"--policy {name}: reading a model of stable-baselines3 executes the code in "
                     "it: should be allowed by --trust-code"
@@ -266,10 +419,12 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes} min" if hours else f"{minutes} min"
 
 
-def run_study(asked: Study, engine: Engine, shard: Shard | None = None) -> Tally:
+def run_study(
+    asked: Study, engine: Engine, shard: Shard | None = None, minutes: float | None = None
+) -> Tally:
     """Run a study; Ctrl-C ends the command and says how to go on."""
     try:
-        return asked.run(engine, shard=shard)
+        return asked.run(engine, shard=shard, minutes=minutes)
     except KeyboardInterrupt:
         done, total = asked.finished(shard)
         left = f"the other {total - done}"
@@ -294,32 +449,25 @@ def in_one_line(tally: Tally, players: str) -> str:
     )
 
 
-def show_report(
-    results: StudyResults, whole: Document, out: Path | None, *, full: bool = False
-) -> None:
-    """Write a study's report into a directory, and print the answer; the tables too if `full`."""
-    from swarm_logistics_env.report.report_files import (
+def show_report(results: StudyResults, out: Path | None, *, full: bool = False) -> Document:
+    """Print the answer of a study, the tables too if `full`, and write its report into `out`."""
+    from swarm_logistics_env.report.answer import answer
+    from swarm_logistics_env.report.document import document
+    from swarm_logistics_env.report.write import (
         how_to_get_figures,
         missing_packages,
         write_report,
     )
 
-    from .terminal_tables import show, show_digest
+    from .terminal_tables import show, show_answer
 
+    whole = document(results)
     for section in whole.summary if full else ():
         show(section)
-    try:
-        written = write_report(results, out, whole) if out else (None,)
-    except StudyError:  # as where the disk is full: what was found is told all the same
-        show_digest(whole.answer, None, whole=full)
-        raise
-    show_digest(whole.answer, written[0], whole=full)
-    if out and (missing := missing_packages()):
-        typer.echo(how_to_get_figures(missing))
-
-
-def _show(asked: Study, *, full: bool) -> None:
-    from swarm_logistics_env.report.document import document
-
-    results = asked.findings()
-    show_report(results, document(results), asked.out, full=full)
+    # Printed first: what was found is told even where no file can be written.
+    show_answer(answer(results, most=None) if full else whole.answer, None, whole=full)
+    if out:
+        typer.echo(f"Report: {write_report(results, out, whole)[0]}")
+        if missing := missing_packages():
+            typer.echo(how_to_get_figures(missing))
+    return whole

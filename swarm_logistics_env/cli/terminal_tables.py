@@ -12,16 +12,14 @@ from rich.table import Table
 from rich.text import Text
 
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.answer import DIGEST_LINES, Answer, digest
-from swarm_logistics_env.report.report_files import section_markdown
-from swarm_logistics_env.report.result_tables import Section
-from swarm_logistics_env.report.verdict_matrix import NOT_ASKED
+from swarm_logistics_env.report.answer import MOST_LINES, Answer, digest
+from swarm_logistics_env.report.section import WORDS, Section
+from swarm_logistics_env.report.write import section_markdown
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 
 _PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
-_COLOURS = {sign.mark: sign.colour for sign in SIGNS.values()}
-# Words of signs alone: a question mark that ends a sentence has no colour.
-_SIGNS = re.compile(rf"(?<!\S)[{''.join(map(re.escape, _COLOURS))}{NOT_ASKED}]+(?!\S)")
+_COLOURS = {word: SIGNS[verdict].colour for verdict, word in WORDS.items()}
+_VERDICTS = re.compile(rf"(?<=  )({'|'.join(_COLOURS)})\b")
 
 
 def show(section: Section) -> None:
@@ -52,12 +50,16 @@ def show_table(
     show(Section(title, tuple(columns), tuple(rows), lines))
 
 
-def show_digest(found: Answer, where: Path | None, *, whole: bool = False) -> None:
-    """Print the answer of a study on one screen, or with every row of its matrix."""
+def show_answer(found: Answer, where: Path | None, *, whole: bool = False) -> None:
+    """Print the answer of a study on one screen, or with every line of it."""
     console = Console(highlight=False)
     width = console.width if console.is_terminal else _PLAIN_WIDTH
-    shown = Text(digest(found, width, where, None if whole else DIGEST_LINES), no_wrap=True)
-    for word in _SIGNS.finditer(shown.plain):
-        for place in range(word.start(), word.end()):
-            shown.stylize(_COLOURS.get(shown.plain[place], "dim"), place, place + 1)
+    shown = Text(plain_lines(digest(found, width, where, None if whole else MOST_LINES)))
+    for word in _VERDICTS.finditer(shown.plain):
+        shown.stylize(_COLOURS[word[1]], *word.span())
     console.print(shown, soft_wrap=True)
+
+
+def plain_lines(text: str) -> str:
+    """Return lines of text without signs that steer a terminal."""
+    return "\n".join(map(plain, text.split("\n")))

@@ -1,31 +1,94 @@
-"""The answer of a study in a few sentences, the same in terminal, HTML page and Markdown."""
+"""The answer of a study: a line a question, with value, interval and verdict, and what is open."""
 
 from __future__ import annotations
 
+import math
 import textwrap
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from swarm_logistics_env.spi.verdict_signs import SIGNS
-from swarm_logistics_env.studies.indicator_table import Finding, findings_of
-from swarm_logistics_env.studies.performance_table import groups_of
-from swarm_logistics_env.studies.policy_comparison import (
-    CellAgainstBaseline,
-    cells_against_baseline,
-)
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.studies.policy_comparison import cells_against_baseline
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 
-from . import wording
-from .verdict_matrix import VerdictMatrix, text_lines, verdict_matrix
+from . import section
+from .section import Section, said
 
-if TYPE_CHECKING:
-    import pandas as pd
+MOST_LINES = 30  # of the answer of `paper` at a terminal
+_EFFECT = 0.1  # of an indicator, for which seeds are counted
+_COLUMNS = ("question", "value", "95 % interval", "verdict")
 
-DIGEST_LINES = 20  # with the line of the runs and the prompt: a screen of 24
-_BUDGETS = (20, 200)  # seeds that a study may afford
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the answer: a question, or several that are alike.
+
+    Attributes:
+        policy: whose swarm it is about.
+        indicator: its symbol.
+        about: what is changed, e.g. "FM4, 1 of 25".
+        tests: the verdicts, in the order of the values.
+        numbers: their places among the verdicts of the study.
+    """
+
+    policy: str
+    indicator: str
+    about: str
+    tests: tuple[Verdict, ...]
+    numbers: tuple[int, ...]
+
+    @property
+    def question(self) -> str:
+        """Indicator and what is changed."""
+        return f"{self.indicator} {self.about}"
+
+    @property
+    def value(self) -> str:
+        """The values, one after the other; from the lowest to the highest where they are many."""
+        known = [test.value for test in self.tests if test.value is not None]
+        if not known:
+            return section.NOTHING
+        if len(self.tests) > 3:
+            return f"{section.fixed(min(known), 2)} to {section.fixed(max(known), 2)}"
+        capped = any(test.saturated for test in self.tests)
+        return " ".join(section.fixed(value, 2) for value in known) + capped * section.SATURATED
+
+    @property
+    def interval(self) -> str:
+        """The interval; of several values that which holds all of theirs."""
+        known = [test.interval for test in self.tests if test.interval]
+        low = [one.low for one in known if one.low is not None]
+        high = [one.high for one in known if one.high is not None]
+        if not (low and high):
+            return ""
+        whole = f"[{section.fixed(min(low), 2)}, {section.fixed(max(high), 2)}]"
+        return whole if len(known) == 1 else f"in {whole}"
+
+    @property
+    def verdict(self) -> str:
+        """The verdicts in words, and what an open one takes."""
+        words = [said(test.conclusion) for test in self.tests]
+        if len(self.tests) > 1:
+            return words[0] if len(set(words)) == 1 else section.counted(words)
+        (test,) = self.tests
+        if test.estimate is None:
+            return f"undefined: {test.problem}"
+        if test.conclusion == UNAFFECTED:
+            return f"{words[0]}, exact"
+        more = _seeds_more(test.estimate)
+        if test.conclusion != "inconclusive" or more is None:
+            return words[0]
+        runs = "seeds" if test.estimate.paired else "trials"
+        return f"open: {more} more {runs} tell {_EFFECT:g}"
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether a verdict contradicts what the study's reference claims."""
+        return any(test.claim_verdict(holm=True) == "refuted" for test in self.tests)
 
 
 @dataclass(frozen=True)
@@ -33,33 +96,172 @@ class Answer:
     """What a study found.
 
     Attributes:
-        asked: how much was asked, and over which seeds.
-        counts: a sentence a policy: how many verdicts of each kind; then P of all of them.
-        surprises: what contradicts the reference, and what differs most; may be empty.
-        unanswered: what is still open, and the seeds it needs.
-        matrix: all verdicts.
+        asked: how much was asked, of whom, and over which seeds.
+        performance: P of every policy where the swarm is as it should be.
+        lines: the questions.
+        last: how to read the verdicts, and what is still open.
     """
 
     asked: str
-    counts: tuple[str, ...]
-    surprises: tuple[str, ...]
-    unanswered: str
-    matrix: VerdictMatrix
+    performance: str
+    lines: tuple[Line, ...]
+    last: str
+
+    @property
+    def section(self) -> Section:
+        """The lines as a table."""
+        several = len({line.policy for line in self.lines}) > 1
+        rows = tuple(
+            (
+                f"{line.policy}: {line.question}" if several else line.question,
+                line.value,
+                line.interval,
+                line.verdict,
+            )
+            for line in self.lines
+        )
+        return Section("Answer", _COLUMNS, rows, (self.performance, self.last))
 
 
-def answer(results: StudyResults) -> Answer:
-    """Return what a study found."""
-    matrix = verdict_matrix(results)
-    return Answer(
-        _asked(results, matrix),
-        tuple(_counts(results)),
-        tuple(_surprises(results)),
-        _unanswered(results),
-        matrix,
+def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
+    """Return what a study found.
+
+    Args:
+        most: lines at most, as far as what is alike can share one; None: a line a question.
+    """
+    numbered = [(number, test) for number, test in enumerate(results.verdicts)]
+    lines: list[Line] = []
+    for alike in (_one, _one_mode, _one_factor, _one_indicator):
+        lines = [
+            _line([test for _, test in here], tuple(n for n, _ in here))
+            for here in grouped(numbered, lambda one: alike(*one)).values()  # noqa: B023
+        ]
+        if most is None or len(lines) <= most:
+            break
+    order = list(DEFINITIONS)
+    policies = results.policies
+    lines.sort(key=lambda line: (policies.index(line.policy), order.index(line.indicator)))
+    return Answer(_asked(results), _performance(results), tuple(lines), _last(results))
+
+
+def _one(number: int, test: Verdict) -> tuple[object, ...]:
+    return (number,)
+
+
+def _one_mode(number: int, test: Verdict) -> tuple[object, ...]:
+    return _one_factor(number, test) if test.compared.changed.setting.kind == "fault" else (number,)
+
+
+def _one_factor(_: int, test: Verdict) -> tuple[object, ...]:
+    setting = test.compared.changed.setting
+    return (*_one_indicator(_, test), setting.name, setting.onset, test.compared.threshold)
+
+
+def _one_indicator(_: int, test: Verdict) -> tuple[object, ...]:
+    compared = test.compared
+    return compared.policy, compared.table, compared.indicator
+
+
+def _line(tests: Sequence[Verdict], numbers: tuple[int, ...]) -> Line:
+    compared = tests[0].compared
+    return Line(compared.policy, compared.indicator, _about(tests), tuple(tests), numbers)
+
+
+def _about(tests: Sequence[Verdict]) -> str:
+    compared = tests[0].compared
+    before, after = compared.original.setting, compared.changed.setting
+    usual = compared.definition.adjectives.get(0.0)
+    asked = "" if tests[0].asked == usual else f", {tests[0].asked}"
+    names = dict.fromkeys(test.compared.changed.setting.name for test in tests)
+    start = f" from {after.onset:g} s" if after.onset else ""
+    values = [f"{test.compared.changed.setting.value:g}" for test in tests]
+    if after.kind == "size":
+        chain = [f"{before.value:g}", *values]
+        return f"N {'→'.join(chain if len(chain) <= 4 else [chain[0], '…', chain[-1]])}{asked}"
+    if len(names) > 1:
+        return f"{len(names)} {'failure modes' if after.kind == 'fault' else 'parameters'}{start}"
+    if after.kind == "fault":
+        return f"{after.name}{start}, {', '.join(values)} of {compared.n_robots}{asked}"
+    if after.kind == "policy":
+        return f"with {after.name}{asked}"
+    return f"{after.name} {before.value:g}→{', '.join(values)}{asked}"
+
+
+def _seeds_more(estimate: Estimate) -> int | None:
+    """Return how many more seeds find an effect on the side of the value with 80 % power."""
+    side = math.copysign(_EFFECT, estimate.value - estimate.threshold)
+    needed = spi.seeds_for_power(estimate, estimate.threshold + side, POWER)
+    return None if needed is None or needed <= estimate.n_seeds else needed - estimate.n_seeds
+
+
+def _asked(results: StudyResults) -> str:
+    count, policies = len(results.verdicts), results.policies
+    whose = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
+    seeds = section.seeds_text(results).split(" (")[0]
+    name = results.plan.specification.name
+    return f"{name}: {count} question{'' if count == 1 else 's'}, {whose}, {seeds}."
+
+
+def _performance(results: StudyResults) -> str:
+    cells = [one for here in cells_against_baseline(results).values() for one in here]
+    # Where the swarm is as it should be, or else in the first condition.
+    base = [c for c in cells if c.cell.arm.setting.kind == "fault" and not c.cell.arm.setting.value]
+    base = base or cells
+    here = {
+        c.cell.policy: c for c in reversed(base) if c.cell.arm.setting == base[0].cell.arm.setting
+    }
+    if not here:
+        return "P: no run has succeeded."
+    cell = base[0].cell
+    where = f"N = {cell.arm.case.scenario.n_robots}"
+    where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
+    several = len(results.policies) > 1
+    told = (
+        (f"{one.cell.policy} " if several else "")
+        + _mean(one.cell)
+        + ("" if one.ratio is None else f" ({one.ratio.value:.2f} times)")
+        for one in map(here.__getitem__, reversed(here))
     )
+    return f"P at {where}: {', '.join(told)}."
 
 
-def digest(found: Answer, width: int, where: Path | None, most: int | None = DIGEST_LINES) -> str:
+def _mean(cell: Cell) -> str:
+    """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
+    if cell.by_seed.any():
+        return section.mean_p(cell)
+    return f"0 (at most {-math.log(0.05) / cell.n_seeds:.2f}, as no run delivered anything)"
+
+
+def _last(results: StudyResults) -> str:
+    """Return how to read the verdicts, in one line."""
+    parts = ["Verdicts are Holm-adjusted"]
+    if any("assumes_normal" in test.flags for test in results.verdicts):
+        few = "below ten seeds" if results.plan.paired else "unpaired"
+        parts.append(f"provisional ({few} they assume normal differences)")
+    if results.exploratory:
+        parts.append("exploratory: other seeds than were declared")
+    if any(test.saturated for test in results.verdicts):
+        parts.append(f"{section.SATURATED} P is capped, as every item was delivered")
+    claims = [said(test.claim_verdict(holm=True)) for test in results.verdicts if test.claim]
+    if claims:
+        parts.append(f"of {len(claims)} claims {section.counted(claims)}")
+    return f"{'; '.join(parts)}."
+
+
+def in_a_sentence(results: StudyResults) -> str:
+    """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
+    known = [test for test in results.verdicts if test.interval]
+    words = section.counted(said(test.conclusion) for test in results.verdicts)
+    told = f"{_performance(results)[:-1]} ({section.seeds_text(results)})"
+    told += f"; of {len(results.verdicts)} questions {words} (Holm)"
+    if known:
+        worst = min(known, key=lambda test: test.value or 0.0)
+        line = _line([worst], (0,))
+        told += f"; the lowest is {line.question} = {line.value} {line.interval}"
+    return f"{', '.join(results.policies)}: {told}."
+
+
+def digest(found: Answer, width: int, where: Path | None, most: int | None = MOST_LINES) -> str:
     """Return the answer for a terminal.
 
     Args:
@@ -68,23 +270,39 @@ def digest(found: Answer, width: int, where: Path | None, most: int | None = DIG
         where: the report; None: there is none.
         most: lines at most; None: as many as it takes.
     """
-    head = [line for text in (found.asked, *found.counts) for line in _fold(text, width)]
-    tail = _fold(found.unanswered, width) + ([f"Report: {where}"] if where else [])
-    matrix = text_lines(found.matrix, width)
-    rows = None if most is None else most - len(head) - len(tail)
-    # The matrix first, then as many surprises as there is room for, but one at least.
-    surprising: list[str] = []
-    for count in range(1, len(found.surprises) + 1):
-        lines = _surprising(found.surprises, count, width)
-        if count == 1 or rows is None or len(matrix) + len(lines) <= rows:
-            surprising = lines
-    rows = None if rows is None else max(2, rows - len(surprising))
-    return "\n".join([*head, *text_lines(found.matrix, width, rows), *surprising, *tail])
+    head = [line for text in (found.asked, found.performance) for line in _fold(text, width)]
+    tail = _fold(found.last, width) + ([f"Report: {where}"] if where else [])
+    rows = list(_rows(found, width))
+    room = None if most is None else most - len(head) - len(tail)
+    if room is not None and len(rows) > room:
+        rows = [*rows[: room - 1], f"and {len(rows) - room + 1} lines more: --full"]
+    return "\n".join([*head, *rows, *tail])
 
 
-def _surprising(surprises: Sequence[str], count: int, width: int) -> list[str]:
-    more = f"; and {len(surprises) - count} more" if len(surprises) > count else ""
-    return _fold(f"Surprising: {'; '.join(surprises[:count])}{more}.", width)
+def _rows(found: Answer, width: int) -> Iterator[str]:
+    """Yield the lines in columns; the verdict is folded where the terminal is narrow."""
+    columns: tuple[Callable[[Line], str], ...] = (
+        lambda line: line.question,
+        lambda line: line.value,
+        lambda line: line.interval,
+    )
+    widths = [max(len(of(line)) for line in found.lines) for of in columns]
+    widths[0] = min(widths[0], max(12, width - sum(widths[1:]) - 14))
+    for policy, lines in grouped(found.lines, lambda line: line.policy).items():
+        if len({line.policy for line in found.lines}) > 1:
+            yield f"{policy}:"
+        for line in lines:
+            question, *more = textwrap.wrap(line.question, widths[0], subsequent_indent="  ")
+            left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {line.interval:{widths[2]}}"
+            verdict = textwrap.wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
+            yield f"{left}  {verdict[0]}".rstrip()
+            for first, second in _filled(more, verdict[1:]):
+                yield f"{first:{len(left)}}  {second}".rstrip()
+
+
+def _filled(first: Sequence[str], second: Sequence[str]) -> Iterator[tuple[str, str]]:
+    for place in range(max(len(first), len(second))):
+        yield "".join(first[place : place + 1]), "".join(second[place : place + 1])
 
 
 def _fold(text: str, width: int) -> list[str]:
@@ -92,133 +310,10 @@ def _fold(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
 
 
-def _asked(results: StudyResults, matrix: VerdictMatrix) -> str:
-    n, total = len(matrix.policies), sum(1 for _ in matrix.cells())
-    policies = f", {n} policies" if n > 1 else ""
-    seeds = wording.seeds_text(results).split(" (")[0]
-    said = (
-        f"{results.plan.specification.name}: {_several(total, 'question')}{policies}, {seeds}, Holm"
+def forest(found: Answer) -> tuple[tuple[str, tuple[Verdict, ...]], ...]:
+    """Return the lines as a forest plot shows them: a label, and the verdicts drawn beside it."""
+    several = len({line.policy for line in found.lines}) > 1
+    return tuple(
+        (f"{line.policy}: {line.question}" if several else line.question, line.tests)
+        for line in found.lines
     )
-    if results.indicators["flags"].str.contains("assumes_normal").eq(True).any():
-        said += "; provisional below ten" if results.plan.paired else "; provisional"
-    return f"{said}{'; exploratory' if results.exploratory else ''}."
-
-
-def _counts(results: StudyResults) -> Iterator[str]:
-    for policy, tests in groups_of(results.indicators, "policy"):
-        claims = tests[tests["claim"].notna()]
-        what, verdicts = "question", tests["conclusion"]
-        if not claims.empty:
-            what, verdicts = "claim", claims["claim_verdict_holm"]
-        counts = Counter(verdict or "blocked" for verdict in verdicts)
-        said = (f"{counts[name]} {sign.word}" for name, sign in SIGNS.items() if counts[name])
-        yield f"{policy}: {', '.join(said)} of {_several(len(verdicts), what)}."
-    cells = [one for here in cells_against_baseline(results).values() for one in here]
-    # Where the swarm is as it should be, or else in the first condition.
-    base = [one for one in cells if one.cell.kind == "fault" and not one.cell.value] or cells
-    here = {one.cell.policy: one for one in reversed(base) if one.cell.cell == base[0].cell.cell}
-    if here:
-        each = ", ".join(_performance(here[policy]) for policy in reversed(here))
-        yield f"P at {_where(base[0])}: {each}."
-
-
-def _several(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
-
-
-def _where(one: CellAgainstBaseline) -> str:
-    cell = one.cell
-    return cell.cell if cell.kind == "size" else f"N = {cell.n_robots}, {cell.cell}"
-
-
-def _performance(one: CellAgainstBaseline) -> str:
-    times = "" if one.ratio is None else f" ({one.ratio.value:.2f} times)"
-    return (
-        f"{one.cell.policy} {wording.fixed(one.cell.mean, wording.digits_of(one.cell.mean))}{times}"
-    )
-
-
-def _surprises(results: StudyResults) -> Iterator[str]:
-    """Yield the claims that are refuted, the furthest first, and where policies differ most.
-
-    What rests on too little to be more than provisional surprises nobody, and so do runs that are
-    the same by construction.
-    """
-    tests = results.indicators
-    is_solid = ~tests["flags"].str.contains("assumes_normal").eq(True) & tests["p_value"].notna()
-    tests = tests[is_solid]
-    contrast = _contrast(tests) if len(tests["policy"].unique()) > 1 else None
-    if contrast:
-        yield contrast
-    refuted = tests[tests["claim_verdict_holm"] == "refuted"]
-    distance = (refuted["value"] - refuted["threshold"]).abs()
-    for test in findings_of(
-        refuted.assign(distance=distance).sort_values("distance", ascending=False)
-    ):
-        yield f"{test.policy} is {_turned(test)}, {_short(test.comparison)} ({test.value:.2f})"
-
-
-def _turned(test: Finding) -> str:
-    """Return the opposite of a claim, e.g. "not tolerant"."""
-    claim = str(test.claim)
-    return claim.removeprefix("not ") if claim.startswith("not ") else f"not {claim}"
-
-
-def _short(comparison: str) -> str:
-    return comparison.replace(" -> ", "→").replace(" = ", "=")
-
-
-def _contrast(tests: pd.DataFrame) -> str | None:
-    """Return the question whose answers of two policies lie furthest apart; None: none do.
-
-    The intervals are widened until all of them together hold the true values in 95 % (Bonferroni),
-    as the furthest of many answers lie apart by chance alone.
-    """
-    from scipy.special import stdtrit
-
-    found: list[tuple[float, str]] = []
-    known = tests[(tests["kind"] != "policy") & tests["low"].notna()]
-    if known.empty:
-        return None
-    df = known["n_seeds"].astype(float) - 1
-    wider = stdtrit(df, 1 - 0.025 / len(known)) / stdtrit(df, 0.5 + known["confidence"] / 2)
-    known = known.assign(
-        low=known["value"] - wider * (known["value"] - known["low"]),
-        high=known["value"] + wider * (known["high"] - known["value"]),
-    )
-    for (_, indicator, comparison), here in groups_of(known, "table", "indicator", "comparison"):
-        here = here.sort_values("value", kind="stable")
-        worst, best = here.iloc[0], here.iloc[-1]
-        if worst["high"] < best["low"]:
-            text = (
-                f"{indicator}, {_short(comparison)} differs most: {worst['policy']} "
-                f"{worst['value']:.2f}, {best['policy']} {best['value']:.2f}"
-            )
-            found.append((best["value"] - worst["value"], text))
-    return max(found)[1] if found else None
-
-
-def _unanswered(results: StudyResults) -> str:
-    """Return how many questions are open, and the seeds that would decide them."""
-    tests = results.indicators
-    said = []
-    if blocked := int(tests["conclusion"].isna().sum()):
-        reason = next(iter(tests["problem"].dropna()), "")
-        said.append(f"{blocked} blocked, {'the first ' if blocked > 1 else ''}because {reason}")
-    left = tests[tests["conclusion"] == "inconclusive"]
-    if left.empty:
-        return f"Open: {'; '.join(said) or 'nothing'}."
-    said.insert(0, f"Open: {len(left)} of {len(tests)}")
-    published = left[left["published"].notna()]
-    if not published.empty:
-        needed = published["seeds_for_power_80"].dropna()
-        counts = (f"{seeds} seeds decide {(needed <= seeds).sum()}" for seeds in _BUDGETS)
-        said.append(f"if the paper is right, {', '.join(counts)}")
-    elif left["detectable"].notna().any():
-        least, most = (f"{x:.2f}" for x in (left["detectable"].min(), left["detectable"].max()))
-        size = least if least == most else f"{least} to {most}"
-        said.append(
-            f"these seeds find an effect of {size} with 80 % power; `study power DIR --effect X` "
-            "counts the seeds for a smaller one"
-        )
-    return f"{'; '.join(said)}."

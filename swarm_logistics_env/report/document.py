@@ -9,17 +9,16 @@ from importlib.metadata import version
 
 from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
-from swarm_logistics_env.studies.indicator_table import findings_of
-from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
-from .figures import Figure, indicator_figures, size_figures
-from .further_measures import budget_sections, load_sections, look_sections, resilience_sections
+from .fault_sections import fault_sections, look_section
+from .figures import forest_figure, indicator_figures, size_figures
 from .policies_compared import policy_sections
-from .result_tables import Section, tables, warnings
-from .wording import NOTHING, sentence
+from .section import NOTHING, Figure, Section, sentence
+from .tables import tables, warnings
 
 
 @dataclass(frozen=True)
@@ -62,25 +61,61 @@ def document(results: StudyResults) -> Document:
     seeds = f"1 {what}" if len(plan.seeds) == 1 else f"{len(plan.seeds)} {what}s"
     seeds = seeds if plan.paired else f"at most {seeds}"
     about = (
-        f"{plan.specification.name}: {len(plan.conditions)} conditions, {seeds} of each; every "
-        "verdict holds for the conditions of the set-up sheet below and for no others."
+        f"{plan.specification.name}: {len(plan.cases)} conditions, {seeds} of each; every verdict "
+        "holds for the conditions of the set-up sheet below and for no others."
     )
     text = [about]
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
+    found = answer(results)
     result_tables, lines = tuple(tables(results)), tuple(warnings(results))
-    faults = *budget_sections(results), *resilience_sections(results), *load_sections(results)
+    faults = tuple(fault_sections(results))
     summary = (
         *result_tables,
         *([Section("Warnings", lines=lines)] if lines else []),
         *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
-    warned = (Section("", lines=lines),) if lines else ()
-    chapters = Chapter("Warnings", "", warned), *_chapters(results, result_tables, faults)
+    figures = forest_figure(results, found), *indicator_figures(results), *size_figures(results)
+    looks = (look_section(results),) if plan.specification.until_clear else ()
+    chapters = [
+        Chapter("Warnings", "", (Section("", lines=lines),) if lines else ()),
+        Chapter(
+            "Figures",
+            "The paper's indicators; raw P and the numbers stand in the tables below.",
+            tuple(Section("", figures=(figure,)) for figure in figures),
+        ),
+        Chapter(
+            "Verdicts",
+            "One sentence per question. Verdicts are Holm-adjusted; the family is all comparisons "
+            "of one indicator for one policy.",
+            tuple(_verdicts(results)),
+        ),
+        Chapter(
+            "Results",
+            f"P is {plan.specification.played.performance}. Square brackets hold intervals at the "
+            'level that the heading gives; "one run" is where a single further run falls.',
+            result_tables,
+        ),
+        Chapter("Checks", "How far the verdicts hang on the method.", looks),
+        Chapter(
+            "Policies compared",
+            "Side by side, seed by seed; the first policy of the study is the one that the others "
+            "are measured against.",
+            tuple(policy_sections(results)),
+        ),
+        Chapter(
+            "Beyond the paper",
+            "Measures that the paper does not define; none of them enters a verdict above.",
+            faults,
+        ),
+        Chapter("Set-up", "", setup_sheet(plan)),
+        Chapter("Methods", "", (Section("", lines=(methods(plan),)),)),
+        Chapter("Glossary", "", (glossary(plan),)),
+    ]
     whole = Document(
         f"Study {plan.specification.name!r}",
         tuple(text),
-        answer(results),
+        found,
         tuple(chapter for chapter in chapters if chapter.sections),
         summary,
     )
@@ -95,54 +130,12 @@ def document(results: StudyResults) -> Document:
     return whole
 
 
-def _chapters(
-    results: StudyResults,
-    result_tables: tuple[Section, ...],
-    faults: tuple[Section, ...],
-) -> Iterator[Chapter]:
-    figures = [*indicator_figures(results), *size_figures(results)]
-    yield Chapter(
-        "Figures",
-        "The paper's indicators; raw P and the numbers stand in the tables below.",
-        tuple(Section("", figures=(figure,)) for figure in figures),
-    )
-    yield Chapter(
-        "Verdicts",
-        "One sentence per question. The mark shows the Holm-adjusted verdict; the family is all "
-        "comparisons of one indicator for one policy.",
-        tuple(_verdicts(results)),
-    )
-    yield Chapter(
-        "Results",
-        f"P is {results.plan.specification.played.performance}. Square brackets hold intervals at "
-        'the level that the heading gives; "one run" is where a single further run falls.',
-        result_tables,
-    )
-    yield Chapter(
-        "Checks", "How far the verdicts hang on the method.", tuple(look_sections(results))
-    )
-    yield Chapter(
-        "Policies compared",
-        "Side by side, seed by seed; the first policy of the study is the one that the others are "
-        "measured against.",
-        tuple(policy_sections(results)),
-    )
-    yield Chapter(
-        "Beyond the paper",
-        "Measures that the paper does not define; none of them enters a verdict above.",
-        faults,
-    )
-    yield Chapter("Set-up", "", setup_sheet(results.plan))
-    yield Chapter("Methods", "", (Section("", lines=(methods(results.plan),)),))
-    yield Chapter("Glossary", "", (glossary(results.plan),))
-
-
 def _verdicts(results: StudyResults) -> Iterator[Section]:
-    families = groups_of(results.indicators, "policy", "indicator")
-    for (policy, indicator), tests in families:
+    families = grouped(results.verdicts, lambda test: test.compared.family)
+    for (policy, indicator), tests in families.items():
         yield Section(
             f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(sentence(results, test) for test in findings_of(tests)),
+            sentences=tuple(sentence(results, test) for test in tests),
         )
 
 
@@ -150,7 +143,7 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
     """Return everything that was held fixed and everything that was varied."""
     if plan.imported_from is not None:
         return _recorded_setup(plan)
-    policies = {condition.policy.label: condition.policy.identity for condition in plan.conditions}
+    policies = {case.policy.title: case.identity for case in plan.cases}
     return (
         Section("Study", lines=tuple(_study(plan))),
         Section(
@@ -170,7 +163,7 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
 
 def _study(plan: Plan) -> Iterator[str]:
     yield (
-        f"Study {plan.specification.name!r}: {len(plan.conditions)} conditions x "
+        f"Study {plan.specification.name!r}: {len(plan.cases)} conditions x "
         f"{len(plan.seeds)} seeds ({plan.seeds[0]} to {plan.seeds[-1]}), the same seeds for every "
         f"condition. swarm-logistics-env {version('swarm-logistics-env')}, code version "
         f"{plan.code}."
@@ -208,8 +201,8 @@ def _listed(parameters: object) -> str:
 
 
 def _failure_modes(plan: Plan) -> Iterator[Section]:
-    modes = dict.fromkeys(fault.mode for c in plan.conditions for fault in c.faults)
-    known = plan.conditions[0].task.failure_modes
+    modes = dict.fromkeys(fault.mode for case in plan.cases for fault in case.faults)
+    known = plan.cases[0].task.failure_modes
     if modes:
         rows = tuple((mode, _described(mode, known)) for mode in modes)
         yield Section("Failure modes", ("mode", "what it does to a robot"), rows)
@@ -224,7 +217,7 @@ def _variations(plan: Plan) -> Iterator[str]:
     asked = plan.specification
     base = asked.scenario.model_dump()
     for factor in (*asked.sizes, *asked.faults, *asked.parameters, *asked.ablations):
-        changed = plan.conditions[0].task.vary(asked.scenario, factor.scenario).model_dump()
+        changed = plan.cases[0].task.vary(asked.scenario, factor.scenario).model_dump()
         differing = [f"{name} = {x}" for name, x in changed.items() if x != base[name]]
         if differing:
             title = factor.title or type(factor).__name__
@@ -238,7 +231,7 @@ def _recorded_setup(plan: Plan) -> tuple[Section, ...]:
     """Return what is known of the trials, the set-up that the user states, and the methods."""
     shared = "Paired by the seeds that it names" if plan.paired else "Unpaired: it names no seeds"
     known = (
-        f"Study {plan.specification.name!r}: {len(plan.conditions)} conditions, imported from "
+        f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
         f"{plan.imported_from}. {shared}. Of their conditions what varies is known, and what is "
         "stated below."
     )
@@ -257,12 +250,12 @@ def methods(plan: Plan) -> str:
     n = len(plan.seeds)
     if plan.paired:
         what = "trials" if plan.imported_from else "simulated runs"
-        trials = f"{n} {what} of each of {len(plan.conditions)} conditions, paired by seed"
+        trials = f"{n} {what} of each of {len(plan.cases)} conditions, paired by seed"
         test = "the paired t-test (Fieller's interval)"
         if n >= MIN_SEEDS:
             test += " and its studentised bootstrap, whichever gives the larger p"
     else:
-        trials = f"up to {n} independent trials of each of {len(plan.conditions)} conditions"
+        trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
         test = "Welch's t-test for independent samples"
     return (
         f"We measured performance P in {trials}. We report {listed}, each a ratio of mean "
@@ -303,9 +296,9 @@ _WORDS = (
     ("twin", "the run of the same seed in the original condition"),
     ("supported, refuted", "above, or below, the threshold beyond chance"),
     ("equivalent", "the indicator is open, but P changes by less than the declared margin"),
-    ("open, inconclusive", "these seeds cannot tell"),
-    ("same runs, unaffected", "both conditions gave the same runs: exact, and no evidence"),
-    ("blocked", "runs failed or are missing, or nothing was delivered in the reference"),
+    ("open", "these seeds cannot tell; in CSV files inconclusive"),
+    ("same runs", "both conditions gave the same runs: exact, and no evidence"),
+    ("undefined", "nothing was delivered in the reference, or runs failed or are missing"),
     ("Holm", "adjustment of a family of verdicts so that any error among them has 5 % at most"),
     ("provisional", "the verdict assumes normal differences: below ten seeds, or unpaired"),
     ("claim", "what the reference says of an indicator"),

@@ -10,26 +10,25 @@ import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from swarm_logistics_env.studies.fault_measures import RepairCurve
-from swarm_logistics_env.studies.performance_table import groups_of
+from swarm_logistics_env.studies.fault_measures import RateCurve, RepairCurve
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
 Draw: TypeAlias = "Callable[[Canvas], None]"
+Curve = TypeVar("Curve", RateCurve, RepairCurve)
 
 INK, PAPER = "#1b1b1b", "#ffffff"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
 WIDTH = 5.2  # inch: still legible at the width of a phone
-_STYLE: Any = {
+_STYLE: Any = {  # matplotlib types each of its names
     "axes.edgecolor": INK,
     "axes.facecolor": "none",
     "axes.grid": True,
@@ -79,18 +78,37 @@ def images(draw: Draw, height: float) -> tuple[str, bytes]:
 
 
 @dataclass(frozen=True)
-class Panel:
-    """One pair of axes: series over shared categories, and thresholds.
+class Point:
+    """One value with its interval.
 
     Attributes:
-        points: a row for each point, with the columns `series` (label), `style` (place of its
-            colour and marker), `category`, `value`, `low`, `high`, `decided` (filled), `saturated`
-            (marked) and `published` (a cross beside it); missing numbers are NaN.
+        series: label of its series.
+        style: place of its colour and marker.
+        category: where it stands on the axis.
+        value, low, high: None: missing.
+        published: a cross beside it; None: none.
+        decided: whether it is filled.
+        saturated: whether it is marked.
     """
+
+    series: str
+    style: int
+    category: str
+    value: float | None
+    low: float | None
+    high: float | None
+    published: float | None = None
+    decided: bool = False
+    saturated: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes: series over shared categories, and thresholds."""
 
     title: str
     y_label: str
-    points: pd.DataFrame
+    points: tuple[Point, ...]
     thresholds: tuple[float, ...]
     x_label: str
 
@@ -100,39 +118,35 @@ def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
     grid = canvas.subplots(len(panels), 1, squeeze=False)
     for axes, panel in zip(grid[:, 0], panels):
         _panel(axes, panel)
-    if len(panels[0].points["style"].unique()) > 1:
+    if len({point.style for point in panels[0].points}) > 1:
         _legend(canvas, grid[0, 0], lines=False)
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
-    categories = list(panel.points["category"].unique())
+    categories = list(dict.fromkeys(point.category for point in panel.points))
     bottom, top = _range(panel)
     for threshold in panel.thresholds:
         if bottom <= threshold <= top:
             axes.axhline(threshold, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
-    styles = sorted(panel.points["style"].unique())
+    styles = sorted({point.style for point in panel.points})
     spread = min(0.8, 0.24 * len(styles))
-    for index, style in enumerate(styles):
-        shift = spread * ((index + 0.5) / len(styles) - 0.5)
-        colour, marker = COLOURS[style % len(COLOURS)], MARKERS[style % len(MARKERS)]
-        points = panel.points[panel.points["style"] == style]
-        points = points.assign(x=points["category"].map(categories.index) + shift)
-        known = points.dropna(subset="value")
-        _bars(axes, known["x"], known["low"], known["high"], (bottom, top), colour)
-        for decided in (True, False):
-            here = known[known["decided"] == decided]
-            # Only the filled marks name the series.
-            label = points["series"].iloc[0] if decided else None
-            fill = colour if decided else PAPER
-            (marks,) = axes.plot(here["x"], here["value"], marker, color=colour, zorder=3)
-            marks.set(markerfacecolor=fill, label=label)
-        # Beside the mark, which would hide it.
-        published = points.dropna(subset="published")
-        crosses = published["x"] + 0.1, published["published"]
-        axes.plot(*crosses, "x", color=INK, markersize=4.5, zorder=4)
-        capped = known[known["saturated"]]
-        for place in zip(capped["x"], capped["value"]):
-            axes.annotate("†", place, (-9, 3), textcoords="offset points", fontsize=9)
+    named: set[int] = set()
+    for point in panel.points:
+        index = styles.index(point.style)
+        x = categories.index(point.category) + spread * ((index + 0.5) / len(styles) - 0.5)
+        colour = COLOURS[point.style % len(COLOURS)]
+        if point.published is not None:  # beside the mark, which would hide it
+            axes.plot(x + 0.1, point.published, "x", color=INK, markersize=4.5, zorder=4)
+        if point.value is None:
+            continue
+        _bar(axes, x, point, (bottom, top), colour)
+        (mark,) = axes.plot(x, point.value, MARKERS[point.style % len(MARKERS)], color=colour)
+        mark.set(markerfacecolor=colour if point.decided else PAPER, zorder=3)
+        if point.style not in named:
+            mark.set_label(point.series)
+            named.add(point.style)
+        if point.saturated:
+            axes.annotate("†", (x, point.value), (-9, 3), textcoords="offset points", fontsize=9)
     axes.set_xticks(range(len(categories)), categories)
     if len(categories) > 6:
         axes.tick_params(axis="x", labelsize=8.0)
@@ -144,74 +158,108 @@ def _panel(axes: Axes, panel: Panel) -> None:
 
 def _range(panel: Panel) -> tuple[float, float]:
     """Axis limits: all values and thresholds, and intervals up to twice their span beyond."""
-    values = [*panel.points["value"].dropna(), *panel.points["published"].dropna()]
+    values = [x for p in panel.points for x in (p.value, p.published) if x is not None]
     inner = [*values, *panel.thresholds[:1]]
     if values and max(values) > 0.5 * panel.thresholds[-1]:
         inner.append(panel.thresholds[-1])
+    return _around(inner, panel.points, least=1.5)
+
+
+def _around(inner: Sequence[float], points: Sequence[Point], least: float) -> tuple[float, float]:
     low, high = min(inner), max(inner)
-    reach = max(2.0 * (high - low), 1.5)
-    limits = [*panel.points["low"], *panel.points["high"]]
-    ends = [limit for limit in limits if math.isfinite(limit)]
-    low = max(low - reach, min([low, *ends]))
-    high = min(high + reach, max([high, *ends]))
+    reach = max(2.0 * (high - low), least)
+    limits = [x for p in points for x in (p.low, p.high) if x is not None and math.isfinite(x)]
+    low = max(low - reach, min([low, *limits]))
+    high = min(high + reach, max([high, *limits]))
     margin = 0.06 * max(high - low, 0.5)
     return low - margin, high + margin
 
 
-def _bars(
+def _bar(
     axes: Axes,
-    x: pd.Series[float],
-    low: pd.Series[float],
-    high: pd.Series[float],
-    limits: tuple[float, float],
+    at: float,
+    point: Point,
+    within: tuple[float, float],
     colour: str,
+    *,
+    level: bool = False,
 ) -> None:
-    """Draw intervals; an arrow where one leaves the axis limits."""
-    bottom, top = limits
-    known = low.notna()
-    x, low, high = x[known], low[known], high[known]
-    ends = low.clip(lower=bottom), high.clip(upper=top)
-    axes.vlines(x, *ends, color=colour, linewidth=1.4, zorder=2)
-    for limit in (low, high):
-        inside = limit.between(bottom, top)
-        axes.plot(x[inside], limit[inside], "_", color=colour, markersize=5)
-    for edge, arrow, leaving in ((bottom, "v", x[low < bottom]), (top, "^", x[high > top])):
-        if len(leaving):  # an empty line that is not clipped spoils the layout
-            edges = [edge] * len(leaving)
-            axes.plot(leaving, edges, arrow, color=colour, markersize=5, clip_on=False)
+    """Draw an interval, upright or level; an arrow where it leaves the axis limits."""
+    if point.low is None or point.high is None:
+        return
+    bottom, top = within
+    ends = max(point.low, bottom), min(point.high, top)
+    lines = axes.hlines if level else axes.vlines
+    lines(at, *ends, color=colour, linewidth=1.4, zorder=2)
+    for limit, end, arrow in zip((point.low, point.high), within, "<>" if level else "v^"):
+        leaves = not bottom <= limit <= top
+        place = (end if leaves else limit, at) if level else (at, end if leaves else limit)
+        sign = arrow if leaves else "|" if level else "_"
+        axes.plot(*place, sign, color=colour, markersize=5, clip_on=not leaves)
 
 
-def sizes(canvas: Canvas, cells: pd.DataFrame) -> None:
-    """Draw P against swarm size."""
+def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
+    """Draw a row for each question: its values with their intervals, from top to bottom.
+
+    Args:
+        canvas: to draw on.
+        rows: the label of each, and its points; a point's `published` is its threshold.
+    """
     axes = canvas.subplots()
-    right, highest = 1.1 * cells["value"].max(), 1.08 * cells["high"].fillna(cells["mean"]).max()
-    _bars(axes, cells["value"], cells["low"], cells["high"], (0.0, math.inf), COLOURS[0])
-    axes.plot(cells["value"], cells["mean"], MARKERS[0], color=COLOURS[0], markersize=5, zorder=3)
-    capped = cells[cells["saturated"]]
-    for point in zip(capped["value"], capped["mean"]):
-        axes.annotate("†", point, (5, 2), textcoords="offset points", fontsize=8)
-    axes.set(xlim=(0.0, right), ylim=(0.0, max(highest, 1.0)))
+    points = [point for _, here in rows for point in here]
+    known = [x for p in points for x in (p.value, p.published) if x is not None]
+    within = _around([0.0, *known], points, least=0.5)
+    for place, (_, here) in enumerate(rows):
+        for index, point in enumerate(here):
+            at = place + 0.6 * ((index + 0.5) / len(here) - 0.5)
+            if point.published:
+                axes.vlines(point.published, place - 0.4, place + 0.4, color=INK, linewidth=0.8)
+            if point.value is None:
+                continue
+            colour = COLOURS[point.style % len(COLOURS)]
+            _bar(axes, at, point, within, colour, level=True)
+            fill = colour if point.decided else PAPER
+            axes.plot(point.value, at, "o", color=colour, markersize=4, markerfacecolor=fill)
+    axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+    axes.set_yticks(range(len(rows)), [label for label, _ in rows])
+    axes.tick_params(axis="y", labelsize=8.0)
+    axes.grid(visible=False, axis="y")
+    axes.grid(visible=True, axis="x")
+    axes.set(ylim=(len(rows) - 0.4, -0.6), xlim=within, xlabel="indicator")
+
+
+def sizes(canvas: Canvas, points: Sequence[tuple[float, Point]]) -> None:
+    """Draw P against swarm size N."""
+    axes = canvas.subplots()
+    highest = max(point.high or point.value or 0.0 for _, point in points)
+    for n, point in points:
+        _bar(axes, n, point, (0.0, math.inf), COLOURS[0])
+        axes.plot(n, point.value or 0.0, MARKERS[0], color=COLOURS[0], markersize=5, zorder=3)
+        if point.saturated:
+            place = n, point.value or 0.0
+            axes.annotate("†", place, (5, 2), textcoords="offset points", fontsize=8)
+    axes.set(xlim=(0.0, 1.1 * max(n for n, _ in points)), ylim=(0.0, max(1.08 * highest, 1.0)))
     axes.set(xlabel="swarm size N [robots]", ylabel="performance P")
 
 
-def rates(canvas: Canvas, panels: Mapping[str, pd.DataFrame], onset: float, y_label: str) -> None:
+def rates(
+    canvas: Canvas, panels: Mapping[str, Sequence[RateCurve]], onset: float, y_label: str
+) -> None:
     """Draw deliveries over time, one panel below the other, on one scale.
 
     Args:
         canvas: to draw on.
-        panels: the rates (`fault_measures.rate_curves`) by the title of their panel.
+        panels: the curves by the title of their panel.
         onset: when the fault begins [s].
         y_label: label of the axis of the rates.
     """
-    for axes, frame in _over_time(canvas, panels, "end of the window [s]", y_label):
-        for index, (runs, curve) in enumerate(groups_of(frame, "runs")):
+    for axes, curves in _over_time(canvas, panels, "end of the window [s]", y_label):
+        for index, curve in enumerate(curves):
             colour = COLOURS[index % len(COLOURS)]
-            if curve["low"].notna().all():
-                low, high = curve["low"].clip(lower=0.0), curve["high"]
-                axes.fill_between(
-                    curve["seconds"], low, high, color=colour, alpha=0.16, linewidth=0
-                )
-            (line,) = axes.plot(curve["seconds"], curve["deliveries"], color=colour, label=runs)
+            if not np.isnan(curve.low).any():
+                band = curve.seconds, curve.low.clip(0.0), curve.high
+                axes.fill_between(*band, color=colour, alpha=0.16, linewidth=0)
+            (line,) = axes.plot(curve.seconds, curve.deliveries, color=colour, label=curve.runs)
             line.set(linestyle=LINES[index % len(LINES)], marker=MARKERS[index % len(MARKERS)])
             line.set(markevery=(index * 4, 12), markersize=4.5)
         axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
@@ -242,8 +290,8 @@ def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None
 
 
 def _over_time(
-    canvas: Canvas, panels: Mapping[str, Any], x_label: str, y_label: str
-) -> Iterator[tuple[Axes, Any]]:
+    canvas: Canvas, panels: Mapping[str, Sequence[Curve]], x_label: str, y_label: str
+) -> Iterator[tuple[Axes, Sequence[Curve]]]:
     """Yield the axes of each panel to draw on, then label them."""
     grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
     for axes, (title, curves) in zip(grid[:, 0], panels.items()):

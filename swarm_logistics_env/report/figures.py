@@ -2,148 +2,172 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
-from swarm_logistics_env.studies.performance_table import groups_of
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import (
+    Verdict,
+    frame_of_cells,
+    frame_of_verdicts,
+    grouped,
+)
 
 from . import drawing
-from .drawing import Panel
-from .wording import DECIDED, listed, percent, seeds_text
+from .answer import Answer
+from .drawing import Panel, Point
+from .section import DECIDED, Figure, listed, seeds_text, slug
 
-if TYPE_CHECKING:
-    import pandas as pd
+_COLUMNS = [
+    "policy", "table", "indicator", "comparison", "value", "low", "high", "verdict",
+    "verdict_holm", "published", "saturated",
+]  # fmt: skip
+_MARKS = (
+    "Filled: the Holm-adjusted verdict is decided; hollow: open; bars: 95 % intervals, an arrow "
+    "where a bar leaves the axis; dashed: thresholds"
+)
 
 
-@dataclass
-class Figure:
-    """One figure.
-
-    Attributes:
-        name: of its files, without ending; letters, digits and hyphens.
-        caption: what it shows and under which conditions, in full.
-        data: what it shows, one row a point.
-        height: of the drawing [inch]; the width is that of all figures.
-        draw: draws it on an empty canvas.
-    """
-
-    name: str
-    caption: str
-    data: pd.DataFrame
-    height: float
-    draw: drawing.Draw
+def forest_figure(results: StudyResults, found: Answer) -> Figure:
+    """Return the lines of the answer as a forest of intervals."""
+    several = len(results.policies) > 1
+    rows = [
+        (
+            f"{line.policy}: {line.question}" if several else line.question,
+            [
+                _point(test, results.policies.index(line.policy), "", test.compared.threshold)
+                for test in line.tests
+            ],
+        )
+        for line in found.lines
+    ]
+    tests = [test for line in found.lines for test in line.tests]
+    return Figure(
+        "answer",
+        f"{found.asked} Every question with its 95 % interval. {_MARKS}.{_capped(tests)}",
+        frame_of_verdicts(tests)[_COLUMNS],
+        0.9 + 0.27 * len(rows),
+        partial(drawing.forest, rows=rows),
+    )
 
 
 def indicator_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield S per step, FT and R per mode and m, A per parameter, and P without a part."""
-    for table, tests in groups_of(_asked(results, "size"), "table"):
-        panels = _panels(_by_policy(tests, _steps(tests)), "swarm size N → N + m")
+    for table, tests in grouped(_asked(results, "size"), lambda t: t.compared.table).items():
+        panels = _panels(results, tests, "swarm size N → N + m")
         title = f"{_policies(tests)}, {table}: {_caption(tests, 'per step in N')}"
         yield _interval_figure(results, (table,), title, tests, panels)
     yield from _faults(results)
     tests = _asked(results, "parameter")
-    if not tests.empty:
+    if tests:
         panels = [
             panel
-            for (table, name), here in groups_of(tests, "table", "factor")
-            for panel in _panels(_by_policy(here, _steps(here)), f"{name}, x_o → x_new", table)
+            for (table, name), here in grouped(
+                tests, lambda t: (t.compared.table, t.compared.changed.setting.name)
+            ).items()
+            for panel in _panels(results, here, f"{name}, x_o → x_new", table)
         ]
         title = f"{_policies(tests)}: {_caption(tests, 'per parameter')}"
         yield _interval_figure(results, (), title, tests, panels)
-    yield from _ablations(results)
-
-
-def _faults(results: StudyResults) -> Iterator[Figure]:
-    for (table, onset, swarm), tests in groups_of(
-        _asked(results, "fault"), "table", "onset", "n_robots"
-    ):
-        start = f", faults from {onset:g} s" if onset else ""
-        numbers = tests["after"].map("{:g}".format)
-        x_label = "failure mode and number m of faulty robots"
-        if len(tests["policy"].unique()) > 1:
-            points = _by_policy(tests, tests["factor"] + " " + numbers)
-        else:
-            points = tests.assign(series="m = " + numbers, category=tests["factor"])
-            x_label = "failure mode"
-        title = (
-            f"{_policies(tests)}, {table}, N = {swarm}{start}: "
-            f"{_caption(tests, 'per failure mode and number m of faulty robots')}"
-        )
-        names = table, f"{onset:g}s" if onset else ""
-        yield _interval_figure(results, names, title, tests, _panels(points, x_label))
-
-
-def _ablations(results: StudyResults) -> Iterator[Figure]:
-    asked = results.indicators[results.indicators["kind"] == "policy"]
-    for table, tests in groups_of(asked, "table"):
+    asked = [t for t in results.verdicts if t.compared.changed.setting.kind == "policy"]
+    for table, tests in grouped(asked, lambda t: t.compared.table).items():
         # 0 first: it is the threshold that always stands in the picture.
-        thresholds = tuple(dict.fromkeys([0.0, *tests["threshold"]]))
-        points = _by_policy(tests, tests["comparison"])
+        thresholds = tuple(dict.fromkeys([0.0, *(t.compared.threshold for t in tests)]))
         title = (
             f"{_policies(tests)}, {table}: relative change of P where another policy takes its "
             "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share."
         )
-        panels = _panels(points, "in its place", thresholds=thresholds)
+        panels = _panels(results, tests, "in its place", thresholds=thresholds)
         yield _interval_figure(results, (table,), title, tests, panels)
 
 
-def _by_policy(tests: pd.DataFrame, categories: pd.Series[str]) -> pd.DataFrame:
-    """Return points of one series a policy; the published values stand beside the first."""
-    first = tests["policy"] == tests["policy"].iloc[0]
-    return tests.assign(
-        series=tests["policy"], category=categories, published=tests["published"].where(first)
-    )
+def _faults(results: StudyResults) -> Iterator[Figure]:
+    def place(test: Verdict) -> tuple[str, float, int]:
+        compared = test.compared
+        return compared.table, compared.changed.setting.onset, compared.n_robots
+
+    for (table, onset, swarm), tests in grouped(_asked(results, "fault"), place).items():
+        start = f", faults from {onset:g} s" if onset else ""
+        title = (
+            f"{_policies(tests)}, {table}, N = {swarm}{start}: "
+            f"{_caption(tests, 'per failure mode and number m of faulty robots')}"
+        )
+        several = len({test.compared.policy for test in tests}) > 1
+        x_label = "failure mode and number m of faulty robots" if several else "failure mode"
+        names = table, f"{onset:g}s" if onset else ""
+        panels = _panels(results, tests, x_label, by_m=not several)
+        yield _interval_figure(results, names, title, tests, panels)
 
 
-def _steps(tests: pd.DataFrame) -> pd.Series[str]:
-    return tests["before"].map("{:g}→".format) + tests["after"].map("{:g}".format)
+def _category(test: Verdict) -> str:
+    before, after = test.compared.original.setting, test.compared.changed.setting
+    if after.kind == "fault":
+        return f"{after.name} {after.value:g}"
+    return test.compared.label if after.kind == "policy" else f"{before.value:g}→{after.value:g}"
 
 
 def _panels(
-    points: pd.DataFrame, x_label: str, title: str = "", thresholds: tuple[float, ...] = ()
+    results: StudyResults,
+    tests: Sequence[Verdict],
+    x_label: str,
+    title: str = "",
+    thresholds: tuple[float, ...] = (),
+    *,
+    by_m: bool = False,
 ) -> list[Panel]:
-    """Return a pair of axes for each indicator."""
-    decided = points["verdict_holm"].isin(DECIDED)
-    points = points.assign(decided=decided, style=points["series"].factorize()[0])
-    return [
-        Panel(
-            title,
-            definition.heading,
-            points[points["indicator"] == definition.symbol],
-            thresholds or tuple(definition.adjectives),
-            x_label,
-        )
-        for definition in _definitions(points)
-    ]
+    """Return a pair of axes for each indicator: a series a policy or, of one policy, an m."""
+    found = []
+    numbers = sorted({test.compared.changed.setting.value for test in tests})
+    for definition in _definitions(tests):
+        points = []
+        for test in tests:
+            if test.compared.indicator != definition.symbol:
+                continue
+            setting, policy = test.compared.changed.setting, test.compared.policy
+            # The published values stand beside the first policy.
+            published = test.published if policy == tests[0].compared.policy else None
+            if by_m:
+                style, series, category = numbers.index(setting.value), "", setting.name
+                series = f"m = {setting.value:g}"
+            else:
+                style, series, category = results.policies.index(policy), policy, _category(test)
+            points.append(_point(test, style, category, published, series))
+        above = thresholds or tuple(definition.adjectives)
+        found.append(Panel(title, definition.heading, tuple(points), above, x_label))
+    return found
+
+
+def _point(
+    test: Verdict, style: int, category: str, published: float | None, series: str = ""
+) -> Point:
+    value, low, high = test.interval or (None, None, None)
+    return Point(
+        series,
+        style,
+        category,
+        value,
+        low,
+        high,
+        published,
+        decided=test.verdict(holm=True) in DECIDED,
+        saturated=test.saturated,
+    )
 
 
 def _interval_figure(
     results: StudyResults,
     names: tuple[str, ...],
     caption: str,
-    tests: pd.DataFrame,
+    tests: Sequence[Verdict],
     panels: Sequence[Panel],
 ) -> Figure:
     """Return the figure of indicators with their intervals."""
-    columns = [
-        "policy", "table", "indicator", "comparison", "value", "low", "high",
-        "verdict", "verdict_holm", "published", "saturated",
-    ]  # fmt: skip
-    crosses = "; crosses: published" if tests["published"].notna().any() else ""
-    marks = (
-        "Filled: the Holm-adjusted verdict is decided; hollow: inconclusive; bars: "
-        f"{percent(results.confidence)} intervals, an arrow where a bar leaves the axis; dashed: "
-        f"thresholds{crosses}."
-    )
+    crosses = "; crosses: published" if any(t.published is not None for t in tests) else ""
     return Figure(
         slug(*(definition.symbol for definition in _definitions(tests)), *names),
-        f"{caption} {seeds_text(results).capitalize()}. {marks}{_saturation(tests)}",
-        tests[columns],
+        f"{caption} {seeds_text(results).capitalize()}. {_MARKS}{crosses}.{_capped(tests)}",
+        frame_of_verdicts(tests)[_COLUMNS],
         0.5 + 2.5 * len(panels),
         partial(drawing.intervals, panels=panels),
     )
@@ -151,35 +175,40 @@ def _interval_figure(
 
 def size_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield P against swarm size N, a figure for every policy and table of sizes."""
-    p = results.performance
-    for (policy, table), cells in groups_of(p[p["kind"] == "size"], "policy", "table"):
-        known = cells.sort_values("value").dropna(subset="mean")
-        if not known.empty:
-            yield Figure(
-                slug("P-N", policy, table),
-                f"{policy}, {table}: P against swarm size N (mean of {seeds_text(results)}, bars: "
-                f"95 % t-intervals).{_saturation(known)}",
-                known[["value", "mean", "low", "high"]],
-                3.6,
-                partial(drawing.sizes, cells=known),
-            )
+    sized = [c for c in results.cells if c.arm.setting.kind == "size" and c.n_seeds]
+    for (policy, table), cells in grouped(sized, lambda c: (c.policy, c.table)).items():
+        cells = sorted(cells, key=lambda cell: cell.arm.setting.value)
+        points = [
+            (c.arm.setting.value, Point("", 0, "", *c.mean, saturated=c.saturated)) for c in cells
+        ]
+        capped = _CAPPED if any(cell.saturated for cell in cells) else ""
+        yield Figure(
+            slug("P-N", policy, table),
+            f"{policy}, {table}: P against swarm size N (mean of {seeds_text(results)}, bars: "
+            f"95 % t-intervals).{capped}",
+            frame_of_cells(cells)[["value", "mean", "low", "high"]],
+            3.6,
+            partial(drawing.sizes, points=points),
+        )
 
 
-def _saturation(rows: pd.DataFrame) -> str:
-    capped = rows["saturated"].any()
-    return " †: P is capped, every item was delivered in a run." if capped else ""
+_CAPPED = " †: P is capped, every item was delivered in a run."
 
 
-def _definitions(tests: pd.DataFrame) -> list[Definition]:
-    asked = set(tests["indicator"])
+def _capped(tests: Sequence[Verdict]) -> str:
+    return _CAPPED if any(test.saturated for test in tests) else ""
+
+
+def _definitions(tests: Sequence[Verdict]) -> list[Definition]:
+    asked = {test.compared.indicator for test in tests}
     return [definition for symbol, definition in DEFINITIONS.items() if symbol in asked]
 
 
-def _policies(tests: pd.DataFrame) -> str:
-    return listed(list(tests["policy"].unique()))
+def _policies(tests: Sequence[Verdict]) -> str:
+    return listed(list(dict.fromkeys(test.compared.policy for test in tests)))
 
 
-def _caption(tests: pd.DataFrame, per: str) -> str:
+def _caption(tests: Sequence[Verdict], per: str) -> str:
     """Return what a figure shows, e.g. "robustness R per failure mode; above 0 robust."."""
     definitions = _definitions(tests)
     above: dict[float, list[str]] = {}
@@ -190,14 +219,12 @@ def _caption(tests: pd.DataFrame, per: str) -> str:
     return f"{listed([definition.heading for definition in definitions])} {per}; {says}."
 
 
-def _asked(results: StudyResults, factor: Factor) -> pd.DataFrame:
+def _asked(results: StudyResults, factor: Factor) -> list[Verdict]:
     """Return each indicator of a factor once: that asked against the lowest threshold."""
-    tests = results.indicators
-    once = ["policy", "table", "indicator", "comparison"]
-    lowest = tests.groupby(once)["threshold"].transform("min") == tests["threshold"]
-    return tests[(tests["kind"] == factor) & lowest].drop_duplicates(once)
+    of = [t for t in results.verdicts if t.compared.changed.setting.kind == factor]
 
+    def same(test: Verdict) -> tuple[str, str, str, str]:
+        compared = test.compared
+        return compared.policy, compared.table, compared.indicator, compared.label
 
-def slug(*parts: object) -> str:
-    """Return a name for files of letters, digits and hyphens, at most 80."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(map(str, parts))).strip("-")[:80]
+    return [min(tests, key=lambda t: t.compared.threshold) for tests in grouped(of, same).values()]

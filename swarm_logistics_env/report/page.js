@@ -144,7 +144,7 @@ function chooseCondition(condition, seed) {
 
 function showQuestion() {
   at("question").hidden = false;
-  for (const sign of document.querySelectorAll(".sign")) {
+  for (const sign of document.querySelectorAll(".answer tr[data-question]")) {
     sign.classList.toggle("chosen", Number(sign.dataset.question) === chosen.question);
   }
   drawSlopes();

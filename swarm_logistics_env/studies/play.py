@@ -11,6 +11,7 @@ import pickle
 import re
 import signal
 import threading
+import time
 import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Sequence
@@ -46,6 +47,7 @@ class Tally:
         played: runs played now; failed: those of them that failed; kept: found in the store.
         seconds: wall-clock time [s].
         error: what the first that failed raised, without its traceback; None: none failed.
+        left: runs that the time did not suffice for.
     """
 
     played: int
@@ -53,6 +55,7 @@ class Tally:
     kept: int
     seconds: float
     error: str | None = None
+    left: int = 0
 
 
 @dataclass(frozen=True)
@@ -93,9 +96,16 @@ class Shard:
 
 
 def play(
-    runs: Sequence[Run], engine: Engine, store: Runs, title: str
+    runs: Sequence[Run],
+    engine: Engine,
+    store: Runs,
+    title: str,
+    end: float | None = None,
 ) -> tuple[list[Outcome], float]:
     """Play runs and keep each in the store at once; show a progress bar.
+
+    Args:
+        end: when to stop (`time.monotonic`) [s]; None: when all are played.
 
     Returns:
         The outcomes, as they finished, and how long it took [s].
@@ -113,6 +123,8 @@ def play(
             done[run.case.policy.title] += 1
             failed = sum(each.error is not None for each in outcomes)
             progress.reach(len(outcomes), f"{failed} failed", done)
+            if end is not None and time.monotonic() > end:
+                break
     return outcomes, progress.seconds
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -123,6 +124,7 @@ class Study:
         processes: int | None = None,
         address: str | None = None,
         shard: Shard | None = None,
+        minutes: float | None = None,
     ) -> Tally:
         """Play the runs that are missing, and those that failed before; each is kept at once.
 
@@ -133,6 +135,7 @@ class Study:
                 `if __name__ == "__main__":` then.
             address: the address of the Ray cluster; None starts one on this machine.
             shard: the part to play, if other machines play the others; None means all.
+            minutes: begin no further run after this time; the same call goes on. None: no end.
 
         Raises:
             StudyError: the store or the engine cannot be used, or the store is another study's.
@@ -151,7 +154,7 @@ class Study:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        whole, seconds = self._runs(shard), 0.0
+        whole, seconds, played = self._runs(shard), 0.0, 0
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
@@ -160,16 +163,20 @@ class Study:
             kept = sum(run.key in done for run in whole)
             tried: set[str] = set()
             errors: list[str] = []
+            end = None if minutes is None else time.monotonic() + 60.0 * minutes
+            left = 0
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
-                outcomes, took = play(missing, engine, store, self.specification.name)
+                outcomes, took = play(missing, engine, store, self.specification.name, end)
+                left = len(missing) - len(outcomes)
+                played += len(outcomes)
                 tried |= {run.key for run in missing}
                 errors += [one.error for one in outcomes if one.error is not None]
                 seconds += took
-                if not self.specification.until_clear:
+                if left or not self.specification.until_clear:
                     break
         error = errors[0].strip().splitlines()[-1] if errors else None
-        return Tally(len(tried), len(errors), kept, seconds, error)
+        return Tally(played, len(errors), kept, seconds, error, left)
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs

@@ -447,7 +447,8 @@ def judge_one(
                 alpha=level.alpha,
             )
         except spi.IndicatorError as error:
-            estimate, problems = None, [str(error)]
+            nothing = not used[comparison.original].by_seed.any()
+            estimate, problems = None, ["it delivers nothing" if nothing else str(error)]
     return Verdict(comparison, estimate, "; ".join(problems) or None, same, bool(saturated), margin)
 
 

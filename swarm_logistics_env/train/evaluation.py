@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from math import isnan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,10 +23,9 @@ from swarm_logistics_env.policies.learned import Score
 from swarm_logistics_env.records import Record, becoming, file_name
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparisons import Arm
-from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.tasks.warehouse_task import code_version
 from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.warehouse import Fault
@@ -218,25 +216,25 @@ def scores_of(results: StudyResults) -> tuple[Score, ...]:
         Score(
             measure="P",
             condition=_in_words(cell.arm),
-            value=cell.mean,
-            low=None if isnan(cell.low) else cell.low,
-            high=None if isnan(cell.high) else cell.high,
+            value=cell.mean.value,
+            low=cell.mean.low,
+            high=cell.mean.high,
             seeds=cell.n_seeds,
         )
-        for cell in rows_of(results.performance)
+        for cell in results.cells
         if cell.n_seeds
     ]
     scores += [
         Score(
-            measure=comparison.indicator,
-            condition=_in_words(comparison.changed),
-            value=estimate.value,
-            low=estimate.low,
-            high=estimate.high,
-            seeds=estimate.n_seeds,
+            measure=test.compared.indicator,
+            condition=_in_words(test.compared.changed),
+            value=test.estimate.value,
+            low=test.estimate.low,
+            high=test.estimate.high,
+            seeds=test.estimate.n_seeds,
         )
-        for estimate, comparison in rows_of(results.indicators[["estimate", "compared"]])
-        if estimate is not None
+        for test in results.verdicts
+        if test.estimate is not None
     ]
     return tuple(dict.fromkeys(scores))
 
@@ -245,4 +243,4 @@ def _in_words(arm: Arm) -> str:
     setting = str(arm.setting)
     if arm.setting.kind == "size":
         return setting
-    return f"N = {arm.condition.scenario.n_robots}, {setting}"
+    return f"N = {arm.case.scenario.n_robots}, {setting}"

@@ -20,7 +20,6 @@ from swarm_logistics_env.records import FileName, each_of, one_of, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
@@ -300,17 +299,17 @@ def performances_of_study(directory: str | Path, own: Scenario) -> dict[Conditio
         results = Study.stored(directory).findings()
     except StudyError as error:
         raise TrainingError(f"indicators.references: {error}") from error
-    labels = set(results.performance["policy"])
-    if len(labels) != 1:
+    if len(results.policies) != 1:
         raise TrainingError(
-            f"indicators.references: the study in {directory} is of {', '.join(sorted(labels))}: "
-            "should be of one policy"
+            f"indicators.references: the study in {directory} is of "
+            f"{', '.join(sorted(results.policies))}: should be of one policy"
         )
     performances: dict[Condition, float] = {}
-    for cell in rows_of(results.performance):
-        condition = cell.arm.condition
-        if cell.n_seeds and not condition.behaviour:
-            performances[_met(condition.scenario, condition.faults, own)] = cell.mean
+    for cell in results.cells:
+        case = cell.arm.case
+        if cell.n_seeds and not case.behaviour and isinstance(case.scenario, Scenario):
+            faults = tuple(fault for fault in case.faults if isinstance(fault, Fault))
+            performances[_met(case.scenario, faults, own)] = cell.mean.value
     return performances
 
 

@@ -17,39 +17,36 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import becoming, plain
 from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.store import write_csv
+from swarm_logistics_env.studies.runs import write_csv
+from swarm_logistics_env.studies.verdict import frame_of_cells, frame_of_verdicts
 
-from .answer import digest
 from .document import Document, document
 from .drawing import INK, PAPER, images
-from .page_data import page_data
-from .result_tables import Section
-from .verdict_matrix import matrix_lines
+from .page import bars, page_data
+from .section import WORDS, Section
 
 if TYPE_CHECKING:
     from jinja2 import Template
-
-WIDTH = 100  # of the answer [characters]
 
 
 def write_report(
     results: StudyResults, directory: Path, whole: Document | None = None
 ) -> tuple[Path, ...]:
-    """Write report.md, cells.csv, claims.csv, every figure's data, and with the extra `study`
-    installed report.html and every figure as SVG and PNG; return the paths of report and tables.
+    """Write report.md, cells.csv, claims.csv, tables.tex, every figure's data, and with the extra
+    `study` report.html and every figure as SVG and PNG; return the paths of report and tables.
 
     Raises:
         StudyError: a file cannot be written.
     """
     whole = whole or document(results)
-    paths = directory / "report.md", directory / "cells.csv", directory / "claims.csv"
+    names = "report.md", "cells.csv", "claims.csv", "tables.tex"
+    paths = tuple(directory / name for name in names)
     pictures, page = directory / "figures", directory / "report.html"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
-        write_csv(paths[1], results.performance.drop(columns=["arm", "by_seed", "digests"]))
-        write_csv(
-            paths[2], results.indicators.drop(columns=["compared", "estimate", "equivalence_test"])
-        )
+        write_csv(paths[1], frame_of_cells(results.cells))
+        write_csv(paths[2], frame_of_verdicts(results.verdicts))
+        write_text(paths[3], latex_tables((whole.answer.section, *whole.summary)))
         for figure in whole.figures():
             write_csv(pictures / f"{figure.name}.csv", figure.data)
         if missing := missing_packages():
@@ -116,9 +113,7 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
     lines = [f"# {document.title}", ""]
     for paragraph in (*document.text, note):
         lines += [_inert(paragraph), ""] if paragraph else []
-    shown = digest(document.answer, WIDTH, None, most=None)
-    fence = "`" * max([3, *(len(run) + 1 for run in re.findall("`+", shown))])
-    lines += ["## Answer", "", f"{fence}text", shown, fence, ""]
+    lines += [section_markdown(document.answer.section)]
     for chapter in document.chapters:
         lines += [f"## {chapter.title}", ""]
         lines += [chapter.text, ""] if chapter.text else []
@@ -172,18 +167,15 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         document: the report.
         drawings: inline SVG of every figure, by name.
     """
-    matrix = document.answer.matrix
-    data = page_data(results, matrix)
+    data = page_data(results)
     return template("page.html.jinja").render(
         document=document,
         answer=document.answer,
-        lines=tuple(matrix_lines(matrix)),
-        found={cell.verdict for cell in matrix.cells()},
-        contradicted=any(cell.contradicts for cell in matrix.cells()),
+        bars=bars(document.answer),
         signs=SIGNS,
-        questions=data["questions"],
+        words=WORDS,
         drawings=drawings,
-        latex=latex_tables(document.summary),
+        latex=latex_tables((document.answer.section, *document.summary)),
         # A text must not end the script that it stands in.
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),

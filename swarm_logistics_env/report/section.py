@@ -1,0 +1,292 @@
+"""Sections: what a report is made of; and numbers and verdicts in words, the same in every one."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.specification import seeds_in_words
+from swarm_logistics_env.studies.verdict import POWER, Cell, Verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .drawing import Draw
+
+SATURATED = "†"
+NOTHING = "–"
+DECIDED = ("supported", "refuted", "equivalent")
+UNAFFECTED = "same runs"
+# The words for verdicts, in the order in which they are counted.
+WORDS = {
+    "supported": "supported",
+    "refuted": "refuted",
+    "equivalent": "equivalent",
+    "inconclusive": "open",
+    "unaffected": UNAFFECTED,
+    "blocked": "undefined",
+}
+_NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
+Record = TypeVar("Record")
+
+
+@dataclass
+class Figure:
+    """One figure.
+
+    Attributes:
+        name: of its files, without ending; letters, digits and hyphens.
+        caption: what it shows and under which conditions, in full.
+        data: what it shows, one row a point.
+        height: of the drawing [inch]; the width is that of all figures.
+        draw: draws it on an empty canvas.
+    """
+
+    name: str
+    caption: str
+    data: pd.DataFrame
+    height: float
+    draw: Draw
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One verdict in words; `verdict`: the conclusion, a name in `WORDS`."""
+
+    head: str
+    text: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with a figure, sentences, a table, lines of text, or several of them."""
+
+    title: str
+    columns: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    lines: tuple[str, ...] = ()
+    sentences: tuple[Sentence, ...] = ()
+    figures: tuple[Figure, ...] = ()
+
+    @classmethod
+    def table(
+        cls,
+        title: str,
+        records: Iterable[Record],
+        columns: Sequence[tuple[str, Callable[[Record], str]]],
+        *lines: str,
+    ) -> Section:
+        """Return a table with a row for each record, and lines of text below it.
+
+        Args:
+            columns: heading of each, and what stands there for a record.
+        """
+        rows = tuple(tuple(text(record) for _, text in columns) for record in records)
+        return cls(title, tuple(heading for heading, _ in columns), rows, lines)
+
+
+def slug(*parts: object) -> str:
+    """Return a name for files of letters, digits and hyphens, at most 80."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(map(str, parts))).strip("-")[:80]
+
+
+def digits_of(p: float) -> int:
+    """Return how many digits after the point tell a performance: three in all where it is small."""
+    return 1 if p >= 1 or p <= 0 else 2 - math.floor(math.log10(p))
+
+
+def fixed(value: float, digits: int) -> str:
+    """Return a number to so many digits; infinity as its sign."""
+    if math.isinf(value):
+        return "∞" if value > 0 else "-∞"
+    # "+ 0.0" after rounding: no minus sign before a zero.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def limits(interval: Interval | Estimate | None, digits: int) -> str:
+    """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none."""
+    if interval is None or interval.low is None or interval.high is None:
+        return ""
+    return f"[{fixed(interval.low, digits)}, {fixed(interval.high, digits)}]"
+
+
+def bracketed(interval: Interval | Estimate | None, digits: int) -> str:
+    """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
+    if interval is None:
+        return NOTHING
+    return f"{fixed(interval.value, digits)} {limits(interval, digits)}".rstrip()
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number without interval."""
+    return NOTHING if value is None else f"{value:.{digits}f}"
+
+
+def percent(confidence: float) -> str:
+    """Return a confidence level, e.g. "95 %"; of an early look never rounded up to 100 %."""
+    return "> 99.99 %" if confidence > 0.9999 else f"{100 * confidence:.4g} %"
+
+
+def p_text(p: float) -> str:
+    """Return a p-value, e.g. "0.013" or "< 0.001"."""
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
+def mean_p(cell: Cell) -> str:
+    """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
+    if not cell.n_seeds:
+        return "no run"
+    return bracketed(cell.mean, digits_of(cell.mean.value)) + mark(cell)
+
+
+def mark(row: Cell | Verdict) -> str:
+    """Return the sign of a P that is capped, or of what rests on it."""
+    return SATURATED if row.saturated else ""
+
+
+def ratio(test: Verdict) -> str:
+    """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
+    return NOTHING if test.interval is None else bracketed(test.interval, 3) + mark(test)
+
+
+def said(verdict: str | None) -> str:
+    """Return a verdict in words."""
+    return WORDS[verdict or "blocked"]
+
+
+def answered(test: Verdict) -> str:
+    """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
+    plain, adjusted = said(test.answer(holm=False)), said(test.answer(holm=True))
+    return plain if plain in (adjusted, "undefined") else f"{plain} ({adjusted})"
+
+
+def counted_as(test: Verdict, verdict: str | None) -> str:
+    """Return what a verdict on this test counts as in `counted`.
+
+    A count is a headline: a verdict that assumes normal differences does not stand in it.
+    """
+    if verdict in DECIDED and "assumes_normal" in test.flags:
+        return _NOT_COUNTED
+    return said(verdict)
+
+
+def counted(verdicts: Iterable[str]) -> str:
+    """Return how many of each word, e.g. "7 supported, 1 refuted"."""
+    counts = Counter(verdicts)
+    return ", ".join(
+        f"{counts[word]} {word}" for word in (*WORDS.values(), _NOT_COUNTED) if counts[word]
+    )
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list, e.g. "swarm-dt, random-walk and central"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def seeds_text(results: StudyResults) -> str:
+    """Return over which seeds everything is, e.g. "20 paired seeds (0 to 19)"."""
+    seeds = results.plan.seeds
+    if not results.plan.paired:
+        return f"{len(seeds)} unpaired {'run' if len(seeds) == 1 else 'runs'} a condition"
+    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
+    return f"{count} ({seeds_in_words(seeds)})"
+
+
+def sentence(results: StudyResults, test: Verdict) -> Sentence:
+    """Return the verdict on one comparison in words."""
+    head = f"{test.compared.policy}, {test.asked}? {_conditions(test)}."
+    return Sentence(head, " ".join(_parts(results, test)), test.conclusion or "blocked")
+
+
+def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
+    estimate, indicator = test.estimate, test.compared.indicator
+    if estimate is None:
+        yield f"Undefined: {test.problem}."
+        return
+    seeds = f"{estimate.n_seeds} runs a condition, unpaired"
+    if results.plan.paired:
+        seeds = seeds_text(results)
+    if results.plan.specification.until_clear:
+        seeds = f"{estimate.n_seeds} paired seeds"
+    if estimate.identical:
+        yield f"{indicator} = {estimate.value:.3f} exactly, over {seeds}: {UNAFFECTED}."
+        yield "Both conditions gave the same runs, so there is nothing to test."
+        return
+    found = limits(estimate, 3)
+    level = f", {percent(estimate.confidence)} interval {found}" if found else " (no interval)"
+    yield f"{indicator}{mark(test)} = {fixed(estimate.value, 3)}{level} over {seeds}."
+    # One seed gives no p, and Holm's placeholder of 1 says nothing.
+    adjusted_p = None if estimate.p_value is None else test.p_holm
+    yield f"Unadjusted: {said(test.answer(holm=False))}{_p(estimate.p_value)};"
+    yield f"Holm-adjusted: {said(test.answer(holm=True))}{_p(adjusted_p)}."
+    if test.claim:
+        plain, adjusted = (said(test.claim_verdict(holm=holm)) for holm in (False, True))
+        both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
+        yield f'Claim "{test.claim}": {both}.'
+    if test.equivalence is not None:
+        same, holm = said(test.equivalence.verdict), said(test.equivalence_holm)
+        adjusted = "" if same == holm else f" ({holm} under Holm)"
+        change = bracketed(test.equivalence.change, 3)
+        yield f"{test.unchanged}? Change {change}: {same}{adjusted}."
+    if "inconclusive" in (test.answer(holm=False), test.answer(holm=True)):
+        yield from _what_it_takes(test, estimate)
+    if estimate.pairing_correlation is not None:
+        yield f"Pairing correlation {estimate.pairing_correlation:.2f}."
+    if "assumes_normal" in test.flags:
+        yield "The verdict assumes normal differences."
+    if "hidden_stalls" in test.flags:
+        yield (
+            "No verdict, as stalled runs that these seeds did not show could turn it: it needs at "
+            f"least {spi.seeds_against_stalls(estimate)} seeds."
+        )
+    if "skewed" in test.flags:
+        yield "Skewed: at so few seeds the verdict errs more often than its level."
+    if results.plan.specification.until_clear:
+        where = "Open after" if test.stopped_at is None else "Clear at"
+        yield f"{where} {estimate.n_seeds} of at most {results.looks[-1]} seeds."
+    if results.exploratory:
+        yield "Exploratory."
+
+
+def _conditions(test: Verdict) -> str:
+    compared = test.compared
+    before, after = compared.original.setting, compared.changed.setting
+    if after.kind == "size":
+        more = after.value - before.value
+        return f"N = {before.value:g} → {after.value:g} (m = {more:g} more)"
+    if after.kind == "fault":
+        start = f" from {after.onset:g} s" if after.onset else ""
+        return f"Failure mode {after.name}{start}, m = {after.value:g} of N = {compared.n_robots}"
+    if after.kind == "policy":
+        return f"{compared.policy} → {after.name}, N = {compared.n_robots}"
+    return f"{after.name} {before.value:g} → {after.value:g}, N = {compared.n_robots}"
+
+
+def _p(p: float | None) -> str:
+    if p is None:
+        return ""
+    text = p_text(p)
+    return f" (p {text})" if text.startswith("<") else f" (p = {text})"
+
+
+def _what_it_takes(test: Verdict, estimate: Estimate) -> Iterator[str]:
+    if test.detectable is not None:
+        yield (
+            f"{estimate.n_seeds} seeds find an effect {test.detectable:.3f} away from "
+            f"{test.compared.threshold:.3g} with {100 * POWER:.0f} % power, unadjusted."
+        )
+    if test.seeds_needed is not None:
+        least = ""
+        if test.least_power is not None:
+            least = f" ({test.least_power:.0%} power or more in nine pilots of ten)"
+        yield f"The published value {test.published:.3f} needs {test.seeds_needed} seeds{least}."

@@ -1,0 +1,225 @@
+"""Tables of results, claims and agreement with published values, and the warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.comparison import CONFIDENCE
+from swarm_logistics_env.studies.policy_comparison import Agreement, agreements
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
+
+from . import section
+from .section import NOTHING, Section
+
+CellColumn = tuple[str, Callable[[Cell], str]]
+_MOST_MISSES = 8  # more are no list that anybody reads
+_FLAGS = {
+    "single_seed": "One seed gives a value, but no interval and no verdict",
+    "identical": "Both conditions gave the same runs, so the value is exact, but it is no evidence "
+    "and stands outside Holm's family",
+    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
+    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
+    "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
+    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
+    "so it is open",
+    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
+    "the verdict comes from the test",
+    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
+    "ten, or unpaired",
+    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
+    "its level says",
+}
+
+
+def tables(results: StudyResults) -> Iterator[Section]:
+    """Yield the tables of a study's results, policy by policy."""
+    known = {one.policy: one for one in agreements(results)}
+    for policy, cells in grouped(results.cells, lambda cell: cell.policy).items():
+        tests = [test for test in results.verdicts if test.compared.policy == policy]
+        for table, here in grouped(cells, lambda cell: cell.table).items():
+            asked = [test for test in tests if test.compared.table == table]
+            yield from _tables(f"{policy}: {table}", here, asked)
+        claims = [test for test in tests if test.claim]
+        if claims:
+            yield _claims(f"{policy}: claims", claims)
+        if policy in known:
+            yield _agreement(known[policy])
+
+
+def by_factor(cells: Sequence[Cell]) -> list[Cell]:
+    """Return cells of one failure mode (or other factor) together, in order of appearance."""
+    groups = grouped(cells, lambda cell: cell.arm.setting.name)
+    return [cell for here in groups.values() for cell in here]
+
+
+def _tables(title: str, cells: Sequence[Cell], tests: Sequence[Verdict]) -> Iterator[Section]:
+    """Yield a table of P and the first indicator, then one of each further indicator."""
+    published = any(cell.published is not None for cell in cells)
+    rows = by_factor(cells)
+    setting: CellColumn = ("", lambda cell: str(cell.arm.setting))
+    columns = [setting]
+    if published:
+        columns.append(("P paper", _published))
+    columns.append(("P ours [95 %]" if published else "P [95 %]", section.mean_p))
+    columns.append(("one run [95 %]", _one_run))
+    for indicator, asked in grouped(tests, lambda test: test.compared.indicator).items():
+        answers = _answers(indicator, asked, published=published)
+        yield Section.table(title, rows, [*columns, *answers])
+        # P is printed once: the tables of further indicators hold what was asked alone.
+        changed = {test.compared.changed for test in asked}
+        rows = [cell for cell in rows if cell.arm in changed]
+        columns, title = [setting], title.removesuffix(", continued") + ", continued"
+
+
+def _published(cell: Cell) -> str:
+    return NOTHING if cell.published is None else f"{cell.published:g}"
+
+
+def _one_run(cell: Cell) -> str:
+    return section.limits(cell.one_run, section.digits_of(cell.mean.value)) or NOTHING
+
+
+def _answers(indicator: str, tests: Sequence[Verdict], *, published: bool) -> Iterator[CellColumn]:
+    """Yield the columns of one indicator in a table of cells.
+
+    Value with interval, the paper's value, and per property (scalable, superlinear, ...) the
+    verdict, with Holm's in brackets where it differs, beside what the paper claims.
+    """
+
+    def column(
+        heading: str, asked: Sequence[Verdict], text: Callable[[Verdict], str]
+    ) -> CellColumn:
+        by_arm = {test.compared.changed: test for test in asked}
+        return heading, lambda cell: text(by_arm[cell.arm]) if cell.arm in by_arm else NOTHING
+
+    levels = {test.estimate.confidence for test in tests if test.estimate}
+    level = section.percent(levels.pop()) if len(levels) == 1 else section.percent(CONFIDENCE)
+    yield column(f"{indicator} [{level}]", tests, section.ratio)
+    if published:
+        yield column(f"{indicator} paper", tests, lambda test: section.number(test.published))
+    for name, asked in grouped(tests, lambda test: test.asked).items():
+        yield column(name, asked, section.answered)
+        if published:
+            yield column("paper", asked, _claimed)
+
+
+def _claimed(test: Verdict) -> str:
+    return NOTHING if test.claimed is None else "yes" if test.claimed else "no"
+
+
+def _claims(title: str, tests: Sequence[Verdict]) -> Section:
+    plain, adjusted = (
+        section.counted(section.counted_as(test, test.claim_verdict(holm=holm)) for test in tests)
+        for holm in (False, True)
+    )
+    return Section.table(
+        title,
+        tests,
+        [
+            ("indicator", lambda test: f"{test.compared.indicator}, {test.compared.label}"),
+            ("claim", lambda test: str(test.claim)),
+            ("paper", lambda test: section.number(test.published)),
+            ("ours [95 %]", section.ratio),
+            ("claim is", lambda test: section.said(test.claim_verdict(holm=False))),
+            ("under Holm", lambda test: section.said(test.claim_verdict(holm=True))),
+            ("seeds for 80 % power at the paper's value", _seeds_needed),
+        ],
+        f"Unadjusted: {plain}.",
+        f"Under Holm, family = all comparisons of one indicator: {adjusted}.",
+        'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
+        *(f"undefined: {why}." for why in dict.fromkeys(t.no_plan for t in tests) if why),
+    )
+
+
+def _seeds_needed(test: Verdict) -> str:
+    if test.estimate is None or test.published is None:
+        return NOTHING
+    return "undefined" if test.seeds_needed is None else f"{test.seeds_needed}"
+
+
+def _agreement(found: Agreement) -> Section:
+    total = len(found.cells)
+    lines = []
+    if found.misses is None or found.met is None or found.mean_interval_width is None:
+        lines.append("Cells inside the 95 % prediction interval: one seed gives no interval.")
+    else:
+        lines += [
+            (
+                f"Cells whose published P lies inside the 95 % prediction interval of one of our "
+                f"runs: {total - len(found.misses)} of {total}; inside that of our mean: "
+                f"{len(found.met)} of {total}."
+            ),
+            f"Mean width of those intervals: {found.mean_interval_width:.1f} items.",
+            f"Misses: {_misses(found.misses)}.",
+        ]
+    lines.append(f"Mean relative error of our mean P: {found.mean_relative_error:.1%}.")
+    if found.mean_log_error is not None:
+        lines.append(f"Mean |log error| of our mean P: {found.mean_log_error:.3f}.")
+    pairs = [f"{a.arm.setting} and {b.arm.setting}" for a, b in found.disorder]
+    lines.append(
+        f"Swarm sizes up to {found.largest_ordered} in the opposite order to the published one, "
+        f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
+    )
+    return Section(f"{found.policy}: agreement with the published values", lines=tuple(lines))
+
+
+def _misses(cells: Sequence[Cell]) -> str:
+    told = [
+        f"{cell.arm.setting} ({_published(cell)} published, "
+        f"{section.bracketed(Interval(*cell.one_run), 1)} ours)"
+        for cell in cells[:_MOST_MISSES]
+    ]
+    if len(cells) > _MOST_MISSES:
+        told.append(f"and {len(cells) - _MOST_MISSES} more, in cells.csv")
+    return ", ".join(told) or "none"
+
+
+def warnings(results: StudyResults) -> Iterator[str]:
+    """Yield what a reader has to know before any verdict, one sentence each."""
+    if any(cell.saturated for cell in results.cells):
+        yield (
+            f"{section.SATURATED} marks a P that is capped, because every item was delivered in at "
+            "least one run, and the indicators that rest on it. A verdict that a larger P could "
+            "turn is open."
+        )
+    stalls = [cell for cell in results.cells if cell.stalled > 0.0]
+    if stalls:
+        told = (f"{c.policy}, {c.arm.setting} ({c.stalled:.0%} of {c.n_seeds})" for c in stalls)
+        yield (
+            "Runs stalled: they have less than a quarter of the median P of their condition: "
+            f"{'; '.join(dict.fromkeys(told))}."
+        )
+    if results.exploratory:
+        yield (
+            "The verdicts are exploratory: they are over other seeds than the study declared "
+            "before its first run, so they err more often than their level."
+        )
+    if results.late_margin:
+        yield (
+            "The verdicts on the margin of equivalence are exploratory: another margin was "
+            "declared before the first run."
+        )
+    for cell in results.cells:
+        if cell.problem:
+            yield f"{cell.policy}, {cell.table}, {cell.arm.setting} is incomplete: {cell.problem}."
+    for test in results.verdicts:
+        if test.problem:
+            compared = test.compared
+            what = f"{compared.policy}, {compared.indicator}, {compared.label}"
+            yield f"{what} is undefined: {test.problem}."
+    for flag, meaning in _FLAGS.items():
+        families = "; ".join(_families(results.verdicts, flag))
+        if families:
+            yield f"{meaning}: {families}."
+
+
+def _families(tests: Sequence[Verdict], flag: str) -> Iterator[str]:
+    """Name the comparisons with a flag, those of one policy and indicator together."""
+    for (policy, indicator), family in grouped(tests, lambda test: test.compared.family).items():
+        whole = {test.compared.label for test in family}
+        labels = list(dict.fromkeys(t.compared.label for t in family if flag in t.flags))
+        which = f"all {len(whole)}" if len(labels) == len(whole) > 1 else "; ".join(labels)
+        if labels:
+            yield f"{policy}: {indicator} ({which})"
