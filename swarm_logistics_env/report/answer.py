@@ -88,7 +88,7 @@ class Line:
     @property
     def contradicts(self) -> bool:
         """Whether a verdict contradicts what the study's reference claims."""
-        return any(test.claim_verdict(holm=True) == "refuted" for test in self.tests)
+        return any(test.claim_verdict_holm == "refuted" for test in self.tests)
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ def _last(results: StudyResults) -> str:
         parts.append("exploratory: other seeds than were declared")
     if any(test.saturated for test in results.verdicts):
         parts.append(f"{section.SATURATED} P is capped, as every item was delivered")
-    claims = [said(test.claim_verdict(holm=True)) for test in results.verdicts if test.claim]
+    claims = [said(test.claim_verdict_holm) for test in results.verdicts if test.claim]
     if claims:
         parts.append(f"of {len(claims)} claims {section.counted(claims)}")
     return f"{'; '.join(parts)}."

@@ -15,7 +15,7 @@ from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
 from .fault_sections import fault_sections, look_section
-from .figures import forest_figure, indicator_figures, size_figures
+from .figures import forest_figure, indicator_figures
 from .policies_compared import policy_sections
 from .section import NOTHING, Figure, Section, sentence
 from .tables import tables, warnings
@@ -75,7 +75,7 @@ def document(results: StudyResults) -> Document:
         *([Section("Warnings", lines=lines)] if lines else []),
         *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
-    figures = forest_figure(results, found), *indicator_figures(results), *size_figures(results)
+    figures = forest_figure(results, found), *indicator_figures(results)
     looks = (look_section(results),) if plan.specification.until_clear else ()
     chapters = [
         Chapter("Warnings", "", (Section("", lines=lines),) if lines else ()),

@@ -228,20 +228,6 @@ def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
     axes.set(ylim=(len(rows) - 0.4, -0.6), xlim=within, xlabel="indicator")
 
 
-def sizes(canvas: Canvas, points: Sequence[tuple[float, Point]]) -> None:
-    """Draw P against swarm size N."""
-    axes = canvas.subplots()
-    highest = max(point.high or point.value or 0.0 for _, point in points)
-    for n, point in points:
-        _bar(axes, n, point, (0.0, math.inf), COLOURS[0])
-        axes.plot(n, point.value or 0.0, MARKERS[0], color=COLOURS[0], markersize=5, zorder=3)
-        if point.saturated:
-            place = n, point.value or 0.0
-            axes.annotate("†", place, (5, 2), textcoords="offset points", fontsize=8)
-    axes.set(xlim=(0.0, 1.1 * max(n for n, _ in points)), ylim=(0.0, max(1.08 * highest, 1.0)))
-    axes.set(xlabel="swarm size N [robots]", ylabel="performance P")
-
-
 def rates(
     canvas: Canvas, panels: Mapping[str, Sequence[RateCurve]], onset: float, y_label: str
 ) -> None:

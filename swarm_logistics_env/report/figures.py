@@ -1,4 +1,4 @@
-"""Figures of the indicators and of P against N: what each shows, as a table and as a drawing."""
+"""Figures of the indicators: what each shows, as a table and as a drawing."""
 
 from __future__ import annotations
 
@@ -6,13 +6,9 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
+from swarm_logistics_env.studies.columns import frame_of_verdicts
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import (
-    Verdict,
-    frame_of_cells,
-    frame_of_verdicts,
-    grouped,
-)
+from swarm_logistics_env.studies.verdict import Verdict, grouped
 
 from . import drawing
 from .answer import Answer
@@ -150,7 +146,7 @@ def _point(
         low,
         high,
         published,
-        decided=test.verdict(holm=True) in DECIDED,
+        decided=test.holm in DECIDED,
         saturated=test.saturated,
     )
 
@@ -171,25 +167,6 @@ def _interval_figure(
         0.5 + 2.5 * len(panels),
         partial(drawing.intervals, panels=panels),
     )
-
-
-def size_figures(results: StudyResults) -> Iterator[Figure]:
-    """Yield P against swarm size N, a figure for every policy and table of sizes."""
-    sized = [c for c in results.cells if c.arm.setting.kind == "size" and c.n_seeds]
-    for (policy, table), cells in grouped(sized, lambda c: (c.policy, c.table)).items():
-        cells = sorted(cells, key=lambda cell: cell.arm.setting.value)
-        points = [
-            (c.arm.setting.value, Point("", 0, "", *c.mean, saturated=c.saturated)) for c in cells
-        ]
-        capped = _CAPPED if any(cell.saturated for cell in cells) else ""
-        yield Figure(
-            slug("P-N", policy, table),
-            f"{policy}, {table}: P against swarm size N (mean of {seeds_text(results)}, bars: "
-            f"95 % t-intervals).{capped}",
-            frame_of_cells(cells)[["value", "mean", "low", "high"]],
-            3.6,
-            partial(drawing.sizes, points=points),
-        )
 
 
 _CAPPED = " †: P is capped, every item was delivered in a run."

@@ -126,8 +126,7 @@ let chosen = { question: null, arms: [], seed: 0 };
 
 function choose(question, seed) {
   const asked = data.questions[question];
-  const film = data.replays.find((one) => one.conditions[0] === asked.arms[1][2]);
-  chosen = { question, arms: asked.arms, seed: seed ?? Math.max(0, data.seeds.indexOf(film && film.seed)) };
+  chosen = { question, arms: asked.arms, seed: seed ?? 0 };
   at("question").querySelector("h2").textContent = asked.head;
   at("question").querySelector("p").textContent = asked.text;
   showQuestion();
@@ -215,99 +214,7 @@ function showRun() {
     const shown = command ? `<code>${escaped(command)} --seed ${seed}</code>` : "";
     return `${escaped(symbol)}, ${escaped(name)}: P = ${p[chosen.seed] ?? "no run"}${shown}`;
   });
-  const found = data.replays.findIndex((one) => one.seed === seed && chosen.arms.some((arm) => arm[2] === one.conditions[0]));
-  const watch = found < 0 ? "" : `<button type="button" data-replay="${found}">Watch this run here</button>`;
-  place.innerHTML = `<b>${data.paired ? "Seed" : "Run"} ${seed}</b> ${watch}<br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
-}
-
-// Replays: a run beside its twin, from positions kept as changes
-
-let film = null, playing = false, moment = 0, last = 0;
-
-async function unpacked(text, series, frames) {
-  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const values = new Int16Array(await new Response(stream).arrayBuffer());
-  for (let i = 0; i < series; i++) {
-    for (let k = 1; k < frames; k++) values[i * frames + k] += values[i * frames + k - 1];
-  }
-  return values;
-}
-
-async function load(number) {
-  const asked = data.replays[number];
-  playing = false;
-  const runs = await Promise.all(asked.runs.map(async (run) => {
-    const loaded = { ...run, times: timesOf(run.times) };
-    for (const name of ["robots", "items", "carrying", "failed"]) {
-      loaded[name] = await unpacked(run[name], run.count[name], run.frames);
-    }
-    return loaded;
-  }));
-  film = { ...asked, runs, end: Math.max(...runs.map((run) => (run.frames - 1) * run.period)) };
-  moment = film.end / 5;
-  at("moment").max = film.end;
-  at("replay").querySelectorAll("canvas").forEach((canvas, i) => {
-    const ratio = Math.min(1.2, film.runs[i].height / film.runs[i].width);
-    canvas.width = 720;
-    canvas.height = Math.round(720 * ratio);
-  });
-  paint();
-}
-
-function paint() {
-  at("moment").value = moment;
-  at("clock").textContent = `${Math.round(moment)} s`;
-  at("play").textContent = playing ? "Pause" : "Play";
-  const ink = getComputedStyle(document.documentElement);
-  const of = (name) => ink.getPropertyValue(name).trim();
-  at("replay").querySelectorAll(".pair > div").forEach((half, i) => {
-    const run = film.runs[i], canvas = half.querySelector("canvas"), pen = canvas.getContext("2d");
-    const count = run.times.filter((time) => time <= moment).length;
-    half.querySelector("h3").textContent = `${run.name}: ${count} delivered`;
-    const scale = Math.min(canvas.width / run.width, canvas.height / run.height);
-    const place = Math.min(moment / run.period, run.frames - 1), k = Math.floor(place), part = place - k;
-    pen.clearRect(0, 0, canvas.width, canvas.height);
-    pen.fillStyle = of("--line");
-    pen.fillRect(run.delivery * scale, 0, (run.width - run.delivery) * scale, run.height * scale);
-    const each = (values, paintOne) => {
-      for (let one = 0; one * 2 * run.frames < values.length; one++) {
-        const spot = [0, 1].map((axis) => {
-          const from = (2 * one + axis) * run.frames + k, next = Math.min(from + 1, (2 * one + axis + 1) * run.frames - 1);
-          // Between two frames a robot moves; what comes or goes does not.
-          return values[from] < 0 || values[next] < 0 ? values[from] : values[from] * (1 - part) + values[next] * part;
-        });
-        if (spot[0] >= 0) paintOne(one, (spot[0] / run.scale) * scale, (run.height - spot[1] / run.scale) * scale);
-      }
-    };
-    pen.fillStyle = of("--soft");
-    const side = run.item * scale * 1.4;
-    each(run.items, (_, x, y) => pen.fillRect(x - side / 2, y - side / 2, side, side));
-    each(run.robots, (robot, x, y) => {
-      const place = robot * run.frames + k;
-      pen.fillStyle = of(run.failed[place] ? "--refuted" : run.carrying[place] ? "--p4" : "--p0");
-      pen.beginPath();
-      pen.arc(x, y, run.robot * scale, 0, 7);
-      pen.fill();
-    });
-  });
-}
-
-function tick(now) {
-  if (!playing) return;
-  moment = Math.min(film.end, moment + (Math.min(100, now - last) / 1000) * Number(at("speed").value));
-  last = now;
-  if (moment >= film.end) playing = false;
-  paint();
-  requestAnimationFrame(tick);
-}
-
-function play() {
-  if (moment >= film.end) moment = 0;
-  playing = !playing;
-  last = performance.now();
-  requestAnimationFrame(tick);
-  paint();
+  place.innerHTML = `<b>${data.paired ? "Seed" : "Run"} ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
 }
 
 // Tables sort by the first number of a cell, or by its text
@@ -327,15 +234,11 @@ function sort(head) {
 }
 
 document.addEventListener("click", (event) => {
-  const one = event.target.closest("[data-question], [data-condition], [data-seed], [data-replay], .sortable thead th");
+  const one = event.target.closest("[data-question], [data-condition], [data-seed], .sortable thead th");
   if (!one) return;
-  const { question, condition, seed, replay } = one.dataset;
+  const { question, condition, seed } = one.dataset;
   if (one.matches("th")) sort(one);
-  else if (replay !== undefined) {
-    at("replays").value = replay;
-    load(Number(replay)).then(play);
-    at("replay").scrollIntoView({ block: "nearest" });
-  } else if (question !== undefined || condition !== undefined) {
+  else if (question !== undefined || condition !== undefined) {
     if (question !== undefined) choose(Number(question), seed && Number(seed));
     else chooseCondition(Number(condition), seed && Number(seed));
     at("question").scrollIntoView({ block: "nearest" });
@@ -354,22 +257,12 @@ options(at("views"), data.views.map((view) => view.name));
 at("views").addEventListener("change", drawComparison);
 drawComparison();
 choose(data.first);
-if (data.replays.length && window.DecompressionStream) {
-  options(at("replays"), data.replays.map((one) => `${one.name}, seed ${one.seed}`));
-  at("replay").hidden = false;
-  at("replays").addEventListener("change", (event) => load(Number(event.target.value)));
-  at("play").addEventListener("click", play);
-  at("moment").addEventListener("input", (event) => { moment = Number(event.target.value); paint(); });
-  load(0);
-}
 function draw() {
   drawComparison();
   showQuestion();
-  if (film) paint();
 }
 let width = innerWidth;
 addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; draw(); } });
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => film && paint());
 // On paper nothing can be unfolded: the warnings belong to the answer.
 addEventListener("beforeprint", () => { for (const one of document.querySelectorAll(".warnings")) one.open = true; });
 // A link to a folded chapter unfolds it.

@@ -1,11 +1,9 @@
-"""What the script of the HTML page draws: points, seeds, delivery curves, runs and replays."""
+"""What the script of the HTML page draws: points, seeds, delivery curves and runs."""
 
 from __future__ import annotations
 
-import base64
 import json
 import shlex
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -15,14 +13,12 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.fault_text import text_of
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparison import Arm, Comparison
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT
-from swarm_logistics_env.tasks.warehouse_task import Recording, record_run
 from swarm_logistics_env.warehouse import Fault
 
 from .answer import Answer
@@ -30,9 +26,7 @@ from .section import sentence
 from .tables import by_factor
 
 Json: TypeAlias = dict[str, JsonValue]
-_MOST_REPLAYS = 3
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
-_STEPS_A_METRE = 50  # of positions in a replay
 
 
 @dataclass(frozen=True)
@@ -89,7 +83,6 @@ def page_data(results: StudyResults) -> dict[str, JsonValue]:
         "questions": [_question(results, test, places) for test in results.verdicts],
         "views": [*_performance_views(results, places), *_indicator_views(results)],
         "first": _first(results.verdicts),
-        "replays": list(_replays(results, places)),
     }
 
 
@@ -158,7 +151,7 @@ def _first(tests: Sequence[Verdict]) -> int:
     refuted = {
         number: test.value
         for number, test in enumerate(tests)
-        if test.answer(holm=True) == "refuted" and test.value is not None
+        if test.answer_holm == "refuted" and test.value is not None
     }
     return min(refuted, key=lambda number: refuted[number], default=0)
 
@@ -264,98 +257,3 @@ def _limits(found: Interval) -> Json:
 def _number(value: float | None) -> float | None:
     """Return a number as JSON holds it: infinite limits become very large, missing ones null."""
     return None if value is None else float(np.clip(round(value, 4), -1e9, 1e9))
-
-
-def _replays(results: StudyResults, places: dict[str, int]) -> Iterator[Json]:
-    """Yield the most telling runs beside their twins, as far as they can be played again."""
-    taken: set[str] = set()
-    recorded: dict[tuple[str, int], Json | None] = {}
-    for test in _telling(results.verdicts):
-        original, changed = test.compared.original, test.compared.changed
-        if changed.case.key in taken or len(taken) == _MOST_REPLAYS:
-            continue
-        seed = _typical_seed(results, original, changed)
-        pair: list[JsonValue] = []
-        for arm in (changed, original):
-            if (key := (arm.case.key, seed)) not in recorded:
-                recorded[key] = _recorded(results, arm, seed)
-            pair.append(recorded[key])
-        if all(pair):
-            taken.add(changed.case.key)
-            yield {
-                "name": f"{test.compared.policy}, {changed.setting}",
-                "seed": int(seed),
-                "runs": pair,
-                "conditions": [places[arm.case.key] for arm in (changed, original)],
-            }
-
-
-def _telling(tests: Sequence[Verdict]) -> Iterator[Verdict]:
-    """Yield the faults that harm most and, of several policies, where they differ most."""
-    known = [t for t in tests if t.compared.changed.setting.kind == "fault" and t.estimate]
-    faults = [test for test in known if test.compared.indicator == known[-1].compared.indicator]
-    by_value = sorted(faults, key=lambda test: test.value or 0.0)
-    alike = grouped(by_value, lambda test: (test.compared.table, test.compared.label)).values()
-    apart = max(alike, key=lambda t: (t[-1].value or 0.0) - (t[0].value or 0.0), default=[])
-    if len(apart) > 1:
-        yield from (apart[0], apart[-1])
-    yield from by_value
-
-
-def _typical_seed(results: StudyResults, original: Arm, changed: Arm) -> int:
-    """Return the seed at which the change of P is the median one."""
-    seeds = list(results.plan.seeds)
-    changes = []
-    for seed in seeds:
-        before, after = (results.outcome(arm, seed) for arm in (original, changed))
-        changes.append(after.delivered - before.delivered if before and after else -np.inf)
-    return seeds[int(np.argsort(changes, kind="stable")[len(seeds) // 2])]
-
-
-def _recorded(results: StudyResults, arm: Arm, seed: int) -> Json | None:
-    """Return a stored run, played again; None: it is not the same any more, or cannot be played."""
-    case, outcome = arm.case, results.outcome(arm, seed)
-    if case.task.name != DEFAULT or outcome is None or outcome.digest is None:
-        return None
-    # A store's text must run no code.
-    if results.plan.code != case.task.code() or case.policy.runs_code:
-        return None
-    try:
-        found = record_run(case.run(results.plan.code, seed))
-    except SwarmLogisticsError:  # the policy's file is gone, say
-        return None
-    if found.digest != outcome.digest:
-        return None
-    return {"name": str(arm.setting), "times": _steps(outcome.delivery_times), **_packed(found)}
-
-
-def _packed(found: Recording) -> Json:
-    """Return a recording as text: positions in steps, each as the change since the frame before."""
-    scenario = found.scenario
-    return {
-        "width": scenario.warehouse_width,
-        "height": scenario.warehouse_height,
-        "delivery": scenario.storage_width,
-        "robot": scenario.robot_radius,
-        "item": scenario.item_radius,
-        "scale": _STEPS_A_METRE,
-        "period": found.period,
-        "frames": len(found.robots),
-        # Series of each: two coordinates of every robot and item, one mark of every robot.
-        "count": {
-            "robots": 2 * found.robots.shape[1],
-            "items": 2 * found.items.shape[1],
-            "carrying": found.robots.shape[1],
-            "failed": found.robots.shape[1],
-        },
-        "robots": _text(np.rint(found.robots * _STEPS_A_METRE)),
-        "items": _text(np.rint(found.items * _STEPS_A_METRE)),
-        "carrying": _text(found.carrying),
-        "failed": _text(found.failed),
-    }
-
-
-def _text(frames: NDArray[np.float64] | NDArray[np.bool_]) -> str:
-    series = frames.reshape(len(frames), -1).T.astype("<i2")
-    changes = np.diff(series, axis=1, prepend=np.int16(0)).astype("<i2")
-    return base64.b64encode(zlib.compress(changes.tobytes(), 9)).decode("ascii")

@@ -1,11 +1,10 @@
-"""Sections and figures that set policies side by side; only for studies of several."""
+"""Sections that set policies side by side; only for studies of several."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.policy_comparison import (
     CellAgainstBaseline,
     IndicatorAgainstBaseline,
@@ -15,9 +14,8 @@ from swarm_logistics_env.studies.policy_comparison import (
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
 
-from . import drawing, section
-from .drawing import Panel, Point
-from .section import Figure, Section, slug
+from . import section
+from .section import Section
 
 _HOW_TO_READ = (
     (
@@ -31,7 +29,6 @@ _HOW_TO_READ = (
         "seeds with more deliveries, ties counting half (Wilson)."
     ),
 )
-_DATA = ["of", "policy", "less", "cell", "difference", "low", "high"]
 
 
 def policy_sections(results: StudyResults) -> Iterator[Section]:
@@ -41,12 +38,9 @@ def policy_sections(results: StudyResults) -> Iterator[Section]:
     yield Section("", lines=(*_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
     questions = list(indicators_against_baseline(results))
     by_table = grouped(questions, lambda one: one.test.compared.table)
-    cells_by_table = cells_against_baseline(results)
-    for table, cells in cells_by_table.items():
-        yield from _difference_figure(results, table, cells, by_table.get(table, []))
     for table, here in by_table.items():
         yield _indicators(table, here, results.policies)
-    for table, cells in cells_by_table.items():
+    for table, cells in cells_against_baseline(results).items():
         yield _cells(table, cells, results.policies[0])
 
 
@@ -87,93 +81,3 @@ def _cells(table: str, cells: Sequence[CellAgainstBaseline], baseline: str) -> S
             ),
         ],
     )
-
-
-def _difference_figure(
-    results: StudyResults,
-    table: str,
-    cells: Sequence[CellAgainstBaseline],
-    questions: Sequence[IndicatorAgainstBaseline],
-) -> Iterator[Section]:
-    """Yield the differences of P in one table, then those of every indicator."""
-    import pandas as pd
-
-    policies = results.policies
-    baseline, *others = policies
-    points = grouped(_differences(policies, cells, questions), lambda one: one[0])
-    if not points:
-        return
-    setting = cells[0].cell.arm.setting
-    panels = [
-        Panel(
-            "",
-            f"difference of {what}",
-            tuple(point for _, point in here),
-            (0.0,),
-            _x_label(setting, stepwise=what != "P"),
-        )
-        for what, here in points.items()
-    ]
-    rows = [
-        (what, p.series, baseline, p.category, p.value, p.low, p.high)
-        for what, here in points.items()
-        for _, p in here
-    ]
-    figure = Figure(
-        slug("differences", table),
-        f"{section.listed(others)} less {baseline}, {table}: differences of P and of the "
-        f"indicators, paired by seed. {section.seeds_text(results).capitalize()}. Bars: 95 % "
-        "intervals (t for P, jackknife for indicators), unadjusted; filled: the interval is clear "
-        "of 0.",
-        pd.DataFrame(rows, columns=_DATA).astype({"low": float, "high": float}),
-        0.5 + 2.5 * len(panels),
-        partial(drawing.intervals, panels=panels),
-    )
-    yield Section("", figures=(figure,))
-
-
-def _differences(
-    policies: Sequence[str],
-    cells: Sequence[CellAgainstBaseline],
-    questions: Sequence[IndicatorAgainstBaseline],
-) -> Iterator[tuple[str, Point]]:
-    """Yield what differs, and the difference as a point."""
-    found = [
-        ("P", one.cell.policy, _category(one.cell.arm.setting), one.difference)
-        # One failure mode after the other, as in the tables.
-        for here in grouped(cells, lambda one: one.cell.arm.setting.name).values()
-        for one in here
-    ]
-    for question in questions:
-        compared = question.test.compared
-        before, after = compared.original.setting, compared.changed.setting
-        # An indicator that is asked against two thresholds has one value.
-        if compared.threshold == 0.0:
-            category = f"{before.value:g}→{after.value:g}"
-            if after.kind == "fault":
-                category = _category(after)
-            for policy, difference in question.differences.items():
-                found.append((compared.indicator, policy, category, difference))
-    for what, policy, category, difference in found:
-        if difference is not None:
-            value, low, high = difference
-            clear = low is not None and high is not None and (low > 0.0 or high < 0.0)
-            # The baseline has the first style in every other figure.
-            style = policies.index(policy)
-            yield what, Point(policy, style, category, value, low, high, decided=clear)
-
-
-def _category(setting: Setting) -> str:
-    if setting.kind != "fault":
-        return f"{setting.value:g}"
-    if not setting.value:
-        return str(setting).replace("no fault, other behaviour seeds", "other seeds")
-    return f"{setting.name} {setting.value:g}" + (f" {setting.onset:g} s" if setting.onset else "")
-
-
-def _x_label(setting: Setting, *, stepwise: bool) -> str:
-    if setting.kind == "fault":
-        return "failure mode and m"
-    if setting.kind == "size":
-        return "swarm size N → N + m" if stepwise else "swarm size N"
-    return f"{setting.name}, x_o → x_new" if stepwise else setting.name

@@ -165,7 +165,7 @@ def said(verdict: str | None) -> str:
 
 def answered(test: Verdict) -> str:
     """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
-    plain, adjusted = said(test.answer(holm=False)), said(test.answer(holm=True))
+    plain, adjusted = said(test.answer), said(test.answer_holm)
     return plain if plain in (adjusted, "undefined") else f"{plain} ({adjusted})"
 
 
@@ -227,10 +227,10 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
     yield f"{indicator}{mark(test)} = {fixed(estimate.value, 3)}{level} over {seeds}."
     # One seed gives no p, and Holm's placeholder of 1 says nothing.
     adjusted_p = None if estimate.p_value is None else test.p_holm
-    yield f"Unadjusted: {said(test.answer(holm=False))}{_p(estimate.p_value)};"
-    yield f"Holm-adjusted: {said(test.answer(holm=True))}{_p(adjusted_p)}."
+    yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"
+    yield f"Holm-adjusted: {said(test.answer_holm)}{_p(adjusted_p)}."
     if test.claim:
-        plain, adjusted = (said(test.claim_verdict(holm=holm)) for holm in (False, True))
+        plain, adjusted = map(said, (test.claim_verdict, test.claim_verdict_holm))
         both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
         yield f'Claim "{test.claim}": {both}.'
     if test.equivalence is not None:
@@ -238,7 +238,7 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         adjusted = "" if same == holm else f" ({holm} under Holm)"
         change = bracketed(test.equivalence.change, 3)
         yield f"{test.unchanged}? Change {change}: {same}{adjusted}."
-    if "inconclusive" in (test.answer(holm=False), test.answer(holm=True)):
+    if "inconclusive" in (test.answer, test.answer_holm):
         yield from _what_it_takes(test, estimate)
     if estimate.pairing_correlation is not None:
         yield f"Pairing correlation {estimate.pairing_correlation:.2f}."

@@ -111,8 +111,11 @@ def _claimed(test: Verdict) -> str:
 
 def _claims(title: str, tests: Sequence[Verdict]) -> Section:
     plain, adjusted = (
-        section.counted(section.counted_as(test, test.claim_verdict(holm=holm)) for test in tests)
-        for holm in (False, True)
+        section.counted(section.counted_as(test, verdict) for test, verdict in zip(tests, verdicts))
+        for verdicts in (
+            [test.claim_verdict for test in tests],
+            [test.claim_verdict_holm for test in tests],
+        )
     )
     return Section.table(
         title,
@@ -122,8 +125,8 @@ def _claims(title: str, tests: Sequence[Verdict]) -> Section:
             ("claim", lambda test: str(test.claim)),
             ("paper", lambda test: section.number(test.published)),
             ("ours [95 %]", section.ratio),
-            ("claim is", lambda test: section.said(test.claim_verdict(holm=False))),
-            ("under Holm", lambda test: section.said(test.claim_verdict(holm=True))),
+            ("claim is", lambda test: section.said(test.claim_verdict)),
+            ("under Holm", lambda test: section.said(test.claim_verdict_holm)),
             ("seeds for 80 % power at the paper's value", _seeds_needed),
         ],
         f"Unadjusted: {plain}.",

@@ -12,6 +12,7 @@ from weakref import finalize
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.tasks.task import Run, Task
 
+from .columns import frame_of_cells, frame_of_verdicts
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
 from .plan import Plan, make_plan
@@ -21,7 +22,6 @@ from .results import StudyResults, judge
 from .runs import FILE_NAME, Runs
 from .specification import Specification, read_study_file
 from .until_clear import standing
-from .verdict import frame_of_cells, frame_of_verdicts
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,7 @@ from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
 
-from .comparison import CONFIDENCE, Arm, Comparison, Reference
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .comparison import CONFIDENCE, Arm, Comparison, Reference, Setting
 
 POWER = 0.8
 UNAFFECTED = "unaffected"
@@ -126,47 +123,17 @@ class Cell:
         return spi.share_stalled(self.by_seed) if self.n_seeds else 0.0
 
     @property
+    def words(self) -> str:
+        """The condition in words, e.g. "N = 10"."""
+        return str(self.arm.setting)
+
+    @property
     def published_inside(self) -> bool | None:
         """Whether the published P lies in the interval of one run; None: unknown."""
         _, low, high = self.one_run
         if self.published is None or low is None or high is None:
             return None
         return low <= self.published <= high
-
-
-Columns = Mapping[str, tuple[type, str]]  # name to type and meaning
-# Columns of cells.csv: type, meaning, and the value of a cell; a number that is missing is NaN.
-_CELL: dict[str, tuple[type, str, Callable[[Cell], object]]] = {
-    "policy": (str, "label of the policy", lambda c: c.policy),
-    "table": (str, "heading of the report's table", lambda c: c.table),
-    "cell": (str, "the condition in words, e.g. N = 10", lambda c: str(c.arm.setting)),
-    "kind": (str, "what is varied: size, fault, parameter or policy", lambda c: c.arm.setting.kind),
-    "factor": (str, "its name: n_robots, a failure mode, a parameter, or a policy",
-               lambda c: c.arm.setting.name),
-    "value": (float, "swarm size N, faulty robots m, or the parameter's value in its unit",
-              lambda c: c.arm.setting.value),
-    "onset": (float, "when the fault begins [s]", lambda c: c.arm.setting.onset),
-    "n_robots": (int, "swarm size N", lambda c: c.arm.case.scenario.n_robots),
-    "published": (float, "P of the reference", lambda c: c.published),
-    "counted": (bool, "whether it is one of the cells of the reference's tables",
-                lambda c: c.counted),
-    "n_seeds": (int, "number of runs that succeeded", lambda c: c.n_seeds),
-    "mean": (float, "mean P, in the unit of the task: items in the warehouse",
-             lambda c: c.mean.value),
-    "low": (float, "lower limit of the 95 % interval of the mean; missing at one seed",
-            lambda c: c.mean.low),
-    "high": (float, "upper limit of it", lambda c: c.mean.high),
-    "prediction_low": (float, "lower limit of the 95 % interval of one further run",
-                       lambda c: c.one_run.low),
-    "prediction_high": (float, "upper limit of it", lambda c: c.one_run.high),
-    "published_inside": (bool, "whether that interval holds the published P; missing: unknown",
-                         lambda c: c.published_inside),
-    "saturated": (bool, "whether a run delivered every item, so that P is capped",
-                  lambda c: c.saturated),
-    "stalled": (float, "share of runs with less than a quarter of the cell's median P",
-                lambda c: c.stalled),
-    "problem": (str, "why runs are missing; missing: they are complete", lambda c: c.problem),
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,24 +190,52 @@ class Verdict:
         definition, below = self.compared.definition, self.claimed is False
         return definition.property_name(self.compared.threshold, claimed_below=below)
 
-    def verdict(self, *, holm: bool) -> str | None:
-        """Return whether it lies above the threshold; "unaffected": equal runs, no evidence."""
+    @property
+    def after(self) -> Setting:
+        """The setting of the changed condition."""
+        return self.compared.changed.setting
+
+    @property
+    def marks(self) -> str:
+        """The flags with blanks between."""
+        return " ".join(self.flags)
+
+    @property
+    def plain(self) -> str | None:
+        """Whether it lies above the threshold; "unaffected": equal runs, no evidence."""
         if self.estimate is None:
             return None
-        if self.estimate.identical:
-            return UNAFFECTED
-        return self.verdict_holm if holm else self.estimate.verdict
+        return UNAFFECTED if self.estimate.identical else self.estimate.verdict
 
-    def claim_verdict(self, *, holm: bool) -> str | None:
-        """Return the verdict on the claim; None: nothing is claimed."""
-        found = self.verdict(holm=holm)
+    @property
+    def holm(self) -> str | None:
+        """The same after Holm."""
+        return UNAFFECTED if self.plain == UNAFFECTED else self.verdict_holm
+
+    @property
+    def claim_verdict(self) -> str | None:
+        """The verdict on the claim; None: nothing is claimed."""
+        return self._on_claim(self.plain)
+
+    @property
+    def claim_verdict_holm(self) -> str | None:
+        """The same after Holm."""
+        return self._on_claim(self.holm)
+
+    @property
+    def answer(self) -> str | None:
+        """The verdict on the property."""
+        return self.claim_verdict if self._asks_for_fall else self.plain
+
+    @property
+    def answer_holm(self) -> str | None:
+        """The same after Holm."""
+        return self.claim_verdict_holm if self._asks_for_fall else self.holm
+
+    def _on_claim(self, found: str | None) -> str | None:
         if self.claimed is False:
             return {"supported": "refuted", "refuted": "supported"}.get(found or "", found)
         return None if self.claimed is None else found
-
-    def answer(self, *, holm: bool) -> str | None:
-        """Return the verdict on the property."""
-        return self.claim_verdict(holm=holm) if self._asks_for_fall else self.verdict(holm=holm)
 
     @property
     def _asks_for_fall(self) -> bool:
@@ -257,9 +252,9 @@ class Verdict:
     @property
     def conclusion(self) -> str | None:
         """The answer under Holm, but "equivalent" if that is inconclusive and P unchanged."""
-        found = self.answer(holm=True)
         unchanged = self.equivalence_holm == "equivalent"
-        return "equivalent" if found == "inconclusive" and unchanged else found
+        is_open = self.answer_holm == "inconclusive"
+        return "equivalent" if is_open and unchanged else self.answer_holm
 
     @property
     def unchanged(self) -> str | None:
@@ -291,106 +286,6 @@ class Verdict:
     def detectable(self) -> float | None:
         """Distance from the threshold that these seeds find with 80 % power."""
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
-
-
-_VERDICT: dict[str, tuple[type, str, Callable[[Verdict], object]]] = {
-    "policy": (str, "label of the policy", lambda v: v.compared.policy),
-    "table": (str, "heading of the report's table", lambda v: v.compared.table),
-    "indicator": (str, "its symbol, e.g. FT", lambda v: v.compared.indicator),
-    "comparison": (str, "the step in words, e.g. N 5 -> 10", lambda v: v.compared.label),
-    "kind": (str, "what differs between the conditions: size, fault, parameter or policy",
-             lambda v: v.compared.changed.setting.kind),
-    "factor": (str, "its name: n_robots, a failure mode, a parameter, or a policy",
-               lambda v: v.compared.changed.setting.name),
-    "before": (float, "its value in the original condition", lambda v:
-               v.compared.original.setting.value),
-    "after": (float, "its value in the changed condition", lambda v:
-              v.compared.changed.setting.value),
-    "onset": (float, "when the fault begins [s]", lambda v: v.compared.changed.setting.onset),
-    "n_robots": (int, "swarm size N of the original condition", lambda v: v.compared.n_robots),
-    "threshold": (float, "what the indicator is tested against", lambda v: v.compared.threshold),
-    "value": (float, "the estimate; missing: blocked", lambda v: v.value),
-    "low": (float, "lower limit of its interval", lambda v: v.estimate and v.estimate.low),
-    "high": (float, "upper limit of its interval", lambda v: v.estimate and v.estimate.high),
-    "confidence": (float, "confidence level of the interval and the verdict",
-                   lambda v: v.estimate and v.estimate.confidence),
-    "probability": (float, "confidence that the indicator lies above the threshold, in [0, 1]",
-                    lambda v: v.estimate and v.estimate.probability),
-    "p_value": (float, "two-sided p, unadjusted", lambda v: v.estimate and v.estimate.p_value),
-    "p_holm": (float, "p adjusted after Holm within the family; missing: blocked or unaffected",
-               lambda v: v.p_holm),
-    "verdict": (str, "whether it lies above the threshold; unaffected: equal runs, no evidence",
-                lambda v: v.verdict(holm=False)),
-    "verdict_holm": (str, "the same after Holm", lambda v: v.verdict(holm=True)),
-    "n_seeds": (float, "number of seeds; missing: blocked", lambda v:
-                v.estimate and v.estimate.n_seeds),
-    "stopped_at": (float, "number of seeds at which it was clear; missing: open, or fixed seeds",
-                   lambda v: v.stopped_at),
-    "pairing_correlation": (float, "correlation of the two performances over seeds",
-                            lambda v: v.estimate and v.estimate.pairing_correlation),
-    "flags": (str, "marks on the verdict, see `Estimate`, with blanks between",
-              lambda v: " ".join(v.flags)),
-    "saturated": (bool, "whether it rests on a P that is capped", lambda v: v.saturated),
-    "property": (str, "what is asked, e.g. tolerant, FT > 0.5 or P falls", lambda v: v.asked),
-    "answer": (str, "verdict on the property", lambda v: v.answer(holm=False)),
-    "answer_holm": (str, "the same after Holm", lambda v: v.answer(holm=True)),
-    "conclusion": (str, "answer_holm, but equivalent if that is inconclusive and P unchanged",
-                   lambda v: v.conclusion),
-    "claim": (str, "what is claimed, e.g. not tolerant; missing: nothing", lambda v: v.claim),
-    "published": (float, "the reference's value of the indicator", lambda v: v.published),
-    "claim_verdict": (str, "verdict on the claim", lambda v: v.claim_verdict(holm=False)),
-    "claim_verdict_holm": (str, "the same after Holm", lambda v: v.claim_verdict(holm=True)),
-    "unchanged": (str, "what is tested for equivalence, e.g. P_F within 10 % of P_o",
-                  lambda v: v.unchanged),
-    "margin": (float, "the largest change that counts as none, as a share of P_o",
-               lambda v: v.equivalence and v.margin),
-    "change": (float, "relative change, e.g. P_F / P_o - 1; of FT (P_F - P_S) / P_o",
-               lambda v: v.equivalence and v.equivalence.change.value),
-    "change_low": (float, "lower limit of its interval, of level 1 - 2 alpha",
-                   lambda v: v.equivalence and v.equivalence.change.low),
-    "change_high": (float, "upper limit of it",
-                    lambda v: v.equivalence and v.equivalence.change.high),
-    "p_unchanged": (float, "p of equivalence; of a larger change p of its being beyond the margin",
-                    lambda v: v.equivalence and v.equivalence.p_value),
-    "equivalence": (str, "verdict on unchanged: equivalent, refuted or inconclusive",
-                    lambda v: v.equivalence and v.equivalence.verdict),
-    "equivalence_holm": (str, "the same after Holm", lambda v: v.equivalence_holm),
-    "detectable": (float, "distance from the threshold that these seeds find with 80 % power",
-                   lambda v: v.detectable),
-    "seeds_for_power_80": (float, "seeds for 80 % power at the published value, on average",
-                           lambda v: v.seeds_needed),
-    "least_power": (float, "power that so many seeds keep in at least nine pilots of ten",
-                    lambda v: v.least_power),
-    "no_plan": (str, "why no such number can be named", lambda v: v.no_plan),
-    "problem": (str, "why the comparison is blocked, e.g. by a failed run", lambda v: v.problem),
-}  # fmt: skip
-
-CELL_COLUMNS: Columns = {name: row[:2] for name, row in _CELL.items()}
-VERDICT_COLUMNS: Columns = {name: row[:2] for name, row in _VERDICT.items()}
-
-
-def frame_of_cells(cells: Iterable[Cell]) -> pd.DataFrame:
-    """Return cells as a table with the columns of `CELL_COLUMNS`, for CSV and for users."""
-    return _frame(list(cells), _CELL)
-
-
-def frame_of_verdicts(verdicts: Iterable[Verdict]) -> pd.DataFrame:
-    """Return verdicts as a table with the columns of `VERDICT_COLUMNS`, for CSV and for users."""
-    return _frame(list(verdicts), _VERDICT)
-
-
-def _frame(
-    rows: Sequence[Item], columns: Mapping[str, tuple[type, str, Callable[[Item], object]]]
-) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.DataFrame(
-        {
-            # Missing texts stay None, which pandas would turn into NaN.
-            name: pd.Series([value(row) for row in rows], dtype=float if kind is float else object)
-            for name, (kind, _, value) in columns.items()
-        }
-    )
 
 
 @dataclass(frozen=True)

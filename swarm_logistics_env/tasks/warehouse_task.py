@@ -1,13 +1,8 @@
-"""The built-in task: robots deliver items in a warehouse; a run of it recorded, to show it."""
+"""The built-in task: robots deliver items in a warehouse."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.policies.policy import code_digest
@@ -16,9 +11,8 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import Fault
-from swarm_logistics_env.warehouse.state import NOBODY, STORED
 
-from .task import Case, Conditions, Outcome, Run
+from .task import Case, Conditions, Outcome
 
 
 def code_version() -> str:
@@ -97,58 +91,3 @@ def _of_the_warehouse(case: Case) -> tuple[Scenario, tuple[Fault, ...]]:
 
 
 WAREHOUSE = WarehouseTask()
-
-
-FRAME_RATE = 2.5  # per second, at most
-NOWHERE = -1.0  # in both coordinates: a robot removed, an item carried or delivered
-
-
-@dataclass(frozen=True)
-class Recording:
-    """Positions over time; a frame every `period` seconds from 0 on.
-
-    Attributes:
-        scenario: of the run.
-        period: time between two frames [s].
-        robots: (T, N, 2) [m]; `NOWHERE` where one is absent.
-        items: (T, I, 2) [m]; `NOWHERE` where one is carried or delivered.
-        carrying, failed: (T, N) whether a robot has an item, and whether it fails in any mode.
-        digest: of the whole run, as in `Episode`: it tells whether this is the run that was stored.
-    """
-
-    scenario: Scenario
-    period: float
-    robots: NDArray[np.float64]
-    items: NDArray[np.float64]
-    carrying: NDArray[np.bool_]
-    failed: NDArray[np.bool_]
-    digest: str
-
-
-def record_run(run: Run) -> Recording:
-    """Play a run of the warehouse again and return where everything was.
-
-    Raises:
-        PolicyError: the policy cannot be found or built, or returned what is no command.
-    """
-    scenario, faults = _of_the_warehouse(run.case)
-    play = Play(scenario, run.case.policy.load(), run.seed, faults, run.policy_seed)
-    state = play.world.state
-    every = max(1, round(1.0 / (FRAME_RATE * scenario.control_period)))
-    digest = hashlib.blake2b(digest_size=16)
-    frames = []
-    while True:
-        if state.step % every == 0 or play.is_over:
-            robots = np.where(state.robot_present[:, np.newaxis], state.robot_position, NOWHERE)
-            lies = state.item_status == STORED
-            items = np.where(lies[:, np.newaxis], state.item_position, NOWHERE)
-            frames.append((robots, items, state.robot_item != NOBODY, state.failed.copy()))
-        if play.is_over:
-            break
-        play.step()
-        digest.update(state.robot_position.tobytes())
-    digest.update(np.array(state.delivery_times, dtype=np.float64).tobytes())
-    period = every * scenario.control_period
-    columns = (np.array(column) for column in zip(*frames))
-    robots, items, carrying, failed = columns
-    return Recording(scenario, period, robots, items, carrying, failed, digest.hexdigest())
