@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from hypothesis import Phase, settings
 
+from swarm_logistics_env.studies import Study
+
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
 settings.register_profile("default", max_examples=200, derandomize=True, deadline=None)
 settings.register_profile("nightly", max_examples=2000, deadline=None)
@@ -28,22 +30,39 @@ if not (Path(__file__).parents[1] / "swarm_logistics_env").is_dir():
     ]
 
 
+SMALL: dict[str, Any] = {
+    "name": "small",
+    "seeds": 3,
+    "scenario": {
+        "n_robots": 4,
+        "n_items": 8,
+        "warehouse_width": 3.0,
+        "warehouse_height": 3.0,
+        "delivery_width": 1.0,
+        "duration": 20.0,
+    },
+    "sizes": [{"values": [2, 4, 6]}],
+    "faults": [{"modes": ["FM1", "FM4"], "robots": [1, 2], "onsets": [0.0, 10.0]}],
+    "parameters": [{"name": "delivery_width", "values": [1.0, 0.5]}],
+    "ablations": [{"policy": "random-walk"}],
+}
+
+
 @pytest.fixture
 def small() -> dict[str, Any]:
     """Fields of a study with all four kinds of factor, of 20 s of simulated time."""
-    return {
-        "name": "small",
-        "seeds": 2,
-        "scenario": {
-            "n_robots": 4,
-            "n_items": 8,
-            "warehouse_width": 3.0,
-            "warehouse_height": 3.0,
-            "delivery_width": 1.0,
-            "duration": 20.0,
-        },
-        "sizes": [{"values": [2, 4, 6]}],
-        "faults": [{"modes": ["FM1", "FM4"], "robots": [1]}],
-        "parameters": [{"name": "delivery_width", "values": [1.0, 0.5]}],
-        "ablations": [{"policy": "random-walk"}],
-    }
+    return {**SMALL}
+
+
+@pytest.fixture
+def sizes(small: dict[str, Any]) -> dict[str, Any]:
+    """Fields of the same study, of the three swarm sizes alone."""
+    return {**small, "faults": [], "parameters": [], "ablations": []}
+
+
+@pytest.fixture(scope="session")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Directory of the small study, played in this process; not to be changed."""
+    directory = tmp_path_factory.mktemp("played")
+    assert Study(out=directory, **SMALL).run().failed == 0
+    return directory
