@@ -54,9 +54,7 @@ def paper(
         digest = f"{policy} {setting} {seed}"
         if setting.name in same or setting == NO_FAULT:
             count, digest = round(p(policy, NO_FAULT)) + seed % 3, f"{policy} no fault {seed}"
-        return delivered(
-            max(0, count), all_delivered=setting == full and seed == 0, digest=digest
-        )
+        return delivered(max(0, count), all_delivered=setting == full and seed == 0, digest=digest)
 
     return judged(Study.preset("paper", seeds=seeds, **fields), play)
 

@@ -16,95 +16,72 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies import SwarmDT, identity
+from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.engines import engine_named, execute, expected_seconds
-from swarm_logistics_env.studies.metadata import merge
-from swarm_logistics_env.studies.runs import Condition, Shard, StudiedPolicy
-from swarm_logistics_env.studies.store import Store, export
-from swarm_logistics_env.tasks.code_version import code_version
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.studies.declaration import merge
+from swarm_logistics_env.studies.play import Shard, engine_named, expected_seconds
+from swarm_logistics_env.studies.runs import Runs, export
+from swarm_logistics_env.tasks.task import Case
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, code_version
+from tests.conftest import SMALL
 
-needs_ray = pytest.mark.skipif(
-    importlib.util.find_spec("ray") is None, reason="ray is not installed"
-)
-
-STUDY: dict[str, Any] = {
-    "seeds": 2,
-    "scenario": {
-        "n_robots": 4,
-        "n_items": 8,
-        "warehouse_width": 3.0,
-        "warehouse_height": 3.0,
-        "delivery_width": 1.0,
-        "duration": 20.0,
-        "restock": True,
-    },
-    "faults": [{"modes": ["FM1", "FM4"], "robots": [1], "onsets": [5.0]}],
-}
+has_ray = importlib.util.find_spec("ray") is not None
+needs_ray = pytest.mark.skipif(not has_ray, reason="ray is not installed")
 
 
-def digest(directory: Path) -> str:
-    with Store.existing(directory) as store:
-        return export(store, directory / "rows.csv")[1]
+def digest(directory: Path, to: Path) -> str:
+    with Runs.existing(directory) as runs:
+        return export(runs, to / "rows.csv")[1]
 
 
-@pytest.fixture(scope="module")
-def local(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Digest of what this process gives."""
-    directory = tmp_path_factory.mktemp("local")
-    study = Study(out=directory, **STUDY)
-    assert study.run("local").failed == 0
-    assert study.results()["delivered"].sum() > 0
-    return digest(directory)
+def test_two_processes(played: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert Study(out=out, **SMALL).run("process", processes=2).failed == 0
+    assert digest(out, tmp_path) == digest(played, tmp_path)
 
 
-def test_two_processes(local: str, tmp_path: Path) -> None:
-    assert Study(out=tmp_path, **STUDY).run("process", processes=2).failed == 0
-    assert digest(tmp_path) == local
-
-
-def test_two_shards_merged(local: str, tmp_path: Path) -> None:
-    parts = [tmp_path / "1", tmp_path / "2"]
+def test_two_shards_merged(played: Path, tmp_path: Path) -> None:
+    parts, half = [tmp_path / "1", tmp_path / "2"], len(Study.stored(played).plan().runs) // 2
     for number, part in enumerate(parts, start=1):
-        tally = Study(out=part, **STUDY).run(shard=Shard(number, 2))
-        assert tally.played == 5
-        assert Study(out=part, **STUDY).run(shard=Shard(number, 2)).kept == 5
+        assert Study(out=part, **SMALL).run(shard=Shard(number, 2)).played == half
+        assert Study(out=part, **SMALL).run(shard=Shard(number, 2)).kept == half
     merge(parts, tmp_path)
-    assert digest(tmp_path) == local
+    assert digest(tmp_path, tmp_path) == digest(played, tmp_path)
     assert not Study.stored(tmp_path).findings().exploratory
 
 
 @needs_ray
 @pytest.mark.filterwarnings("ignore")  # of ray's own
-def test_ray_with_two_local_nodes(local: str, tmp_path: Path) -> None:
+def test_ray_with_two_local_nodes(played: Path, tmp_path: Path) -> None:
     from ray.cluster_utils import Cluster
 
+    out = tmp_path / "out"
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
     try:
         cluster.add_node(num_cpus=1)
-        tally = Study(out=tmp_path, **STUDY).run("ray", address=cluster.address)
+        tally = Study(out=out, **SMALL).run("ray", address=cluster.address)
     finally:
         cluster.shutdown()
     assert tally.failed == 0
-    assert digest(tmp_path) == local
+    assert digest(out, tmp_path) == digest(played, tmp_path)
 
 
 @needs_ray
 @pytest.mark.filterwarnings("ignore")
-def test_ray_starts_a_node_of_its_own(local: str, tmp_path: Path) -> None:
+def test_ray_starts_a_node_of_its_own(played: Path, tmp_path: Path) -> None:
     import ray
 
-    assert Study(out=tmp_path, **STUDY).run("ray", processes=1).failed == 0
-    assert digest(tmp_path) == local
+    out = tmp_path / "out"
+    assert Study(out=out, **SMALL).run("ray", processes=1).failed == 0
+    assert digest(out, tmp_path) == digest(played, tmp_path)
     assert not ray.is_initialized()
 
 
-@needs_ray
 @pytest.mark.filterwarnings("ignore")
-def test_no_cluster_at_that_address(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match="no Ray cluster at auto"):
-        Study(out=tmp_path, **STUDY).run("ray", address="auto")
+def test_ray_that_is_missing_or_a_cluster_that_is_not_there_is_named() -> None:
+    words = "no Ray cluster at auto" if has_ray else r"swarm-logistics-env\[ray\]"
+    with pytest.raises(StudyError, match=words):
+        Study(**SMALL).run("ray", address="auto")
 
 
 @pytest.mark.parametrize(
@@ -122,17 +99,11 @@ def test_no_such_engine(arguments: Any, words: str) -> None:
     assert words in str(caught.value)
 
 
-@pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="ray is installed")
-def test_ray_that_is_missing_is_named(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match=r"swarm-logistics-env\[ray\]"):
-        Study(out=tmp_path, **STUDY).run("ray")
-
-
 SCENARIO = Scenario(n_robots=3, n_items=5, warehouse_width=3, warehouse_height=3, duration=10)
 
 
-def condition(source: object) -> Condition:
-    return Condition(StudiedPolicy("mine", identity(SwarmDT()), source), SCENARIO, task=WAREHOUSE)
+def case(source: object) -> Case:
+    return Case(PolicySpec.of(source), "identity", SCENARIO, task=WAREHOUSE)
 
 
 class Remembering(SwarmDT):
@@ -146,21 +117,21 @@ class Remembering(SwarmDT):
 
 
 def test_what_a_policy_remembers_does_not_reach_the_next_run() -> None:
-    run = condition(Remembering()).run(code_version(), 0)
-    first, second = execute(run), execute(run)
+    run = case(Remembering()).run(code_version(), 0)
+    first, second = run.play(), run.play()
     assert first.error is None
+    assert first.digest == second.digest
     assert first.delivery_times.tolist() == second.delivery_times.tolist()
-    assert first.anchoring_seconds == second.anchoring_seconds
 
 
 def test_run_of_other_code_fails_rather_than_mixes() -> None:
-    outcome = execute(condition("swarm-dt").run("0" * 16, 0))
-    assert outcome.error is not None
-    assert "the package changed while the study ran" in outcome.error
+    assert "the package changed while the study ran" in str(
+        case("swarm-dt").run("0" * 16, 0).play().error
+    )
 
 
 class Recording(SwarmDT):
-    """Keeps the seeds that it is reset with, and never moves."""
+    """Keeps the seeds that it is reset with."""
 
     identity = "recording"
     seeds: list[int] = []  # noqa: RUF012 - shared by the copies that runs play
@@ -171,15 +142,13 @@ class Recording(SwarmDT):
 
 
 def test_other_behaviour_meets_the_same_worlds() -> None:
-    Recording.seeds.clear()
-    source = Recording()
-    Recording.seeds.clear()
-    same = Condition(StudiedPolicy("mine", "recording", source), SCENARIO, task=WAREHOUSE)
+    same = case(Recording())
     other = replace(same, behaviour=1)
     assert other.key != same.key
+    Recording.seeds.clear()
     for seed in (0, 1):
-        for condition_ in (same, other):
-            assert execute(condition_.run(code_version(), seed)).error is None
+        for one in (same, other):
+            assert one.run(code_version(), seed).play().error is None
     first, other_first, second, other_second = Recording.seeds
     assert (first, second) == (0, 1)
     assert len({first, second, other_first, other_second}) == 4
@@ -188,7 +157,7 @@ def test_other_behaviour_meets_the_same_worlds() -> None:
 def test_workers_end_with_a_parent_that_is_killed() -> None:
     script = (
         "import os, signal\n"
-        "from swarm_logistics_env.studies.engines import workers\n"
+        "from swarm_logistics_env.studies.play import workers\n"
         "if __name__ == '__main__':\n"
         "    with workers(2) as pool:\n"
         "        print(len({pool.submit(os.getpid).result() for _ in range(20)}), flush=True)\n"
@@ -221,11 +190,8 @@ class Broken:
     def act(self, observations: Any) -> Any: ...
 
 
-def test_more_seeds_take_more_time(small: dict[str, Any]) -> None:
-    few, many = (expected_seconds(Study(**{**small, "seeds": seeds}).plan()) for seeds in (2, 200))
+def test_more_seeds_take_more_time_and_a_policy_that_fails_is_named(sizes: dict[str, Any]) -> None:
+    few, many = (expected_seconds(Study(**{**sizes, "seeds": n}).plan()) for n in (2, 200))
     assert 0 < few < many
-
-
-def test_policy_that_fails_is_named(small: dict[str, Any]) -> None:
     with pytest.raises(StudyError, match=r"'Broken' fails .*a wheel came off"):
-        expected_seconds(Study(**{**small, "policies": [Broken()]}).plan())
+        expected_seconds(Study(**{**sizes, "policies": [Broken()]}).plan())

@@ -95,9 +95,7 @@ def test_claims_are_judged_in_their_own_direction(
 ) -> None:
     test = by_question(found)[question]
     assert test.claim_verdict == verdict
-    assert (test.claim_verdict == test.plain) == (
-        test.claimed is True or verdict == "inconclusive"
-    )
+    assert (test.claim_verdict == test.plain) == (test.claimed is True or verdict == "inconclusive")
 
 
 def test_power_is_undefined_where_the_published_value_is_the_threshold(
@@ -226,7 +224,9 @@ def test_warnings_are_sentences(seeds: int) -> None:
 
 def test_a_named_effect_decides_the_number_of_seeds_and_the_seen_one_never() -> None:
     study = Study(seeds=5, sizes=[{"values": [5, 10]}])
-    pilot = judged(study, lambda _, at, seed: Outcome(untimed=at.value + seed ** (at.value // 5) % 5))
+    pilot = judged(
+        study, lambda _, at, seed: Outcome(untimed=at.value + seed ** (at.value // 5) % 5)
+    )
     (far,), (near,) = demands(pilot, 1.0), demands(pilot, 0.3)
     assert far.test.estimate is not None
     assert far.seeds is not None

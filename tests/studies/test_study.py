@@ -1,4 +1,4 @@
-"""A study from end to end: engines agree, failures are kept, a killed study goes on."""
+"""A study from end to end: failures are kept, a killed study goes on, declared seeds are guarded."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,14 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.report_files import markdown
+from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.indicator_table import INDICATORS
-from swarm_logistics_env.studies.metadata import Declaration, notes_of
-from swarm_logistics_env.studies.performance_table import PERFORMANCE
-from swarm_logistics_env.studies.runs import Run, Shard
-from swarm_logistics_env.studies.store import FILE_NAME, Store, export
-from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.studies.columns import CELL_COLUMNS, VERDICT_COLUMNS
+from swarm_logistics_env.studies.declaration import Declaration, note
+from swarm_logistics_env.studies.play import Shard
+from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
+from swarm_logistics_env.tasks.task import Outcome, Run
+from tests.conftest import SMALL
 
 DYING = """
 import os, pathlib, signal
@@ -97,79 +98,51 @@ class Dizzy(SwarmDT):
         return np.full((len(observations), 4), np.nan)
 
 
-ONE: dict[str, Any] = {"sizes": [{"values": [2, 4]}]}
+def exported(directory: Path, to: Path) -> bytes:
+    with Runs.existing(directory) as runs:
+        export(runs, to / "export.csv")
+    return (to / "export.csv").read_bytes()
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The small study, played in this process."""
-    directory = tmp_path_factory.mktemp("undisturbed")
-    Study(out=directory, **SMALL).run()
-    return directory
+def stored(directory: Path) -> int:
+    if not (directory / FILE_NAME).is_file():
+        return 0
+    with closing(sqlite3.connect(directory / FILE_NAME)) as database:
+        try:
+            return int(database.execute("SELECT count(*) FROM runs").fetchone()[0])
+        except sqlite3.OperationalError:  # the table does not exist yet
+            return 0
 
 
-SMALL: dict[str, Any] = {
-    "name": "small",
-    "seeds": 3,
-    "scenario": {
-        "n_robots": 4,
-        "n_items": 8,
-        "warehouse_width": 3.0,
-        "warehouse_height": 3.0,
-        "delivery_width": 1.0,
-        "duration": 30.0,
-    },
-    "sizes": [{"values": [2, 4, 6]}],
-    "faults": [{"modes": ["FM1", "FM4"], "robots": [1, 2], "onsets": [0.0, 10.0]}],
-    "parameters": [{"name": "delivery_width", "values": [1.0, 0.5]}],
-    "ablations": [{"policy": "random-walk"}],
-}
+def test_swarm_delivers_and_frames_are_whole(played: Path) -> None:
+    study = Study.stored(played)
+    rows = study.results()
+    assert study.finished() == (len(rows), len(rows))
+    assert len(rows) == len(study.plan().runs)
+    assert rows["delivered"].sum() > 0
+    assert rows["error"].isna().all()
+    assert [len(times) for times in rows["delivery_times"]] == list(rows["delivered"])
+    verdicts, cells = study.indicators(), study.performance()
+    assert list(verdicts["indicator"].unique()) == ["S", "FT", "R", "A", "change"]
+    assert verdicts["problem"].isna().all()
+    assert list(verdicts.columns) == list(VERDICT_COLUMNS)
+    assert list(cells.columns) == list(CELL_COLUMNS)
 
 
-def exported(directory: Path) -> bytes:
-    path = directory / "export.csv"
-    with Store.existing(directory) as store:
-        export(store, path)
-    return path.read_bytes()
-
-
-def reports(directory: Path) -> list[bytes]:
-    return [(directory / name).read_bytes() for name in ("report.md", "cells.csv", "claims.csv")]
-
-
-def told(directory: Path) -> str:
-    return markdown(document(Study.stored(directory).findings()))
-
-
-def test_swarm_delivers_and_rows_are_sound(undisturbed: Path) -> None:
-    with Store.existing(undisturbed) as store:
-        rows = list(store.rows())
-    assert len(rows) == len(list(Study(**SMALL).plan().runs()))
-    assert sum(row["delivered"] for row in rows) > 0
-    assert all(len(row["delivery_times"]) == row["delivered"] for row in rows)
-    assert all(row["error"] is None for row in rows)
-
-
-def test_study_killed_at_ten_random_moments_goes_on(undisturbed: Path, tmp_path: Path) -> None:
+def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     out = tmp_path / "out"
     command = [sys.executable, str(script), str(out), json.dumps(SMALL)]
-    total = len(list(Study(**SMALL).plan().runs()))
-    kept = 0
+    total, kept = stored(played), 0
 
     def killed(group: int) -> None:
         nonlocal kept
         while stored(out) == kept:
             os.killpg(group, 0)  # it still runs
             time.sleep(0.002)
-        time.sleep(random.Random().uniform(0, 0.02))
+        time.sleep(random.Random().uniform(0, 0.01))
         os.killpg(group, signal.SIGKILL)
-
-    def counted() -> None:
-        nonlocal kept
-        assert kept < stored(out) < total
-        kept = stored(out)
 
     with subprocess.Popen(
         [sys.executable, "-c", SEVERAL_TIMES, *command[2:]],
@@ -186,176 +159,113 @@ def test_study_killed_at_ten_random_moments_goes_on(undisturbed: Path, tmp_path:
             else:
                 print(file=warm.stdin, flush=True)
                 killed(int(warm.stdout.readline()))
-            counted()
+            assert kept < stored(out) < total
+            kept = stored(out)
     Study(out=out, **SMALL).run()
-    assert exported(out) == exported(undisturbed)
-    assert told(out) == told(undisturbed)
+    assert exported(out, tmp_path) == exported(played, tmp_path)
+    one, other = (markdown(document(Study.stored(where).findings())) for where in (out, played))
+    assert one == other
 
 
-def stored(directory: Path) -> int:
-    path = directory / FILE_NAME
-    if not path.is_file():
-        return 0
-    database = sqlite3.connect(path)
-    try:
-        return int(database.execute("SELECT count(*) FROM runs").fetchone()[0])
-    except sqlite3.OperationalError:  # the table does not exist yet
-        return 0
-    finally:
-        database.close()
-
-
-def test_finished_runs_are_kept_and_seeds_can_be_added(tmp_path: Path) -> None:
-    fields = {**SMALL, "faults": [], "parameters": [], "ablations": []}
-    first = Study(out=tmp_path, **{**fields, "seeds": 2})
-    assert first.run().played == 3 * 2
-    assert first.run().played == 0
-    assert not first.findings().exploratory
-    more = Study(out=tmp_path, **{**fields, "seeds": 3})
-    tally = more.run()
-    assert (tally.played, tally.kept) == (3, 6)
-    assert more.findings().exploratory
-    assert len(more.results()) == 9
-
-
-def test_seeds_may_start_anywhere_and_others_than_the_declared_ones_are_exploratory(
+@pytest.mark.parametrize(
+    ("first_seed", "seeds", "kept", "exploratory"),
+    [
+        (1000, 2, 4, False),
+        (1000, 3, 4, True),
+        (2000, 2, 0, True),  # as many, but others
+        (999, 2, 2, True),  # shares those of seed 1000
+        (1000, 1, 2, True),  # else one could choose the part that says most
+    ],
+)
+def test_verdicts_over_others_than_the_declared_seeds_are_exploratory(
+    sizes: dict[str, Any],
+    first_seed: int,
+    seeds: int,
+    kept: int,
+    exploratory: bool,
     tmp_path: Path,
 ) -> None:
-    fields = {**SMALL, "faults": [], "parameters": [], "ablations": [], "seeds": 2}
-    first = Study(out=tmp_path, **fields, first_seed=1000)
-    first.run()
-    assert sorted(set(first.results()["seed"])) == [1000, 1001]
-    assert not first.findings().exploratory
-    assert not Study.stored(tmp_path).findings().exploratory
-    report = first.report()[0].read_text()
-    assert "2 seeds (1000 to 1001), the same seeds" in report
-    assert "2 paired seeds (1000 to 1001)" in report
-    fresh = Study(out=tmp_path, **fields, first_seed=2000)
-    assert fresh.run().kept == 0  # as many, but others
-    assert fresh.findings().exploratory
-    overlapping = Study(out=tmp_path, **fields, first_seed=999)
-    assert overlapping.run().kept == 3  # those of seed 1000
-    assert overlapping.findings().exploratory
-    part = Study(out=tmp_path, **{**fields, "seeds": 1}, first_seed=1000)
-    assert part.run().played == 0
-    assert part.findings().exploratory  # else one could choose the part that says most
+    fields = {**sizes, "sizes": [{"values": [2, 4]}], "seeds": 2}
+    Study(out=tmp_path, **fields, first_seed=1000).run()
+    asked = Study(out=tmp_path, **{**fields, "seeds": seeds}, first_seed=first_seed)
+    assert (asked.exploratory_because() is not None) == exploratory
+    tally = asked.run()
+    assert (tally.kept, tally.played) == (kept, 2 * seeds - kept)
+    assert asked.findings().exploratory == exploratory
+    assert sorted(set(asked.results()["seed"])) == list(range(first_seed, first_seed + seeds))
     again = Study(out=tmp_path, **fields, first_seed=1000)
     assert again.run().played == 0
     assert not again.findings().exploratory
 
 
-def test_another_study_does_not_enter_the_directory_of_this_one(tmp_path: Path) -> None:
-    fields = {**SMALL, "faults": [], "parameters": [], "ablations": [], "seeds": 1}
-    Study(out=tmp_path, **{**fields, "name": "first"}).run()
-    report = Study.stored(tmp_path).report()[0].read_bytes()
-    other = Study(out=tmp_path, **{**fields, "name": "second", "seeds": 2})
-    with pytest.raises(StudyError, match="holds the study 'first': should be another directory"):
-        other.run()
-    assert Study.stored(tmp_path).specification.name == "first"
-    assert Study.stored(tmp_path).report()[0].read_bytes() == report
-
-
 @pytest.mark.parametrize(
-    ("field", "value"),
+    ("field", "value", "words"),
     [
-        ("policies", ["random-walk"]),
-        ("faults", [{"modes": ["FM4"], "robots": [1]}]),
-        ("sizes", [{"values": [2, 5]}]),
-        ("scenario", {**SMALL["scenario"], "n_robots": 5}),
-        ("indicators", ["S"]),
+        ("name", "second", "holds the study 'small': should be another directory"),
+        ("policies", ["random-walk"], "with another policies: should be as it was declared"),
+        ("faults", [{"modes": ["FM4"], "robots": [1]}], "with another faults"),
+        ("sizes", [{"values": [2, 5]}], "with another sizes"),
+        ("scenario", {**SMALL["scenario"], "n_robots": 5}, "with another scenario"),
+        ("indicators", ["S"], "with another indicators"),
     ],
 )
-def test_a_study_of_the_same_name_that_asks_something_else_is_refused(
-    field: str, value: Any, tmp_path: Path
+def test_another_study_does_not_enter_the_directory_of_this_one(
+    field: str, value: Any, words: str, small: dict[str, Any], tmp_path: Path
 ) -> None:
-    fields = {**SMALL, "parameters": [], "ablations": [], "seeds": 1}
-    declared = Study(out=tmp_path, **fields).specification
-    with Store(tmp_path / FILE_NAME) as store:
+    declared = Study(out=tmp_path, **small).specification
+    with Runs(tmp_path / FILE_NAME) as runs:
         covers = Declaration.model_validate(declared)
-        store.note(notes_of(declared, declared.played.code(), {}, covers))
-        notes = store.notes()
-    other = Study(out=tmp_path, **{**fields, field: value})
+        note(runs, declared, declared.played.code(), {}, covers)
+        notes = runs.notes()
+    other = Study(out=tmp_path, **{**small, field: value})
     for ask in (other.run, other.exploratory_because):
-        with pytest.raises(StudyError, match=f"with another {field}: should be as it was declared"):
+        with pytest.raises(StudyError, match=words):
             ask()
-    with Store.existing(tmp_path) as store:
-        assert store.notes() == notes
-        assert len(store) == 0
+    with Runs.existing(tmp_path) as runs:
+        assert (runs.notes(), len(runs)) == (notes, 0)
 
 
-def test_stored_study_is_judged_without_its_policies(tmp_path: Path) -> None:
-    study = Study(out=tmp_path, policies=[Steady()], seeds=2, scenario=SMALL["scenario"], **ONE)
+def test_stored_study_is_judged_without_its_policies(sizes: dict[str, Any], tmp_path: Path) -> None:
+    study = Study(out=tmp_path, **{**sizes, "policies": [Steady()], "seeds": 2})
     study.run()
-    study.report()
-    written = reports(tmp_path)
     again = Study.stored(tmp_path)
-    assert [c.key for c in again.plan().conditions] == [c.key for c in study.plan().conditions]
-    again.report()
-    assert reports(tmp_path) == written
+    assert [case.key for case in again.plan().cases] == [case.key for case in study.plan().cases]
+    first, second = study.report(), again.report(tmp_path / "elsewhere")
+    assert {path.parent for path in second} == {tmp_path / "elsewhere"}
+    # The page alone names commands, which need the policy.
+    texts = [[path.read_bytes() for path in paths[1:]] for paths in (first, second)]
+    assert texts[0] == texts[1]
     with sqlite3.connect(tmp_path / FILE_NAME) as database:
-        database.execute("UPDATE notes SET value = 'older' WHERE name = 'code'")
+        database.execute("UPDATE notes SET value = json_set(value, '$.code', 'older')")
     database.close()
     with pytest.raises(StudyError, match="was played under code version older"):
         Study.stored(tmp_path).run()
 
 
-def test_only_what_is_asked_is_run() -> None:
-    fields = {**SMALL, "faults": [{"modes": ["FM1"], "robots": [1]}], "indicators": ["R"]}
-    plan = Study(**fields).plan()
-    assert {comparison.indicator for comparison in plan.comparisons} == {"R"}
-    assert len(plan.conditions) == 2
-
-
-def test_failed_run_is_a_row_and_blocks_the_verdict(tmp_path: Path) -> None:
-    fields: dict[str, Any] = {
-        **SMALL,
-        "policies": [Failing()],
-        "faults": [],
-        "parameters": [],
-        "ablations": [],
-    }
-    study = Study(out=tmp_path, **fields)
+def test_failed_runs_are_rows_block_their_verdicts_and_are_tried_again(
+    sizes: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = Study(out=tmp_path, **{**sizes, "policies": [Failing()]})
     tally = study.run()
     assert tally.failed == tally.played == 9
     assert tally.error == "RuntimeError: a wheel came off"
     errors = study.results()["error"]
-    assert errors.str.contains("RuntimeError: a wheel came off").all()
-    assert errors.str.contains("Traceback").all()
+    assert errors.str.contains(r"Traceback[^$]*RuntimeError: a wheel came off").all()
     tests = study.indicators()
     assert tests[["value", "verdict", "verdict_holm"]].isna().all(axis=None)
     assert tests["problem"].str.contains("3 of 3 runs failed").all()
-    study.report()
-    assert "blocked" in (tmp_path / "report.md").read_text()
-    Failing.broken = False
-    try:
-        assert study.run().failed == 0
-    finally:
-        Failing.broken = True
+    monkeypatch.setattr(Failing, "broken", False)
+    assert study.run().failed == 0
     assert study.results()["error"].isna().all()
     assert study.indicators()["value"].notna().all()
 
 
-def test_one_failed_run_blocks_its_family_under_holm(tmp_path: Path) -> None:
-    fields = {**SMALL, "faults": [], "parameters": [], "ablations": []}
-    study = Study(out=tmp_path, **fields)
-    study.run()
-    largest = next(c for c in study.plan().conditions if c.scenario.n_robots == 6)
-    with sqlite3.connect(tmp_path / FILE_NAME) as database:
-        database.execute(
-            "UPDATE runs SET error = 'Traceback', delivered = NULL WHERE run = ?",
-            (largest.run(study.plan().code, 1).key,),
-        )
-    database.close()
-    tests = study.indicators()
-    assert tests["value"].notna().tolist() == [True, False]
-    assert tests["verdict_holm"].isna().all()
-    assert tests["problem"].tolist() == [None, "N = 6: 1 of 3 runs failed"]
-
-
-def test_policy_that_returns_nan_fails_in_words_and_spoils_nothing_else() -> None:
-    study = Study(**{**SMALL, **ONE, "policies": [Dizzy(), "swarm-dt"], "faults": []})
+def test_policy_that_returns_nan_fails_in_words_and_spoils_nothing_else(
+    sizes: dict[str, Any],
+) -> None:
+    study = Study(**{**sizes, "policies": [Dizzy(), "swarm-dt"], "seeds": 1})
     tally = study.run()
-    assert 0 < tally.failed < tally.played
+    assert (tally.failed, tally.played) == (3, 6)
     results = study.results()
     dizzy = results["policy"] == "Dizzy"
     assert results.loc[dizzy, "error"].str.contains("PolicyError: Dizzy at 0 s").all()
@@ -363,42 +273,37 @@ def test_policy_that_returns_nan_fails_in_words_and_spoils_nothing_else() -> Non
 
 
 def test_disk_that_fills_up_stops_the_study_in_words_and_keeps_what_is_finished(
-    undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    played: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    add = Store.add
+    add = Runs.add
 
-    def add_until_full(store: Store, run: Run, outcome: Outcome) -> None:
-        if len(store) == 5:
-            (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
-            store._connection.execute(f"PRAGMA max_page_count = {pages}")
-        add(store, run, outcome)
+    def add_until_full(runs: Runs, run: Run, outcome: Outcome) -> None:
+        if len(runs) == 5:
+            (pages,) = runs._connection.execute("PRAGMA page_count").fetchone()
+            runs._connection.execute(f"PRAGMA max_page_count = {pages}")
+        add(runs, run, outcome)
 
+    out = tmp_path / "out"
     with monkeypatch.context() as patched:
-        patched.setattr(Store, "add", add_until_full)
+        patched.setattr(Runs, "add", add_until_full)
         with pytest.raises(StudyError, match="disk is full"):
-            Study(out=tmp_path, **SMALL).run()
-    before = stored(tmp_path)
+            Study(out=out, **SMALL).run()
+    before = stored(out)
     assert before >= 5
-    study = Study(out=tmp_path, **SMALL)
-    assert study.run().kept == before
-    assert exported(tmp_path) == exported(undisturbed)
+    assert Study(out=out, **SMALL).run().kept == before
+    assert exported(out, tmp_path) == exported(played, tmp_path)
 
 
 @pytest.mark.parametrize("always", ["no", "yes"])
 def test_run_whose_worker_is_killed_is_tried_again_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, always: str
+    sizes: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, always: str
 ) -> None:
     (tmp_path / "dying_policy.py").write_text(DYING)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("DYING_FLAG", str(tmp_path / "flag"))
     monkeypatch.setenv("DYING_ALWAYS", always)
-    study = Study(
-        out=tmp_path / "out",
-        policies=["dying_policy:Dying"],
-        seeds=1,
-        scenario=SMALL["scenario"],
-        sizes=[{"values": [2, 4]}],
-    )
+    fields = {**sizes, "sizes": [{"values": [2, 4]}], "seeds": 1}
+    study = Study(out=tmp_path / "out", **{**fields, "policies": ["dying_policy:Dying"]})
     # One run is enough where it ends its workers for good.
     tally = study.run("process", processes=1, shard=Shard(1, 2) if always == "yes" else None)
     if always == "no":
@@ -408,29 +313,26 @@ def test_run_whose_worker_is_killed_is_tried_again_once(
         assert study.results()["error"].str.contains("SIGKILL").all()
 
 
-def test_policy_that_cannot_travel_is_refused(tmp_path: Path) -> None:
+def test_time_that_is_over_leaves_runs_for_the_same_call(sizes: dict[str, Any]) -> None:
+    study = Study(**{**sizes, "seeds": 1})
+    tally = study.run(minutes=0.0)
+    assert (tally.played, tally.left) == (1, 2)
+    assert study.finished() == (1, 3)
+    tally = study.run(minutes=60.0)
+    assert (tally.kept, tally.played, tally.left) == (1, 2, 0)
+
+
+def test_a_policy_that_cannot_travel_and_a_study_in_memory(sizes: dict[str, Any]) -> None:
     class Local(SwarmDT):
         identity = "local"
 
-    study = Study(
-        out=tmp_path, policies=[Local()], seeds=1, scenario=SMALL["scenario"], sizes=SMALL["sizes"]
-    )
+    study = Study(**{**sizes, "policies": [Local()], "seeds": 1})
+    with pytest.raises(StudyError, match="nothing has been run"):
+        study.results()
     with pytest.raises(StudyError, match="use one process"):
         study.run("process", processes=1)
     assert study.run(processes=1).failed == 0
-
-
-def test_study_in_memory() -> None:
-    study = Study(**{**SMALL, "seeds": 2})
-    with pytest.raises(StudyError, match="nothing has been run"):
-        study.results()
-    study.run()
-    table = study.indicators()
-    assert list(table["indicator"].unique()) == ["S", "FT", "R", "A", "change"]
-    assert table["problem"].isna().all()
-    assert list(table.columns) == list(INDICATORS)
-    performance = study.performance()
-    assert list(performance.columns) == list(PERFORMANCE)
-    assert [p.mean() for p in performance["by_seed"]] == performance["mean"].tolist()
     with pytest.raises(StudyError, match="report needs a path"):
         study.report()
+    with pytest.raises(StudyError, match="cannot write to"):
+        Study(out=Path(__file__) / "in", **sizes).run()

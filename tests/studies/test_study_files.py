@@ -66,7 +66,7 @@ def test_robots_may_fail_and_be_repaired_at_random_lose_parts_of_a_mode_or_a_fac
         """
     )
     study = Study.from_file(path, out=tmp_path / "out")
-    faults = {fault for c in study.plan().conditions for fault in c.faults}
+    faults = {fault for c in study.plan().cases for fault in c.faults}
     assert faults == {
         Fault("dead[move,send]", 1, duration=15.0, intermittent=(2.0, 3.0)),
         Fault("motor_slow", 2, factor=0.1),

@@ -17,13 +17,14 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.report_files import markdown
+from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import rows_of
-from swarm_logistics_env.studies.runs import Run
+from swarm_logistics_env.studies.play import Shard
 from swarm_logistics_env.studies.specification import looks_up_to
 from swarm_logistics_env.studies.until_clear import SPENDING
-from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.studies.verdict import Verdict
+from swarm_logistics_env.tasks.task import Outcome, Run
+from tests.studies.made_up import delivered
 from verification.verdict_errors import MODELS, wrong_verdicts
 
 FIELDS: dict[str, Any] = {
@@ -36,10 +37,10 @@ MEANS = {"FM2": 38.5, "FM3": 34.0, "FM4": 15.0}  # of 40 items; R is 0.0025, -0.
 
 def made_up(run: Run) -> Outcome:
     """An outcome that depends on the run alone: Poisson counts around the mean of its fault."""
-    faults = [fault.mode for fault in run.condition.faults]
+    faults = [fault.mode for fault in run.case.faults]
     rng = np.random.default_rng([run.seed, *map(ord, "".join(faults))])
     count = rng.poisson(MEANS[faults[0]] if faults else 40.0)
-    return Outcome(run.key, np.arange(float(count)), digest=run.key)
+    return delivered(count, digest=run.key)
 
 
 class Engine:
@@ -61,41 +62,65 @@ def until_clear(most: int, out: Path | None = None, **fields: Any) -> Study:
     return Study(out=out, seeds=most, **FIELDS, **fields)
 
 
+def verdicts_of(study: Study) -> dict[str, Verdict]:
+    return {test.after.name: test for test in study.findings().verdicts}
+
+
 def told(study: Study) -> dict[str, tuple[Any, ...]]:
     return {
-        test.factor: (test.stopped_at, test.n_seeds, test.verdict_holm, test.low, test.high)
-        for test in rows_of(study.indicators())
+        mode: (test.stopped_at, test.estimate and test.estimate.n_seeds, test.holm, test.interval)
+        for mode, test in verdicts_of(study).items()
     }
 
 
-def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds() -> None:
-    study, engine = until_clear(100), Engine()
-    tally = study.run(engine)
+@pytest.fixture(scope="module")
+def whole() -> tuple[Study, Engine]:
+    """A study of at most 60 seeds, and the engine that played it."""
+    study, engine = until_clear(60), Engine()
+    assert study.run(engine).played == len(engine.played)
+    return study, engine
+
+
+def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
+    whole: tuple[Study, Engine],
+) -> None:
+    study, engine = whole
     found = told(study)
     assert found["FM4"][:3] == (20, 20, "refuted")
     assert found["FM3"][2] == "refuted"
-    assert 20 < found["FM3"][1] < 100
-    assert found["FM2"][:3] == (None, 100, "inconclusive")
-    modes = [fault.mode for run in engine.played for fault in run.condition.faults]
+    assert 20 < found["FM3"][1] < 60
+    assert found["FM2"][:3] == (None, 60, "inconclusive")
+    modes = [fault.mode for run in engine.played for fault in run.case.faults]
     seeds = {mode: modes.count(mode) for mode in MEANS}
     assert seeds == {mode: found[mode][1] for mode in MEANS}
-    assert tally.played == len(engine.played) == sum(seeds.values()) + 100
+    assert len(engine.played) == sum(seeds.values()) + 60
+    text = markdown(document(study.findings()))
+    assert "Clear at 20 of at most 60 seeds." in text
+    assert "Open after 60 of at most 60 seeds." in text
 
 
-def test_a_comparison_is_judged_by_its_own_seeds_and_its_repeated_interval() -> None:
-    study = until_clear(100)
-    study.run(Engine())
-    looks = looks_up_to(100)
-    for test in rows_of(study.indicators()):
-        alpha = spi.look_alphas(looks, spending=SPENDING)[looks.index(test.n_seeds)]
-        assert test.confidence == pytest.approx(1 - alpha)
-        code, seeds = study.plan().code, range(test.n_seeds)
+def test_a_comparison_is_judged_by_its_own_seeds_and_its_repeated_interval(
+    whole: tuple[Study, Engine],
+) -> None:
+    study, _ = whole
+    looks = looks_up_to(60)
+    for test in study.findings().verdicts:
+        estimate = test.estimate
+        assert estimate is not None
+        alpha = spi.look_alphas(looks, spending=SPENDING)[looks.index(estimate.n_seeds)]
+        assert estimate.confidence == pytest.approx(1 - alpha)
         p_o, p_f = (
-            [made_up(arm.condition.run(code, seed)).delivered for seed in seeds]
+            [
+                made_up(arm.case.run(study.plan().code, seed)).delivered
+                for seed in range(estimate.n_seeds)
+            ]
             for arm in test.compared.arms
         )
-        alone = spi.robustness(p_o, p_f, n=25, m=1, confidence=test.confidence)
-        assert (test.low, test.high, test.p_value) == (alone.low, alone.high, alone.p_value)
+        alone = spi.robustness(p_o, p_f, n=25, m=1, confidence=estimate.confidence)
+        assert (test.interval, estimate.p_value) == (
+            (alone.value, alone.low, alone.high),
+            alone.p_value,
+        )
 
 
 def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
@@ -104,30 +129,34 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
 
         def engine(runs: Iterable[Run], number: int = number) -> Generator[tuple[Run, Outcome]]:
             for run in runs:
-                fault = "".join(fault.mode for fault in run.condition.faults)
+                fault = "".join(fault.mode for fault in run.case.faults)
                 rng = np.random.default_rng([number, run.seed, *map(ord, fault)])
-                yield run, Outcome(run.key, np.arange(float(rng.poisson(35 if fault else 40))))
+                yield run, delivered(rng.poisson(35 if fault else 40))
 
         study = until_clear(30)
         study.run(engine)
-        rows = sorted(rows_of(study.indicators()), key=lambda test: (test.n_seeds, test.p_value))
-        n_open = len(rows)
-        for test in rows:
-            look = looks.index(test.n_seeds)
+        found = [
+            (e.n_seeds, e.p_value, t.holm) for t in verdicts_of(study).values() if (e := t.estimate)
+        ]
+        n_open = len(found)
+        for n_seeds, p, verdict in sorted(found, key=lambda one: (one[0], one[1] or 0.0)):
+            assert p is not None
+            look = looks.index(n_seeds)
             alone, level = (
                 spi.look_alphas(looks, alpha, spending=SPENDING)[look]
                 for alpha in (0.05, 0.05 / n_open)
             )
-            is_clear = test.verdict_holm != "inconclusive"
-            assert is_clear == (test.p_value < level)
-            softened += level <= test.p_value < alone
+            is_clear = verdict != "inconclusive"
+            assert is_clear == (p < level)
+            softened += level <= p < alone
             n_open -= is_clear
     assert softened
 
 
-def test_killed_at_any_moment_it_goes_on_to_the_same_result(tmp_path: Path) -> None:
-    whole, engine = until_clear(60), Engine()
-    whole.run(engine)
+def test_killed_at_any_moment_it_goes_on_to_the_same_result(
+    whole: tuple[Study, Engine], tmp_path: Path
+) -> None:
+    study, engine = whole
     moments, played = random.Random(0), 0
     for most in (moments.randrange(1, 20) for _ in range(4)):
         # Killed as by kill -9: no cleaning up, and only what the store holds is left.
@@ -142,7 +171,7 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_result(tmp_path: Path) -> N
     until_clear(60, tmp_path).run(last)
     assert played + len(last.played) == len(engine.played)
     stored = Study.stored(tmp_path)
-    assert told(stored) == told(whole)
+    assert told(stored) == told(study)
     assert not stored.findings().exploratory
 
 
@@ -153,80 +182,69 @@ def test_an_interrupted_study_counts_the_runs_of_its_next_look(tmp_path: Path) -
                 raise KeyboardInterrupt
             yield run, made_up(run)
 
-    study = until_clear(100, tmp_path)
+    study = until_clear(40, tmp_path)
     with pytest.raises(KeyboardInterrupt):
         study.run(interrupted)
     assert study.finished() == (25, 20 * 4)
     assert study.run(Engine()).kept == 25
     done, total = study.finished()
-    assert done == total < 4 * 100
+    assert done == total < 4 * 40
 
 
-def test_later_outcomes_of_a_shared_condition_change_no_verdict() -> None:
+def test_later_outcomes_of_a_shared_condition_change_no_verdict(
+    whole: tuple[Study, Engine],
+) -> None:
     def capped_later(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
         for run in runs:
-            full = not run.condition.faults and run.seed >= 20
+            full = not run.case.faults and run.seed >= 20
             yield run, replace(made_up(run), all_delivered=full)
 
-    plain, capped = until_clear(60), until_clear(60)
-    plain.run(Engine())
+    capped = until_clear(60)
     capped.run(capped_later)
     # A capped P_F would block "refuted" only; a capped P_o blocks "supported", and marks the rest.
-    (early,) = (t for t in rows_of(capped.indicators()) if t.factor == "FM4")
-    assert told(capped)["FM4"] == told(plain)["FM4"]
-    assert not early.saturated
+    assert told(capped)["FM4"] == told(whole[0])["FM4"]
+    assert not verdicts_of(capped)["FM4"].saturated
 
 
 def test_a_failed_run_blocks_its_comparison_and_no_other() -> None:
     def fails_once(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
         for run in runs:
-            faults = [fault.mode for fault in run.condition.faults]
+            faults = [fault.mode for fault in run.case.faults]
             broken = faults == ["FM3"] and run.seed == 7
-            yield run, Outcome(run.key, error="ValueError: no") if broken else made_up(run)
+            yield run, Outcome(error="ValueError: no") if broken else made_up(run)
 
-    study = until_clear(60)
+    study = until_clear(30)
     tally = study.run(fails_once)
     assert tally.failed == 1
-    tests = {test.factor: test for test in rows_of(study.indicators())}
-    assert "1 of 20 runs failed" in tests["FM3"].problem
+    tests = verdicts_of(study)
+    assert "1 of 20 runs failed" in str(tests["FM3"].problem)
     assert tests["FM4"].stopped_at == 20
     study.run(Engine())  # what failed is tried again
-    assert study.indicators()["problem"].isna().all()
+    assert not any(test.problem for test in verdicts_of(study).values())
 
 
 def test_the_same_runs_are_exact_at_the_first_look() -> None:
     def unaffected(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
         for run in runs:
-            outcome = Outcome(run.key, np.arange(40.0 + run.seed), digest=f"{run.seed}")
-            yield run, outcome
+            yield run, delivered(40 + run.seed, digest=f"{run.seed}")
 
-    study = until_clear(60)
+    study = until_clear(30)
     assert study.run(unaffected).played == 4 * 20
-    assert {test.stopped_at for test in rows_of(study.indicators())} == {20}
-    assert set(study.indicators()["verdict_holm"]) == {"unaffected"}
+    assert {(test.stopped_at, test.holm) for test in verdicts_of(study).values()} == {
+        (20, "unaffected")
+    }
 
 
-def test_the_report_tells_where_each_stopped() -> None:
-    study = until_clear(60)
-    study.run(Engine())
-    text = markdown(document(study.findings()))
-    assert "Clear at 20 of at most 60 seeds." in text
-    assert "Open after 60 of at most 60 seeds." in text
-
-
-def test_another_most_is_another_plan_and_exploratory(tmp_path: Path) -> None:
-    until_clear(40, tmp_path).run(Engine())
-    longer = until_clear(60, tmp_path)
+def test_another_most_is_another_plan_and_exploratory_and_shards_are_refused(
+    tmp_path: Path,
+) -> None:
+    until_clear(30, tmp_path).run(Engine())
+    longer = until_clear(40, tmp_path)
     assert longer.exploratory_because() is not None
     longer.run(Engine())
     assert longer.findings().exploratory
-
-
-def test_shards_and_missing_looks_are_refused() -> None:
-    from swarm_logistics_env.studies.runs import Shard
-
     with pytest.raises(StudyError, match="shard"):
-        until_clear(60).run(Engine(), shard=Shard(1, 2))
+        longer.run(Engine(), shard=Shard(1, 2))
 
 
 @pytest.mark.parametrize("model", MODELS)
