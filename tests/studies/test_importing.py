@@ -11,9 +11,8 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study, presets
 from swarm_logistics_env.studies.fault_measures import resiliences
 from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 
 
 def papers_tables() -> str:
@@ -148,10 +147,9 @@ def event_log(results: StudyResults, *, seeds: bool = True) -> str:
     for _, _, arm in results.plan.cells:
         setting = arm.setting
         for number, seed in enumerate(results.plan.seeds):
-            outcome = results.outcomes[arm.condition.run(results.plan.code, seed).key]
-            named = (
-                f"swarm-dt;{arm.condition.size};{setting.name};{setting.value:g};{setting.onset:g}"
-            )
+            outcome = results.outcomes[arm.case.key, seed]
+            size = arm.case.scenario.n_robots
+            named = f"swarm-dt;{size};{setting.name};{setting.value:g};{setting.onset:g}"
             shown = f"{seed if seeds else ''};{setting.name} {number}"
             times = outcome.delivery_times.tolist() or [""]
             rows += [f"{named};{shown};{time};300" for time in times]
@@ -210,7 +208,7 @@ MANY = """robots,delivered
 
 
 def test_unequally_many_runs_are_judged_unpaired(tmp_path: Path) -> None:
-    (test,) = rows_of(imported(tmp_path, MANY).findings().indicators)
+    (test,) = imported(tmp_path, MANY).findings().verdicts
     assert test.estimate is not None
     assert not test.estimate.paired
     assert test.estimate.value == pytest.approx(1.0)
@@ -220,11 +218,11 @@ def test_unequally_many_runs_are_judged_unpaired(tmp_path: Path) -> None:
 def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
     rows = ["5,7,10,theirs", "5,3,20,theirs", "10,3,40,theirs", "10,7,21,theirs"]
     study = imported(tmp_path, "\n".join(["robots,seed,delivered,policy", *rows]))
-    (test,) = rows_of(study.findings().indicators)
-    assert test.policy == "theirs"
+    (test,) = study.findings().verdicts
+    assert test.compared.policy == "theirs"
     assert test.estimate is not None
     assert test.estimate.paired
-    cells = {cell.value: cell.by_seed.tolist() for cell in rows_of(study.findings().performance)}
+    cells = {c.arm.setting.value: c.by_seed.tolist() for c in study.findings().cells}
     assert cells == {5: [20, 10], 10: [40, 21]}
     # The file's own seeds, so that it can be compared with another file by them.
     assert list(study.plan().seeds) == [3, 7]
@@ -271,8 +269,8 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
         import_results(tmp_path / "table.csv", tmp_path / "out")
     with pytest.raises(StudyError, match="was imported: run into a new directory"):
         Study(out=tmp_path / "out", **small).run()
-    with Store.existing(tmp_path / "out") as store:
-        assert len(store) == 5
+    with Runs.existing(tmp_path / "out") as runs:
+        assert len(runs) == 5
     assert [path.name for path in (tmp_path / "out").iterdir()] == [FILE_NAME]
     with pytest.raises(StudyError, match="was imported: run into a new directory"):
         Study.stored(tmp_path / "out").run()
