@@ -48,7 +48,7 @@ class StoredSpecification(BaseModel):
         """
         if task is None and ":" not in self.task and self.task not in NAMES:
             raise StudyError(
-                f"{place}: was played on the task {self.task!r}, an object: should be handed over "
+                f"{place}: was played on the task {self.task!r} of a script: should be handed over "
                 "again, as Study.stored(.., task=..)"
             )
         if task is None:

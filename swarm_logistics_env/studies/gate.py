@@ -26,12 +26,14 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.tasks.task import Conditions, TaskFault
 
 from .results import StudyResults
 from .specification import seeds_in_words
 from .verdict import Cell, judge_one, same_runs
 
-_Content = tuple[object, ...]  # everything about a condition but its policy
+# All about a condition but its policy: scenario, faults, behaviour and table.
+_Content = tuple[Conditions, tuple[TaskFault, ...], int, str]
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 

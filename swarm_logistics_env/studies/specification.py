@@ -194,7 +194,7 @@ class Specification(_Part):
         name: the study's name, of which its directory is called: at most 80 letters, digits, -, _
             and, within, points.
         task: the task to play: "warehouse", another name that the package knows, or the import path
-            "package.module:OBJECT" of a `tasks.Task`; in Python also the object itself.
+            "package.module:OBJECT" of a `tasks.Task`; in Python also the task itself.
         policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
             `act`.
         seeds: number of seeds, the same for every condition.
