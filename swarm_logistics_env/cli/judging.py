@@ -218,10 +218,10 @@ def _judge_policy(
     if tally.left:
         typer.echo(f"Stopped after {minutes:g} minutes; the same command goes on: {command}")
     elif any(test.conclusion == "inconclusive" for test in results.verdicts):
-        new = shlex.quote(f"{out}-{2 * seeds}")
+        more = max(MOST_SEEDS, 2 * seeds)
         typer.echo(
             "What is open needs more seeds, from the start: swarm-logistics judge "
-            f"{shlex.quote(asked)} --seeds {2 * seeds} --out {new}"
+            f"{shlex.quote(asked)} --seeds {more} --out {shlex.quote(f'{out}-{more}')}"
         )
     typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}"))
     return tally.failed

@@ -252,7 +252,7 @@ def in_a_sentence(results: StudyResults) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
     known = [test for test in results.verdicts if test.interval]
     words = section.counted(said(test.conclusion) for test in results.verdicts)
-    told = f"{_performance(results)[:-1]} ({section.seeds_text(results)})"
+    told = f"{_performance(results)[:-1]} over {section.seeds_text(results)}"
     told += f"; of {len(results.verdicts)} questions {words} (Holm)"
     if known:
         worst = min(known, key=lambda test: test.value or 0.0)
