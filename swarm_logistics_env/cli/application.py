@@ -147,9 +147,7 @@ FaultOption = Annotated[
 ]
 PolicyOption = Annotated[
     str,
-    typer.Option(
-        help="Name (`list policies`), path of a policy file, or package.module:Class."
-    ),
+    typer.Option(help="Name (`list policies`), path of a policy file, or package.module:Class."),
 ]
 SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[

@@ -72,11 +72,12 @@ class Line:
     def verdict(self) -> str:
         """The verdicts in words, and what an open one takes."""
         words = [said(test.conclusion) for test in self.tests]
+        test, problems = self.tests[0], {test.problem for test in self.tests}
+        if test.estimate is None and (len(self.tests) == 1 or len(problems) == 1):
+            return f"undefined: {test.problem}"
         if len(self.tests) > 1:
             return words[0] if len(set(words)) == 1 else section.counted(words)
-        (test,) = self.tests
-        if test.estimate is None:
-            return f"undefined: {test.problem}"
+        assert test.estimate is not None
         if test.conclusion == UNAFFECTED:
             return f"{words[0]}, exact"
         more = _seeds_more(test.estimate)
@@ -227,9 +228,10 @@ def _performance(results: StudyResults) -> str:
 
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
+    failed = f" ({cell.problem})" if cell.problem else ""
     if cell.by_seed.any():
-        return section.mean_p(cell)
-    return f"0 (at most {-math.log(0.05) / cell.n_seeds:.2f}, as no run delivered anything)"
+        return section.mean_p(cell) + failed
+    return f"0{failed} (at most {-math.log(0.05) / cell.n_seeds:.2f}, as no run delivered anything)"
 
 
 def _last(results: StudyResults) -> str:
