@@ -70,7 +70,7 @@ class Plan:
     @cached_property
     def runs(self) -> tuple[Run, ...]:
         """Every run, seed by seed, so that an interrupted study has complete seeds."""
-        return tuple(case.run(self.code, seed) for seed in self.seeds for case in self.cases)
+        return tuple(Run(case, self.code, seed) for seed in self.seeds for case in self.cases)
 
     def __str__(self) -> str:
         asked, run = len(self.cells), len(self.cases)
