@@ -310,12 +310,3 @@ def _filled(first: Sequence[str], second: Sequence[str]) -> Iterator[tuple[str, 
 def _fold(text: str, width: int) -> list[str]:
     # Paths and names are longer than a line sometimes: they are broken, never cut.
     return textwrap.wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
-
-
-def forest(found: Answer) -> tuple[tuple[str, tuple[Verdict, ...]], ...]:
-    """Return the lines as a forest plot shows them: a label, and the verdicts drawn beside it."""
-    several = len({line.policy for line in found.lines}) > 1
-    return tuple(
-        (f"{line.policy}: {line.question}" if several else line.question, line.tests)
-        for line in found.lines
-    )

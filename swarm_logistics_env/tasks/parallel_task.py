@@ -30,7 +30,7 @@ from .parallel_policies import (
     observation_rows,
 )
 from .performance import Gain, SumOfRewards, in_words, name_of, performance_of
-from .task import Case, Conditions, Fields, Outcome
+from .task import Case, Fields, Outcome, TaskScenario
 
 # These files decide what a run in somebody else's environment gives.
 ENVIRONMENT_SOURCES = (
@@ -151,7 +151,7 @@ class ParallelTask:
             repr(settings), (self._make_env, self._gain), lambda: self._made(self.default, ())
         )
 
-    def vary(self, base: Conditions, fields: Fields) -> ParallelScenario:
+    def vary(self, base: TaskScenario, fields: Fields) -> ParallelScenario:
         """Return a scenario with some fields changed.
 
         Raises:

@@ -72,7 +72,7 @@ class Outcome:
         return len(self.delivery_times) if self.untimed is None else self.untimed
 
 
-class Conditions(Protocol):
+class TaskScenario(Protocol):
     """A scenario of a task: a record (`records.Record`) that says how many robots, and how long."""
 
     @property
@@ -121,7 +121,7 @@ class Task(Protocol):
     performance: str
 
     @property
-    def default(self) -> Conditions:
+    def default(self) -> TaskScenario:
         """The scenario from which a study's own is varied."""
 
     @property
@@ -139,7 +139,7 @@ class Task(Protocol):
     def code(self) -> str:
         """Return a text that changes whenever the task's runs may have changed."""
 
-    def vary(self, base: Conditions, fields: Fields) -> Conditions:
+    def vary(self, base: TaskScenario, fields: Fields) -> TaskScenario:
         """Return a scenario with some fields changed.
 
         Raises:
@@ -182,7 +182,7 @@ class Case:
 
     policy: PolicySpec
     identity: str
-    scenario: Conditions
+    scenario: TaskScenario
     faults: tuple[TaskFault, ...] = ()
     behaviour: int = 0
     _: KW_ONLY

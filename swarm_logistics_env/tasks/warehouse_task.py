@@ -10,7 +10,7 @@ from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import Fault
 
-from .task import Case, Conditions, Fields, Outcome
+from .task import Case, Fields, Outcome, TaskScenario
 
 
 def code_version() -> str:
@@ -50,7 +50,7 @@ class WarehouseTask:
         """Return the version of the simulation."""
         return code_version()
 
-    def vary(self, base: Conditions, fields: Fields) -> Scenario:
+    def vary(self, base: TaskScenario, fields: Fields) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.
 
         Raises:
