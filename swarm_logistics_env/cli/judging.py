@@ -111,6 +111,7 @@ def judge_command(
         )  # fmt: skip
         raise typer.Exit(1 if failed else 0)
     from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.declaration import StoredStudy
     from swarm_logistics_env.studies.importing import import_results
 
     directory = out or _free(Path("results", "judged", Path(asked).stem))
@@ -123,7 +124,8 @@ def judge_command(
         decimal=decimal or ".",
         setup=_stated(setup or []),
     )
-    typer.echo(f"{count} runs in {asked}\n")
+    imported = StoredStudy.existing(directory).imported
+    typer.echo("\n".join([f"{count} runs in {asked}", *(imported.notes if imported else ()), ""]))
     _finish(Study.stored(directory).findings(), directory, full=full)
 
 

@@ -130,6 +130,7 @@ class Origin(Record):
         seeds: those that they name, ascending; empty: none.
         setup: what the user states about the trials, name and value.
         trials: the first of every condition, in the file's order.
+        notes: sentences on how the file was read.
     """
 
     error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
@@ -140,6 +141,7 @@ class Origin(Record):
     seeds: tuple[int, ...] = ()
     setup: tuple[tuple[str, str], ...] = ()
     trials: tuple[Trial, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 class StoredStudy(BaseModel):

@@ -67,6 +67,7 @@ def import_results(
         seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
         setup=tuple((setup or {}).items()),
         trials=tuple(replace(rows[0], times=None) for rows in conditions.values()),
+        notes=trials.notes,
     )
     specification = Specification(
         name=file_name(file.stem),
