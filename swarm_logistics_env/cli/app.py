@@ -156,6 +156,8 @@ def train_command(
         typer.echo("\nStopped. The same command goes on.", err=True)
         raise typer.Exit(130) from None
     typer.echo(f"Written: {path}")
+    typer.echo(f"Watch it: swarm-logistics watch --policy {shlex.quote(str(path))}")
+    typer.echo(f"Judge it: swarm-logistics judge {shlex.quote(str(path))}")
 
 
 def _train(
@@ -168,9 +170,10 @@ def _train(
     with _explained():
         import_module("tensorboard")  # missed before anything is written
         from swarm_logistics_env.train.trainer import train
-    path = train(
-        training, out or Path("results/train", training.name), command=command, device=device
-    )
+    out = out or Path("results/train", training.name)
+    log = shlex.quote(str(out / "tensorboard"))
+    typer.echo(f"To follow it: tensorboard --logdir {log}")
+    path = train(training, out, command=command, device=device)
     _show_training(path)
     return path
 
