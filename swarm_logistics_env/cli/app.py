@@ -1,23 +1,23 @@
-"""`swarm-logistics run`, `scenario`, `attack` and `train`; the other commands are added here."""
+"""`swarm-logistics run`, `list`, `attack` and `train`; the other commands are added here."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.errors import SetupError, TrainingError
 from swarm_logistics_env.train.training import preset_names
 
 from .application import (
     Application,
     FaultOption,
-    PolicyOption,
     PresetOption,
     ScenarioOption,
     SeedOption,
@@ -28,7 +28,7 @@ from .application import (
 )
 from .judging import judge_command
 from .study_commands import ProcessesOption, study
-from .watch import film_command, watch_command
+from .watch import watch_command, write_film_of
 
 if TYPE_CHECKING:
     from swarm_logistics_env.attack import AttackResult
@@ -156,6 +156,8 @@ def train_command(
         typer.echo("\nStopped. The same command goes on.", err=True)
         raise typer.Exit(130) from None
     typer.echo(f"Written: {path}")
+    typer.echo(f"Watch it: swarm-logistics watch --policy {shlex.quote(str(path))}")
+    typer.echo(f"Judge it: swarm-logistics judge {shlex.quote(str(path))}")
 
 
 def _train(
@@ -168,9 +170,10 @@ def _train(
     with _explained():
         import_module("tensorboard")  # missed before anything is written
         from swarm_logistics_env.train.trainer import train
-    path = train(
-        training, out or Path("results/train", training.name), command=command, device=device
-    )
+    out = out or Path("results/train", training.name)
+    log = shlex.quote(str(out / "tensorboard"))
+    typer.echo(f"To follow it: tensorboard --logdir {log}")
+    path = train(training, out, command=command, device=device)
     _show_training(path)
     return path
 
@@ -213,6 +216,144 @@ def _explained() -> Iterator[None]:
         ) from error
 
 
+def run_command(
+    policies: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--policy",
+            help="Name (`list policies`), path of a policy file, or package.module:Class; swarm-dt "
+            "if not given. With --film it may be repeated.",
+        ),
+    ] = None,
+    seed: SeedOption = 0,
+    preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
+    changes: SetOption = None,
+    faults: FaultOption = None,
+    film: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mp4|FILE.gif",
+            help="Write the episode as a film; several policies stand side by side.",
+        ),
+    ] = None,
+    twin: Annotated[
+        bool,
+        typer.Option("--twin", help="In the film beside the same seed without its faults."),
+    ] = False,
+    until: Annotated[
+        float | None, typer.Option(help="Where the film ends [s]; with the episode if not given.")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="How many times real time the film plays.")] = 4.0,
+    trust_code: TrustPolicyOption = False,
+) -> None:
+    """Play one episode and print what it delivered, or write it as a film."""
+    import time
+
+    from swarm_logistics_env.episode import run_episode
+    from swarm_logistics_env.policies import called, load
+
+    scenario = scenario_of(preset, scenario_file, changes)
+    scheduled = faults_of(faults, scenario)
+    names = policies or ["swarm-dt"]
+    if film is not None:
+        write_film_of(
+            film, scenario, names, seed, scheduled, until, speed,
+            twin=twin, load=lambda name: load(name, trust_code=trust_code),
+        )  # fmt: skip
+        return
+    if twin or until is not None or len(names) > 1:
+        raise SetupError("--twin, --until, several --policy: are for a film, with --film FILE.mp4")
+    player = load(names[0], trust_code=trust_code)
+    # This compiles the kernels, so that the time below is that of the episode alone.
+    run_episode(scenario.replace(duration=scenario.control_period), player, seed)
+    start = time.perf_counter()
+    episode = run_episode(scenario, player, seed, scheduled)
+    wall = time.perf_counter() - start
+    times = episode.delivery_times
+    of = "" if scenario.restock else f" of {scenario.n_items}"
+    typer.echo(
+        f"P = {episode.delivered} items delivered{of} in {episode.ended_at:g} s "
+        f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
+    )
+    if len(times):
+        gaps = [after - before for before, after in zip([0.0, *times], times)]
+        typer.echo(
+            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, "
+            f"{sum(gaps) / len(gaps):.1f} s apart on average, at most {max(gaps):.1f} s"
+        )
+    if episode.failed_robots:
+        typer.echo(
+            f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
+            f"them for {episode.anchoring_seconds:.1f} robot-seconds"
+        )
+    typer.echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")
+
+
+class Listed(StrEnum):
+    """What `list` can list."""
+
+    policies = "policies"
+    faults = "faults"
+    studies = "studies"
+    scenario = "scenario"
+
+
+def list_command(
+    what: Annotated[Listed, typer.Argument(help="What to list.")],
+    preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
+    changes: SetOption = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Of a scenario: JSON, which --scenario reads.")
+    ] = False,
+) -> None:
+    """List policies, faults (failure modes), studies, or every condition of a scenario."""
+    from swarm_logistics_env.scenario import SOURCES
+
+    from .terminal_tables import show_table
+
+    if what is Listed.scenario:
+        chosen = scenario_of(preset, scenario_file, changes)
+        if as_json:
+            typer.echo(chosen.to_json())
+            return
+        marks = (
+            "fitted: chosen to bring the paper's tables closest. chosen: without a source. "
+            "off: added here, left out."
+        )
+        sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
+        columns = ("condition", "value", "unit, meaning; source")
+        show_table(f"Preset {preset}", columns, chosen.conditions(), marks, sources)
+    elif what is Listed.policies:
+        from swarm_logistics_env.policies import known_policies
+
+        line = "Your own is package.module:Class, or the path of a file that `train` wrote."
+        show_table("Policies", ("name", "kind", "about"), known_policies(), line)
+    elif what is Listed.faults:
+        from swarm_logistics_env.warehouse import FAILURE_MODES
+
+        rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
+        line = "As --fault takes one: MODE:ROBOTS@ONSET, e.g. FM4:2@200"
+        show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
+    else:
+        from swarm_logistics_env.studies import Study
+        from swarm_logistics_env.studies.presets import PRESETS
+
+        plans = [(name, Study.preset(name).plan()) for name in PRESETS]
+        found = [
+            (
+                name,
+                str(len(plan.seeds)),
+                str(len(plan.runs)),
+                "; ".join(dict.fromkeys(table for _, table, _ in plan.cells)),
+            )
+            for name, plan in plans
+        ]
+        line = "swarm-logistics study plan NAME says how long one takes; study run NAME plays it."
+        show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)
+
+
 app = Application(
     name="swarm-logistics",
     help="A warehouse for robot swarms, and the measure of how they cope.",
@@ -220,12 +361,14 @@ app = Application(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.add_typer(study)
-app.command("train")(train_command)
-app.command("film")(film_command)
+# In the order of use, as the help shows them.
 app.command("watch")(watch_command)
+app.command("run")(run_command)
+app.command("train")(train_command)
 app.command("judge")(judge_command)
 app.command("attack")(attack_command)
+app.command("list")(list_command)
+app.add_typer(study)
 
 
 def _print_version(wanted: bool) -> None:
@@ -246,85 +389,3 @@ def options(
     ] = False,
 ) -> None:
     """Take the options that stand before a command."""
-
-
-@app.command("scenario")
-def scenario_command(
-    preset: PresetOption = "paper",
-    scenario_file: ScenarioOption = None,
-    changes: SetOption = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON, which can be read back.")
-    ] = False,
-) -> None:
-    """Print every condition of a run: value, unit, and whether the default is sourced or fitted."""
-    from swarm_logistics_env.scenario import SOURCES
-
-    from .terminal_tables import show_table
-
-    chosen = scenario_of(preset, scenario_file, changes)
-    if as_json:
-        typer.echo(chosen.to_json())
-        return
-    marks = (
-        "fitted: chosen to bring the paper's tables closest. chosen: without a source. "
-        "off: added here, left out."
-    )
-    sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
-    columns = ("condition", "value", "unit, meaning; source")
-    show_table(f"Scenario, from the preset {preset}", columns, chosen.conditions(), marks, sources)
-
-
-@app.command("policies")
-def policies_command() -> None:
-    """List the policies that can be called by name."""
-    from swarm_logistics_env.policies import known_policies
-
-    from .terminal_tables import show_table
-
-    line = "A policy of your own is package.module:Class, or the path of a file that `train` wrote."
-    show_table("Policies", ("name", "kind", "about"), known_policies(), line)
-
-
-@app.command("run")
-def run_command(
-    policy: PolicyOption = "swarm-dt",
-    seed: SeedOption = 0,
-    preset: PresetOption = "paper",
-    scenario_file: ScenarioOption = None,
-    changes: SetOption = None,
-    faults: FaultOption = None,
-    trust_code: TrustPolicyOption = False,
-) -> None:
-    """Play one episode and print what it delivered."""
-    import time
-
-    from swarm_logistics_env import policies
-    from swarm_logistics_env.episode import run_episode
-
-    scenario = scenario_of(preset, scenario_file, changes)
-    scheduled = faults_of(faults, scenario)
-    player = policies.load(policy, trust_code=trust_code)
-    # This compiles the kernels, so that the time below is that of the episode alone.
-    run_episode(scenario.replace(duration=scenario.control_period), player, seed)
-    start = time.perf_counter()
-    episode = run_episode(scenario, player, seed, scheduled)
-    wall = time.perf_counter() - start
-    times = episode.delivery_times
-    of = "" if scenario.restock else f" of {scenario.n_items}"
-    typer.echo(
-        f"P = {episode.delivered} items delivered{of} in {episode.ended_at:g} s "
-        f"by {scenario.n_robots} robots with {policies.called(policy)}, seed {seed}"
-    )
-    if len(times):
-        gaps = [after - before for before, after in zip([0.0, *times], times)]
-        typer.echo(
-            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, "
-            f"{sum(gaps) / len(gaps):.1f} s apart on average, at most {max(gaps):.1f} s"
-        )
-    if episode.failed_robots:
-        typer.echo(
-            f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
-            f"them for {episode.anchoring_seconds:.1f} robot-seconds"
-        )
-    typer.echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")

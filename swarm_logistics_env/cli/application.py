@@ -48,7 +48,7 @@ class Application(typer.Typer):
             sys.path.append("")
         try:
             command = typer.main.get_command(self)
-            _show_brackets(command)
+            _show_help_well(command)
             # What made a file is recorded in it: the command line is the context's object.
             typed = sys.argv[1:] if arguments is None else arguments
             words = shlex.join(["swarm-logistics", *typed])
@@ -66,13 +66,15 @@ class Application(typer.Typer):
         return code if isinstance(code, int) else 0
 
 
-def _show_brackets(command: Any) -> None:
-    """Escape the help texts of a command and of those below it: Rich reads `[px]` as a style."""
+def _show_help_well(command: Any) -> None:
+    """Escape the help of a command and of those below it: Rich reads `[px]` as a style."""
     command.help = escape(command.help or "")
-    for parameter in command.params:
+    for parameter in command.get_params(typer.Context(command)):
         parameter.help = escape(getattr(parameter, "help", None) or "")
+        if getattr(parameter, "is_flag", False):
+            parameter.metavar = " "  # a flag takes no value, though Typer shows its type
     for below in getattr(command, "commands", {}).values():
-        _show_brackets(below)
+        _show_help_well(below)
 
 
 def _sentence(error: Exception) -> str | None:
@@ -128,7 +130,7 @@ ScenarioOption = Annotated[
     typer.Option(
         "--scenario",
         metavar="FILE",
-        help="TOML or JSON file of fields to change, as `scenario --json` writes it.",
+        help="TOML or JSON file of fields to change, as `list scenario --json` writes it.",
     ),
 ]
 SetOption = Annotated[
@@ -145,9 +147,7 @@ FaultOption = Annotated[
 ]
 PolicyOption = Annotated[
     str,
-    typer.Option(
-        help="Name (`policies` lists them), path of a policy file, or package.module:Class."
-    ),
+    typer.Option(help="Name (`list policies`), path of a policy file, or package.module:Class."),
 ]
 SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[

@@ -111,6 +111,7 @@ def judge_command(
         )  # fmt: skip
         raise typer.Exit(1 if failed else 0)
     from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.declaration import StoredStudy
     from swarm_logistics_env.studies.importing import import_results
 
     directory = out or _free(Path("results", "judged", Path(asked).stem))
@@ -123,7 +124,8 @@ def judge_command(
         decimal=decimal or ".",
         setup=_stated(setup or []),
     )
-    typer.echo(f"{count} runs in {asked}\n")
+    imported = StoredStudy.existing(directory).imported
+    typer.echo("\n".join([f"{count} runs in {asked}", *(imported.notes if imported else ()), ""]))
     _finish(Study.stored(directory).findings(), directory, full=full)
 
 
@@ -218,10 +220,10 @@ def _judge_policy(
     if tally.left:
         typer.echo(f"Stopped after {minutes:g} minutes; the same command goes on: {command}")
     elif any(test.conclusion == "inconclusive" for test in results.verdicts):
-        new = shlex.quote(f"{out}-{2 * seeds}")
+        more = max(MOST_SEEDS, 2 * seeds)
         typer.echo(
             "What is open needs more seeds, from the start: swarm-logistics judge "
-            f"{shlex.quote(asked)} --seeds {2 * seeds} --out {new}"
+            f"{shlex.quote(asked)} --seeds {more} --out {shlex.quote(f'{out}-{more}')}"
         )
     typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}"))
     return tally.failed

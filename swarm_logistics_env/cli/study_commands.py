@@ -16,7 +16,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 if TYPE_CHECKING:
     from swarm_logistics_env.report.document import Document
     from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.gate import Answer
+    from swarm_logistics_env.studies.gate import GateAnswer
     from swarm_logistics_env.studies.play import Engine, Shard, Tally
     from swarm_logistics_env.studies.results import StudyResults
 
@@ -332,7 +332,7 @@ def compare_command(
     raise typer.Exit(1 if failed else 0)
 
 
-def _show_answers(title: str, found: tuple[Answer, ...], left_out: tuple[str, ...]) -> None:
+def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str, ...]) -> None:
     from swarm_logistics_env.report.section import bracketed, said
 
     from .terminal_tables import show_table

@@ -1,4 +1,4 @@
-"""`swarm-logistics watch` and `film`."""
+"""`swarm-logistics watch`, and films."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from .application import (
     PolicyOption,
     PresetOption,
     ScenarioOption,
-    SeedOption,
     SetOption,
     TrustPolicyOption,
     faults_of,
@@ -20,9 +19,14 @@ from .application import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from swarm_logistics_env.policies import Policy
+    from swarm_logistics_env.scenario import Scenario
     from swarm_logistics_env.warehouse.faults import Fault
+
+FRAME_RATE = 25.0  # frames a second
+FILM_SIZE = 480  # longer side of each warehouse [px]
 
 
 def watch_command(
@@ -84,54 +88,30 @@ def watch_command(
     typer.echo(f"{save}: {session.run.world.state.time:g} s, {len(page) / 1e6:.2f} MB")
 
 
-def film_command(
-    out: Annotated[
-        Path,
-        typer.Argument(metavar="FILE.mp4|FILE.gif", help="The film; an older one is replaced."),
-    ],
-    policies: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--policy",
-            help="Name (`policies` lists them), path of a policy file, or package.module:Class; "
-            "may be repeated.",
-        ),
-    ] = None,
-    seed: SeedOption = 0,
-    preset: PresetOption = "paper",
-    scenario_file: ScenarioOption = None,
-    changes: SetOption = None,
-    faults: FaultOption = None,
-    twin: Annotated[
-        bool, typer.Option("--twin", help="Show each run beside the same seed without faults.")
-    ] = False,
-    until: Annotated[
-        float | None,
-        typer.Option(help="Where the film ends [s of the run]; with the episode if not given."),
-    ] = None,
-    speed: Annotated[float, typer.Option(help="How many times real time it plays.")] = 4.0,
-    frame_rate: Annotated[float, typer.Option("--fps", help="Frames a second.")] = 25.0,
-    size: Annotated[int, typer.Option(help="Longer side of each warehouse [px].")] = 480,
-    trails: Annotated[bool, typer.Option("--trails", help="Draw the paths of robots.")] = False,
-    links: Annotated[
-        bool,
-        typer.Option(
-            "--links", help="Draw which robot each follows; otherwise for the carrier only."
-        ),
-    ] = False,
-    trust_code: TrustPolicyOption = False,
+def write_film_of(
+    out: Path,
+    scenario: Scenario,
+    policies: Sequence[str],
+    seed: int,
+    faults: Sequence[Fault],
+    until: float | None,
+    speed: float,
+    *,
+    twin: bool,
+    load: Callable[[str], Policy],
 ) -> None:
-    """Write an episode as a film; several policies, or with and without faults, side by side."""
+    """Write episodes as a film, one policy, or with and without faults, beside the other.
+
+    Raises:
+        SetupError: the file's name or the extra for films does not do, or there is no fault.
+    """
     from rich.console import Console
     from rich.progress import Progress
 
     from swarm_logistics_env.errors import SetupError
-    from swarm_logistics_env.policies import load
     from swarm_logistics_env.rendering.renderer import check_film, load_pygame, write_film
 
-    scenario = scenario_of(preset, scenario_file, changes)
-    scheduled = faults_of(faults, scenario)
-    if twin and not scheduled:
+    if twin and not faults:
         raise SetupError("--twin: shows the run without its faults, so --fault should be given")
     check_film(out)
     load_pygame()
@@ -139,20 +119,18 @@ def film_command(
     from swarm_logistics_env.watch.film import Film, Take
 
     takes = []
-    for name in policies or ["swarm-dt"]:
-        for these in ((), scheduled) if twin else (scheduled,):
-            title = _title(name, these) if scheduled else _short(name)
-            play = Play(scenario, load(name, trust_code=trust_code), seed, these)
-            takes.append(Take(title, play))
+    for name in policies:
+        for these in ((), faults) if twin else (faults,):
+            title = _title(name, these) if faults else _short(name)
+            takes.append(Take(title, Play(scenario, load(name), seed, these)))
     end = scenario.duration if until is None else until
-    film = Film(takes, end, speed, frame_rate, size, trails=trails, all_links=links)
+    film = Film(takes, end, speed, FRAME_RATE, FILM_SIZE)
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         frames = progress.track(film.frames(), total=film.n_frames, description=out.name)
-        count = write_film(out, frames, frame_rate)
-    typer.echo(
-        f"{out}: {count} frames, {count / frame_rate:.1f} s, {out.stat().st_size / 1e6:.2f} MB"
-    )
+        count = write_film(out, frames, FRAME_RATE)
+    size = out.stat().st_size / 1e6
+    typer.echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
 
 
 def _short(policy: str) -> str:

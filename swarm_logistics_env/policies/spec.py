@@ -181,7 +181,8 @@ class PolicySpec(Record):
         if self.made is not None:
             if not (makers or isinstance(self.made, Policy)):
                 raise PolicyError(f"policy {self.made!r}: should have the methods reset and act")
-            return _copied(self.made)
+            own: Policy = copy.deepcopy(self.made)
+            return own
         if self.name in makers:
             try:
                 made: Policy = makers[self.name](**self.parameters)
@@ -191,8 +192,8 @@ class PolicySpec(Record):
         if makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         if makers and self.name.endswith(SB3_SUFFIX):
-            return _copied(_model(self.name))
-        return _copied(_loaded(self.name, canonical_json(self.parameters)))
+            return copy.deepcopy(_model(self.name))
+        return copy.deepcopy(_loaded(self.name, canonical_json(self.parameters)))
 
     def identity(self, makers: Makers = NO_MAKERS) -> str:
         """Return text that changes whenever the policy's behaviour may have; `makers` as `load`."""
@@ -203,10 +204,6 @@ class PolicySpec(Record):
             if self.parameters
             else found
         )
-
-
-def _copied(policy: Policy) -> Policy:
-    return copy.deepcopy(policy)
 
 
 @functools.lru_cache(maxsize=8)

@@ -72,11 +72,12 @@ class Line:
     def verdict(self) -> str:
         """The verdicts in words, and what an open one takes."""
         words = [said(test.conclusion) for test in self.tests]
+        test, problems = self.tests[0], {test.problem for test in self.tests}
+        if test.estimate is None and (len(self.tests) == 1 or len(problems) == 1):
+            return f"undefined: {test.problem}"
         if len(self.tests) > 1:
             return words[0] if len(set(words)) == 1 else section.counted(words)
-        (test,) = self.tests
-        if test.estimate is None:
-            return f"undefined: {test.problem}"
+        assert test.estimate is not None
         if test.conclusion == UNAFFECTED:
             return f"{words[0]}, exact"
         more = _seeds_more(test.estimate)
@@ -227,9 +228,10 @@ def _performance(results: StudyResults) -> str:
 
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
+    failed = f" ({cell.problem})" if cell.problem else ""
     if cell.by_seed.any():
-        return section.mean_p(cell)
-    return f"0 (at most {-math.log(0.05) / cell.n_seeds:.2f}, as no run delivered anything)"
+        return section.mean_p(cell) + failed
+    return f"0{failed} (at most {-math.log(0.05) / cell.n_seeds:.2f}, as no run delivered anything)"
 
 
 def _last(results: StudyResults) -> str:
@@ -252,7 +254,7 @@ def in_a_sentence(results: StudyResults) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
     known = [test for test in results.verdicts if test.interval]
     words = section.counted(said(test.conclusion) for test in results.verdicts)
-    told = f"{_performance(results)[:-1]} ({section.seeds_text(results)})"
+    told = f"{_performance(results)[:-1]} over {section.seeds_text(results)}"
     told += f"; of {len(results.verdicts)} questions {words} (Holm)"
     if known:
         worst = min(known, key=lambda test: test.value or 0.0)
@@ -308,12 +310,3 @@ def _filled(first: Sequence[str], second: Sequence[str]) -> Iterator[tuple[str, 
 def _fold(text: str, width: int) -> list[str]:
     # Paths and names are longer than a line sometimes: they are broken, never cut.
     return textwrap.wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
-
-
-def forest(found: Answer) -> tuple[tuple[str, tuple[Verdict, ...]], ...]:
-    """Return the lines as a forest plot shows them: a label, and the verdicts drawn beside it."""
-    several = len({line.policy for line in found.lines}) > 1
-    return tuple(
-        (f"{line.policy}: {line.question}" if several else line.question, line.tests)
-        for line in found.lines
-    )

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
+from pydantic import JsonValue
+
 from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
 from swarm_logistics_env.studies.plan import Plan
@@ -194,7 +196,7 @@ def _identified(identity: str) -> tuple[str, str, str]:
     return identity, NOTHING, NOTHING
 
 
-def _listed(parameters: object) -> str:
+def _listed(parameters: JsonValue) -> str:
     if not isinstance(parameters, dict):
         return str(parameters)
     return ", ".join(f"{name} = {value}" for name, value in parameters.items())

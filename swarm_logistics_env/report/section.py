@@ -35,7 +35,7 @@ WORDS = {
     "blocked": "undefined",
 }
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
-Record = TypeVar("Record")
+Row = TypeVar("Row")
 
 
 @dataclass
@@ -81,8 +81,8 @@ class Section:
     def table(
         cls,
         title: str,
-        records: Iterable[Record],
-        columns: Sequence[tuple[str, Callable[[Record], str]]],
+        records: Iterable[Row],
+        columns: Sequence[tuple[str, Callable[[Row], str]]],
         *lines: str,
     ) -> Section:
         """Return a table with a row for each record, and lines of text below it.

@@ -70,11 +70,13 @@ class Trials:
         file: its name.
         digest: of its content, 16 hexadecimal digits.
         rows: the runs.
+        notes: sentences on how the file was read.
     """
 
     file: str
     digest: str
     rows: tuple[Trial, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def paired(self) -> bool:
@@ -143,7 +145,7 @@ def read_trials(
         raise IndicatorError(f"{path} holds no trial: should have a row for each below the names")
     _check_pairing(path, rows)
     _check_durations(path, rows)
-    return Trials(path.name, hashlib.sha256(content).hexdigest()[:16], tuple(rows))
+    return Trials(path.name, hashlib.sha256(content).hexdigest()[:16], tuple(rows), table.notes)
 
 
 def _runs(table: Table, duration: float | None) -> list[Trial]:

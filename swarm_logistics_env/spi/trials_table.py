@@ -118,6 +118,16 @@ class Table:
         value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
         return value if math.isfinite(value) else None
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on faults that are spelled in several ways and taken for one."""
+        faults = dict.fromkeys(self.text(row, "fault") for row in range(len(self.rows)))
+        others = (name for name in faults if name != self.spellings[name.casefold()])
+        return tuple(
+            f"The faults {self.spellings[name.casefold()]} and {name} are taken for one."
+            for name in others
+        )
+
     @cached_property
     def spellings(self) -> dict[str, str]:
         """Each fault in small letters to the way in which its first row has it."""
@@ -135,7 +145,7 @@ def read_table(
     """Return the table in a file, and the file's bytes.
 
     Args:
-        columns: what a column is (a key of `NAMES`) to its name in the file.
+        columns: what a column is (a word of `NAMES`) to its name in the file.
         ignore: names of columns to leave out.
         decimal: the sign before decimals, "." or ",".
 
@@ -194,8 +204,9 @@ def _columns(
 ) -> tuple[dict[str, int], tuple[int, ...]]:
     """Return where each known column is, and which columns are left as parameters."""
     for column in columns:
-        if column not in NAMES:
-            raise IndicatorError(f"--column {column}: {_one_of(column, NAMES)}")
+        if column not in _MEANING:
+            raise IndicatorError(f"--column {column}: {_one_of(column, _MEANING)}")
+    columns = {_MEANING[column]: name for column, name in columns.items()}
     for name in (*columns.values(), *ignore):
         if name not in header:
             raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, header)}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import reduce
 from typing import TYPE_CHECKING
 
 from .verdict import Cell, Verdict
@@ -102,14 +101,13 @@ def _frame(rows: Sequence[Cell | Verdict], columns: Columns) -> pd.DataFrame:
     return pd.DataFrame(
         {
             # Missing texts stay None, which pandas would turn into NaN.
-            name: pd.Series(
-                [reduce(_get, place.split("."), row) for row in rows],
-                dtype=float if kind is float else object,
-            )
+            name: pd.Series([_at(row, place) for row in rows], dtype=kind if kind is float else "O")
             for name, (kind, place, _) in columns.items()
         }
     )
 
 
-def _get(record: object, name: str) -> object:
-    return getattr(record, name, None)
+def _at(record: object, place: str) -> object:
+    for name in place.split("."):
+        record = getattr(record, name, None)
+    return record

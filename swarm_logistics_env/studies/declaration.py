@@ -48,7 +48,7 @@ class StoredSpecification(BaseModel):
         """
         if task is None and ":" not in self.task and self.task not in NAMES:
             raise StudyError(
-                f"{place}: was played on the task {self.task!r}, an object: should be handed over "
+                f"{place}: was played on the task {self.task!r} of a script: should be handed over "
                 "again, as Study.stored(.., task=..)"
             )
         if task is None:
@@ -130,6 +130,7 @@ class Origin(Record):
         seeds: those that they name, ascending; empty: none.
         setup: what the user states about the trials, name and value.
         trials: the first of every condition, in the file's order.
+        notes: sentences on how the file was read.
     """
 
     error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
@@ -140,6 +141,7 @@ class Origin(Record):
     seeds: tuple[int, ...] = ()
     setup: tuple[tuple[str, str], ...] = ()
     trials: tuple[Trial, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 class StoredStudy(BaseModel):

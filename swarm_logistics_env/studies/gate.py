@@ -26,12 +26,14 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.tasks.task import TaskFault, TaskScenario
 
 from .results import StudyResults
 from .specification import seeds_in_words
 from .verdict import Cell, judge_one, same_runs
 
-_Content = tuple[object, ...]  # everything about a condition but its policy
+# All about a condition but its policy: scenario, faults, behaviour and table.
+_Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
@@ -240,7 +242,7 @@ _Found = Estimate | float | str
 
 
 @dataclass(frozen=True)
-class Answer:
+class GateAnswer:
     """The answer of one comparison or condition to a gate.
 
     Attributes:
@@ -261,7 +263,7 @@ class Answer:
     problem: str | None = None
 
 
-def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[Answer, ...]:
+def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswer, ...]:
     """Return what everything that a gate is about says to it.
 
     A change is asked of every judged policy: one that the other study gives nothing to compare
@@ -281,13 +283,13 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[Answer, .
     return tuple(_answer(gate, name, value, verdicts) for name, value in asked)
 
 
-def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -> Answer:
+def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -> GateAnswer:
     if isinstance(value, str):
-        return Answer(name, fails=True, problem=value)
+        return GateAnswer(name, fails=True, problem=value)
     if isinstance(value, float):
-        return Answer(name, gate.holds_for(value), exact=value)
+        return GateAnswer(name, gate.holds_for(value), exact=value)
     verdict = next(verdicts)
-    return Answer(name, gate.fails_on(verdict), estimate=value, verdict=verdict)
+    return GateAnswer(name, gate.fails_on(verdict), estimate=value, verdict=verdict)
 
 
 def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:

@@ -23,6 +23,7 @@ from .declaration import Declaration, Origin, note
 from .plan import Plan
 from .runs import FILE_NAME, Runs
 from .specification import Specification
+from .verdict import grouped
 
 
 def import_results(
@@ -58,9 +59,7 @@ def import_results(
         )
     except IndicatorError as error:
         raise StudyError(str(error)) from error
-    conditions: dict[object, list[Trial]] = {}
-    for row in trials.rows:
-        conditions.setdefault(row.condition, []).append(row)
+    conditions = grouped(trials.rows, lambda row: row.condition)
     origin = Origin(
         file=trials.file,
         digest=trials.digest,
@@ -68,6 +67,7 @@ def import_results(
         seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
         setup=tuple((setup or {}).items()),
         trials=tuple(replace(rows[0], times=None) for rows in conditions.values()),
+        notes=trials.notes,
     )
     specification = Specification(
         name=file_name(file.stem),

@@ -70,7 +70,7 @@ class Plan:
     @cached_property
     def runs(self) -> tuple[Run, ...]:
         """Every run, seed by seed, so that an interrupted study has complete seeds."""
-        return tuple(case.run(self.code, seed) for seed in self.seeds for case in self.cases)
+        return tuple(Run(case, self.code, seed) for seed in self.seeds for case in self.cases)
 
     def __str__(self) -> str:
         asked, run = len(self.cells), len(self.cases)
@@ -133,7 +133,7 @@ def make_plan(
 
 
 def _refuse_one_name_for_two(comparisons: Sequence[Comparison]) -> None:
-    found: dict[object, str] = {}
+    found: dict[tuple[str, str, Setting], str] = {}
     for comparison in comparisons:
         for arm in comparison.arms:
             place = comparison.policy, comparison.table, arm.setting
@@ -215,7 +215,7 @@ def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Co
     original = Arm(NO_FAULT, replace(base, scenario=scenario))
 
     def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Manner) -> Arm:
-        fault = task.fault(mode, m, onset, lasts, **manner)
+        fault = task.fault(mode, m, onset, lasts, manner)
         case = replace(base, scenario=scenario, faults=(fault,))
         return Arm(Setting("fault", mode, m, onset), case)
 

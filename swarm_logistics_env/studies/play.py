@@ -14,7 +14,7 @@ import threading
 import time
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
@@ -355,7 +355,7 @@ class Cluster:
         if not waiting:
             return
         ray, ours = self._connected()
-        pending: dict[object, Run] = {}
+        pending: dict[Hashable, Run] = {}
         try:
             sent = ray.remote(num_cpus=1, max_retries=RETRIES)(_play)
             # A policy travels with every run, so only a few runs are sent at a time.

@@ -28,7 +28,7 @@ from swarm_logistics_env.policies.spec import PolicySpec, called
 from swarm_logistics_env.records import FileName, Record, each_of, file_name, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.tasks.task import DEFAULT, Conditions, Task, refuse_untrusted, task_of
+from swarm_logistics_env.tasks.task import DEFAULT, Task, TaskScenario, refuse_untrusted, task_of
 
 Fields = dict[str, JsonValue]
 Manner = dict[str, float | tuple[float, float]]
@@ -194,7 +194,7 @@ class Specification(_Part):
         name: the study's name, of which its directory is called: at most 80 letters, digits, -, _
             and, within, points.
         task: the task to play: "warehouse", another name that the package knows, or the import path
-            "package.module:OBJECT" of a `tasks.Task`; in Python also the object itself.
+            "package.module:OBJECT" of a `tasks.Task`; in Python also the task itself.
         policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
             `act`.
         seeds: number of seeds, the same for every condition.
@@ -221,7 +221,7 @@ class Specification(_Part):
     ] = (PolicySpec(name="swarm-dt"),)
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
-    scenario: Annotated[Conditions, SkipValidation] = Field(default={}, validate_default=True)
+    scenario: Annotated[TaskScenario, SkipValidation] = Field(default={}, validate_default=True)
     sizes: Annotated[tuple[Sizes, ...], BeforeValidator(each_of(Sizes))] = ()
     faults: Annotated[tuple[Faults, ...], BeforeValidator(each_of(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(each_of(Parameter))] = ()

@@ -30,7 +30,7 @@ from .parallel_policies import (
     observation_rows,
 )
 from .performance import Gain, SumOfRewards, in_words, name_of, performance_of
-from .task import Case, Conditions, Outcome
+from .task import Case, Fields, Outcome, TaskScenario
 
 # These files decide what a run in somebody else's environment gives.
 ENVIRONMENT_SOURCES = (
@@ -151,7 +151,7 @@ class ParallelTask:
             repr(settings), (self._make_env, self._gain), lambda: self._made(self.default, ())
         )
 
-    def vary(self, base: Conditions, fields: Mapping[str, object]) -> ParallelScenario:
+    def vary(self, base: TaskScenario, fields: Fields) -> ParallelScenario:
         """Return a scenario with some fields changed.
 
         Raises:
@@ -166,7 +166,7 @@ class ParallelTask:
         )
 
     def fault(
-        self, mode: str, robots: int, onset: float, duration: float | None, **manner: object
+        self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> RobotFault:
         """Return the fault of some robots from `onset` on, for `duration` [s] or for good.
 
@@ -317,7 +317,7 @@ def _failed(seed: int, n_robots: int, faults: Sequence[RobotFault]) -> tuple[int
 
 
 def environment_version(
-    settings: str, functions: Iterable[object], make: Callable[[], Value]
+    settings: str, functions: Iterable[Callable[..., Value]], make: Callable[[], Value]
 ) -> str:
     """Return a digest of what decides a run in a parallel environment, and its libraries' versions.
 

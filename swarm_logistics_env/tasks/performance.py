@@ -67,8 +67,8 @@ def in_words(gain: Gain, references: tuple[float, float] | None) -> str:
     return words
 
 
-def name_of(function: object) -> str:
-    """Return the import path of a function, or how an object writes itself."""
+def name_of(function: Callable[..., Value]) -> str:
+    """Return the import path of a function, or how it writes itself."""
     if hasattr(function, "__qualname__"):
         return f"{getattr(function, '__module__', '')}:{function.__qualname__}"
     return repr(function)

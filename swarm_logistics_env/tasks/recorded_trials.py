@@ -10,7 +10,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.records import Record
 
-from .task import Case, Conditions, Outcome
+from .task import Case, Fields, Outcome, TaskScenario
 
 
 class RecordedScenario(Record):
@@ -60,13 +60,13 @@ class RecordedTrials:
         """Return a word in place of a code version: none made these runs."""
         return "imported"
 
-    def vary(self, base: Conditions, fields: Mapping[str, object]) -> RecordedScenario:
+    def vary(self, base: TaskScenario, fields: Fields) -> RecordedScenario:
         """Return the scenario of a file, of which nothing is varied by a study."""
         assert isinstance(base, RecordedScenario)
         return base.replace(**fields)
 
     def fault(
-        self, mode: str, robots: int, onset: float, duration: float | None, **_: object
+        self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> RecordedFault:
         """Return the fault; how long it lasted is not recorded."""
         return RecordedFault(mode=mode, robots=robots, onset=onset)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Protocol, runtime_checkable
+from typing import Annotated, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from swarm_logistics_env import streams
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.records import canonical_json
+
+Fields: TypeAlias = Mapping[str, object]  # of a record, by name
 
 
 def _ascending(times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -70,7 +72,7 @@ class Outcome:
         return len(self.delivery_times) if self.untimed is None else self.untimed
 
 
-class Conditions(Protocol):
+class TaskScenario(Protocol):
     """A scenario of a task: a record (`records.Record`) that says how many robots, and how long."""
 
     @property
@@ -81,7 +83,7 @@ class Conditions(Protocol):
     def duration(self) -> float:
         """Time at which a run ends at the latest [s]."""
 
-    def model_dump(self, *, mode: str = "python") -> dict[str, object]:
+    def model_dump(self, *, mode: str = "python") -> Fields:
         """Return its fields."""
 
     def conditions(self) -> list[tuple[str, str, str]]:
@@ -99,7 +101,7 @@ class TaskFault(Protocol):
     def onset(self) -> float:
         """When it begins [s]."""
 
-    def model_dump(self, *, mode: str = "python") -> dict[str, object]:
+    def model_dump(self, *, mode: str = "python") -> Fields:
         """Return its fields."""
 
 
@@ -119,7 +121,7 @@ class Task(Protocol):
     performance: str
 
     @property
-    def default(self) -> Conditions:
+    def default(self) -> TaskScenario:
         """The scenario from which a study's own is varied."""
 
     @property
@@ -137,7 +139,7 @@ class Task(Protocol):
     def code(self) -> str:
         """Return a text that changes whenever the task's runs may have changed."""
 
-    def vary(self, base: Conditions, fields: Mapping[str, object]) -> Conditions:
+    def vary(self, base: TaskScenario, fields: Fields) -> TaskScenario:
         """Return a scenario with some fields changed.
 
         Raises:
@@ -145,12 +147,12 @@ class Task(Protocol):
         """
 
     def fault(
-        self, mode: str, robots: int, onset: float, duration: float | None, **manner: object
+        self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> TaskFault:
         """Return the fault of some robots from `onset` on, for `duration` [s] or for good.
 
         Args:
-            manner: further fields of the task's own faults.
+            manner: further fields of the task's own faults; mostly empty.
 
         Raises:
             SwarmLogisticsError: the task cannot let robots fail so.
@@ -180,7 +182,7 @@ class Case:
 
     policy: PolicySpec
     identity: str
-    scenario: Conditions
+    scenario: TaskScenario
     faults: tuple[TaskFault, ...] = ()
     behaviour: int = 0
     _: KW_ONLY

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.policies.policy import code_digest
 from swarm_logistics_env.policies.spec import NO_MAKERS
@@ -12,7 +10,7 @@ from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import Fault
 
-from .task import Case, Conditions, Outcome
+from .task import Case, Fields, Outcome, TaskScenario
 
 
 def code_version() -> str:
@@ -52,7 +50,7 @@ class WarehouseTask:
         """Return the version of the simulation."""
         return code_version()
 
-    def vary(self, base: Conditions, fields: Mapping[str, object]) -> Scenario:
+    def vary(self, base: TaskScenario, fields: Fields) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.
 
         Raises:
@@ -65,7 +63,7 @@ class WarehouseTask:
         return base.replace(**changes)
 
     def fault(
-        self, mode: str, robots: int, onset: float, duration: float | None, **manner: object
+        self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> Fault:
         """Return the fault of some robots from `onset` on; `manner` is its further fields."""
         return Fault(mode, robots, onset=onset, duration=duration).replace(**manner)
