@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.studies.store import FILE_NAME, Store
+from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 
 
 def run_killed_and_resumed(file: Path, folder: Path, *options: str, kept: int) -> None:
@@ -41,12 +41,12 @@ def run_killed_and_resumed(file: Path, folder: Path, *options: str, kept: int) -
 
 def n_runs(directory: Path) -> int:
     try:
-        with Store.existing(directory) as store:
-            return len(store.succeeded())
+        with Runs.existing(directory) as runs:
+            return len(runs.succeeded())
     except StudyError:  # the tables are being made
         return 0
 
 
-def rows(directory: Path) -> list[dict[str, Any]]:
-    with Store.existing(directory) as store:
-        return list(store.rows())
+def rows(directory: Path) -> list[dict[Any, Any]]:
+    with Runs.existing(directory) as runs:
+        return runs.frame().to_dict("records")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.tasks.parallel_policies import observation_rows
 from swarm_logistics_env.tasks.task import task_of
 
@@ -38,7 +37,7 @@ def test_the_tasks_own_policy_is_better_than_random(shipped: str) -> None:
         STUDIES / f"{shipped}.toml", trust_code=True, seeds=2, sizes=sizes, faults=[], parameters=[]
     )
     assert study.run().failed == 0
-    p = [cell.mean for cell in rows_of(study.findings().performance) if cell.value == 4]
+    p = [c.mean.value for c in study.findings().cells if c.arm.setting.value == 4]
     assert p[0] > 2 * p[1]
 
 

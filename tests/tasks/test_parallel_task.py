@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -16,11 +15,9 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.study_commands import study_of
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.engines import execute
-from swarm_logistics_env.studies.performance_table import rows_of
-from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.tasks import ParallelTask, SumOfInfos, SumOfRewards
+from swarm_logistics_env.tasks import Case, ParallelTask, Run, SumOfInfos, SumOfRewards
 from tests.tasks.killing import run_killed_and_resumed
 from tests.tasks.lane import ACTIONS, FAILURES, LANE, OBSERVATIONS, STAY, WALK, Lane, Walker
 
@@ -43,25 +40,31 @@ values = [6, 12]
 FAULT = {"modes": ["silent"], "robots": [1]}
 
 
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    path = tmp_path / "lane.toml"
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("lane") / "lane.toml"
     path.write_text(STUDY)
     return path
 
 
+@pytest.fixture(scope="module")
+def study(file: Path) -> Study:
+    """The study of the file, played beside it."""
+    study = Study.from_file(file, out=file.parent / "out", trust_code=True)
+    # N = 2, 4 (which is no fault and length 6), silent, blind, removed, length 12; two policies.
+    tally = study.run()
+    assert (tally.played, tally.failed) == (6 * 2 * 4, 0)
+    return study
+
+
 def only_run(task: object, **fields: Any) -> Run:
     study = Study(**{"task": task, "seeds": 1, "policies": ["walker"], "faults": [FAULT], **fields})
-    return next(study.plan().runs())
+    return study.plan().runs[0]
 
 
-def test_a_study_plays_sizes_parameters_and_failure_modes(file: Path, tmp_path: Path) -> None:
-    study = Study.from_file(file, out=tmp_path / "out", trust_code=True)
-    tally = study.run()
-    # N = 2, 4 (which is no fault and length 6), silent, blind, removed, length 12; two policies.
-    assert (tally.played, tally.failed) == (6 * 2 * 4, 0)
+def test_a_study_plays_sizes_parameters_and_failure_modes(study: Study) -> None:
     results = study.findings()
-    p = {(c.policy, c.cell): c.by_seed for c in rows_of(results.performance)}
+    p = {(cell.policy, cell.words): cell.by_seed for cell in results.cells}
     assert p["walker", "N = 2"].mean() > 5
     assert p["walker", "length = 12"].mean() < p["walker", "length = 6"].mean()
     assert p["random", "N = 4"].mean() < p["walker", "N = 4"].mean()
@@ -69,27 +72,20 @@ def test_a_study_plays_sizes_parameters_and_failure_modes(file: Path, tmp_path: 
     assert p["walker", "silent, m = 1"].mean() < p["walker", "removed, m = 1"].mean()
     assert p["walker", "silent, m = 1"].tolist() == p["walker", "blind, m = 1"].tolist()
     by_hand = spi.fault_tolerance(
-        p["walker", "no fault"], p["walker", "silent, m = 1"], p["walker", "removed, m = 1"]
+        *(p["walker", name] for name in ("no fault", "silent, m = 1", "removed, m = 1"))
     )
-    (test,) = (
-        t
-        for t in rows_of(results.indicators)
-        if (t.policy, t.indicator, t.comparison) == ("walker", "FT", "silent, m = 1")
-    )
-    assert test.estimate is not None
-    assert test.estimate.value == by_hand.value
+    asked = {
+        (v.compared.policy, v.compared.indicator, v.compared.label): v for v in results.verdicts
+    }
+    assert asked["walker", "FT", "silent, m = 1"].value == by_hand.value
+    for outcome in results.outcomes.values():  # whole rewards are events with times
+        assert len(outcome.delivery_times) == outcome.delivered
+        assert (outcome.ended_at, outcome.untimed) == (40, None)
     study.report()
-    text = (tmp_path / "out" / "report.md").read_text()
+    assert study.out is not None
+    text = (study.out / "report.md").read_text()
     assert "Performance P is the sum of the rewards." in text
     assert "its actions are replaced by the task's no-op" in text
-
-
-def test_whole_rewards_are_events_with_times(file: Path) -> None:
-    study = Study.from_file(file, trust_code=True, seeds=1, policies=["walker"])
-    study.run()
-    outcomes = study.findings().outcomes.values()
-    assert all(len(o.delivery_times) == o.delivered for o in outcomes)
-    assert all(o.ended_at == 40 and o.untimed is None for o in outcomes)
 
 
 @pytest.mark.parametrize(("shared", "wanted"), [(False, 6.0), (True, 2.0)])
@@ -118,38 +114,31 @@ def test_an_event_is_at_the_end_of_its_step() -> None:
         period=0.5,
         performance=lambda env, *_: gains.get(env.count, 0.0),
     )
-    run = task.play("random", SimpleNamespace(scenario=task.default, faults=()), 0, 0)
+    run = task.play(Case(PolicySpec(name="random"), "", task.default, task=task), 0, 0)
     assert run.delivery_times.tolist() == [0.5, 1.5, 1.5, 2.5]
     assert run.ended_at == 2.5
 
 
-def test_equal_seeds_give_equal_bits_in_another_process(file: Path) -> None:
+def test_equal_seeds_give_equal_bits_in_other_processes(study: Study, file: Path) -> None:
     script = (
         "import sys; from pathlib import Path; from swarm_logistics_env.studies import Study\n"
-        "from swarm_logistics_env.studies.engines import execute\n"
         "study = Study.from_file(Path(sys.argv[1]), trust_code=True)\n"
-        "for run in study.plan().runs():\n"
-        "    outcome = execute(run); print(run.key, outcome.delivered, outcome.digest)\n"
+        "for run in reversed(study.plan().runs):\n"
+        "    outcome = run.play(); print(run.key, outcome.delivered, outcome.digest)\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, str(file)], capture_output=True, text=True, check=True
     )
-    study = Study.from_file(file, trust_code=True)
-    runs = list(study.plan().runs())
-    here = [execute(run) for run in reversed(runs)][::-1]
-    assert done.stdout.splitlines() == [f"{o.run} {o.delivered} {o.digest}" for o in here]
-    assert len({o.digest for o in here}) > len(here) / 2
-
-
-def test_worker_processes_give_the_same_rows(file: Path) -> None:
-    alone, shared = (Study.from_file(file, trust_code=True, seeds=2) for _ in range(2))
-    alone.run()
+    outcomes = study.findings().outcomes
+    kept = {run.key: outcomes[run.case.key, run.seed] for run in study.plan().runs}
+    assert sorted(done.stdout.splitlines()) == sorted(
+        f"{key} {outcome.delivered} {outcome.digest}" for key, outcome in kept.items()
+    )
+    assert len({outcome.digest for outcome in kept.values()}) > len(kept) / 2
+    shared = Study.from_file(file, trust_code=True, seeds=1)
     assert shared.run(processes=2).failed == 0
-    kept = [
-        {key: (o.delivered, o.digest) for key, o in study.findings().outcomes.items()}
-        for study in (alone, shared)
-    ]
-    assert kept[0] == kept[1]
+    for place, outcome in shared.findings().outcomes.items():
+        assert outcome.digest == outcomes[place].digest
 
 
 class Ahead(Walker):
@@ -160,37 +149,27 @@ class Ahead(Walker):
 
 
 def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Path) -> None:
-    task = ParallelTask(
-        Lane,
+    task = task_of(
         name="distance",
-        n_robots=3,
         steps=10,
         performance=SumOfInfos("distance"),
         failures={"frozen": None, "blind": None},
-        policies={"walker": Walker},
     )
-    study = Study(
-        task=task, out=tmp_path, seeds=3, policies=["random"], faults=[{"modes": ["blind"]}]
-    )
-    # Removing is not among its failures, so FT is not asked.
+    fields: dict[str, Any] = {"task": task, "seeds": 3, "policies": ["random"]}
     with pytest.raises(StudyError, match="less than n_robots"):
-        study.plan()
-    study = Study(
-        task=task,
-        out=tmp_path,
-        seeds=3,
-        policies=["random"],
-        faults=[{"modes": ["blind", "frozen"], "robots": [1]}],
-    )
+        Study(**fields, faults=[{"modes": ["blind"]}]).plan()
+    faults = [{"modes": ["blind", "frozen"], "robots": [1]}]
+    study = Study(out=tmp_path, faults=faults, **fields)
+    # Removing is not among its failures, so FT is not asked.
     assert {c.indicator for c in study.plan().comparisons} == {"R"}
     study.run()
     results = Study.stored(tmp_path, task=task).findings()
     assert all(o.untimed is not None and o.digest for o in results.outcomes.values())
-    blind, frozen = rows_of(results.indicators)
+    blind, frozen = results.verdicts
     # Random actions do not look: a blind robot changes nothing, and the report says so.
-    assert blind.verdict == "unaffected"
-    assert frozen.verdict != "unaffected"
-    assert any(p % 1 for p in np.concatenate(list(results.performance["by_seed"])))
+    assert blind.plain == "unaffected"
+    assert frozen.plain != "unaffected"
+    assert any(p % 1 for cell in results.cells for p in cell.by_seed)
 
 
 class Hidden(Lane):
@@ -217,13 +196,13 @@ def test_runs_that_differ_in_p_alone_are_not_the_same_runs() -> None:
     )
     study = Study(task=task, seeds=3, policies=["ahead"], faults=[FAULT])
     study.run()
-    (test,) = rows_of(study.findings().indicators)
+    (test,) = study.findings().verdicts
     assert test.problem is None
-    assert test.verdict in ("supported", "refuted", "inconclusive")
+    assert test.plain in ("supported", "refuted", "inconclusive")
 
 
 def test_a_killed_study_goes_on_where_it_was(file: Path, tmp_path: Path) -> None:
-    run_killed_and_resumed(file, tmp_path, "--seeds", "40", "--trust-code", kept=30)
+    run_killed_and_resumed(file, tmp_path, "--seeds", "15", "--trust-code", kept=20)
 
 
 def test_a_model_of_stable_baselines3_plays(tmp_path: Path) -> None:
@@ -235,7 +214,7 @@ def test_a_model_of_stable_baselines3_plays(tmp_path: Path) -> None:
     path = tmp_path / "model.zip"
     sb3.PPO("MlpPolicy", Single(), seed=0, device="cpu").save(path)
     run = only_run(LANE, policies=[str(path)])
-    one, two = execute(run), execute(run)
+    one, two = run.play(), run.play()
     assert one.error is None
     assert one.digest == two.digest
     study = tmp_path / "lane.toml"
@@ -252,7 +231,7 @@ class Blunt:
 
 
 def test_a_policy_needs_nothing_but_act_here_and_reset_in_the_warehouse() -> None:
-    assert execute(only_run(LANE, policies=[Blunt()])).delivered > 0
+    assert only_run(LANE, policies=[Blunt()]).play().delivered > 0
     with pytest.raises(SwarmLogisticsError, match="should have the methods reset and act"):
         only_run("warehouse", policies=[Blunt()], faults=[{"modes": ["FM1"], "robots": [1]}])
 
@@ -267,19 +246,6 @@ class Wrong(Walker):
         return np.full(self.n_robots, 7)
 
 
-@pytest.mark.parametrize(
-    ("policy", "words"),
-    [
-        (Crash(), "ZeroDivisionError: on purpose"),
-        (Wrong(), "PolicyError: action 7 of robot 0: should be in Discrete(3)"),
-    ],
-)
-def test_failing_runs_are_rows_with_their_reason(policy: object, words: str) -> None:
-    outcome = execute(only_run(LANE, policies=[policy]))
-    assert outcome.error is not None
-    assert words in outcome.error
-
-
 def costs(env: object, rewards: object, infos: object) -> float:
     return -2.0
 
@@ -289,30 +255,45 @@ def endless(env: object, rewards: object, infos: object) -> float:
 
 
 def task_of(**fields: Any) -> ParallelTask:
+    usual = {"name": "lane", "n_robots": 3, "steps": 5, "failures": FAILURES}
     return ParallelTask(
-        Lane,
-        **{
-            "name": "lane",
-            "n_robots": 3,
-            "steps": 5,
-            "failures": FAILURES,
-            "policies": {"walker": Walker},
-            **fields,
-        },
+        fields.pop("make_env", Lane), **{**usual, "policies": {"walker": Walker}, **fields}
     )
 
 
-def test_a_measure_without_a_true_zero_is_refused_with_a_remedy() -> None:
-    outcome = execute(only_run(task_of(performance=costs)))
-    assert outcome.error is not None
-    assert "step 1 adds -2: should be 0 or more; the indicators are ratios" in outcome.error
-    assert "references=(score that counts as 0" in outcome.error
-    outcome = execute(only_run(task_of(performance=endless)))
-    assert "adds nan: should be a finite number" in (outcome.error or "")
-    scored = execute(only_run(task_of(performance=costs, references=(-20.0, 0.0))))
-    assert scored.delivered == 0.5
-    below = execute(only_run(task_of(performance=costs, references=(-5.0, 0.0))))
-    assert "the score -10 is below the reference -5" in (below.error or "")
+@pytest.mark.parametrize(
+    ("task", "fields", "words"),
+    [
+        (LANE, {"policies": [Crash()]}, "ZeroDivisionError: on purpose"),
+        (
+            LANE,
+            {"policies": [Wrong()]},
+            "PolicyError: action 7 of robot 0: should be in Discrete(3)",
+        ),
+        (task_of(performance=costs), {}, "step 1 adds -2: should be 0 or more; the indicators are"),
+        (task_of(performance=costs), {}, "references=(score that counts as 0"),
+        (task_of(performance=endless), {}, "adds nan: should be a finite number"),
+        (
+            task_of(performance=costs, references=(-5.0, 0.0)),
+            {},
+            "the score -10 is below the reference -5",
+        ),
+        (
+            task_of(make_env=lambda n_robots: Lane(2)),
+            {"policies": ["random"]},
+            "the environment of 3 robots has 2 agents",
+        ),
+    ],
+)
+def test_failing_runs_are_outcomes_with_their_reason(
+    task: ParallelTask, fields: dict[str, Any], words: str
+) -> None:
+    assert words in str(only_run(task, **fields).play().error)
+
+
+def test_references_make_a_score_of_what_is_below_zero() -> None:
+    scored = only_run(task_of(performance=costs, references=(-20.0, 0.0))).play()
+    assert (scored.error, scored.delivered) == (None, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -342,14 +323,6 @@ def test_what_cannot_be_is_refused_before_any_run(make: Any, words: str) -> None
     assert "\n" not in str(caught.value)
 
 
-def test_a_factory_that_ignores_the_size_is_refused() -> None:
-    task = ParallelTask(
-        lambda n_robots: Lane(2), name="two", n_robots=3, steps=5, failures={"silent": STAY}
-    )
-    outcome = execute(only_run(task, policies=["random"]))
-    assert "the environment of 3 robots has 2 agents" in (outcome.error or "")
-
-
 def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
     assert task_of().code() == task_of().code()
     others = [
@@ -357,7 +330,7 @@ def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
         task_of(references=(0.0, 2.0)),
         task_of(failures={**FAILURES, "noisy": 0.1}),
         task_of(period=0.5),
-        ParallelTask(lambda n_robots: Lane(n_robots), name="lane", n_robots=3, steps=5),
+        task_of(make_env=lambda n_robots: Lane(n_robots)),
     ]
     assert len({task.code() for task in [task_of(), *others]}) == 6
     assert "pettingzoo" in task_of().code()
@@ -367,5 +340,5 @@ def test_robots_that_fail_in_mid_run_and_recover() -> None:
     late = {**FAULT, "onsets": [20], "duration": 10}
     study = Study(task=LANE, seeds=3, policies=["walker"], indicators=["R"], faults=[FAULT, late])
     assert study.run().failed == 0
-    p = {c.cell: c.mean for c in rows_of(study.findings().performance)}
+    p = {cell.words: cell.mean.value for cell in study.findings().cells}
     assert p["silent, m = 1"] < p["silent, m = 1 from 20 s"] < p["no fault"]

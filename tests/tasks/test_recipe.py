@@ -19,7 +19,7 @@ from swarm_logistics_env.studies import Study
 study = Study(task="lane", policies=["walker"], seeds=2, sizes=[{"values": [2, 4]}])
 assert study.run().failed == 0
 assert Study(task="lane").specification.played.name == "lane"
-assert (study.findings().performance["mean"] > 0).all()
+assert (study.performance()["mean"] > 0).all()
 """
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import ScenarioError, StudyError
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import rows_of
-from swarm_logistics_env.studies.runs import Condition, StudiedPolicy
-from swarm_logistics_env.tasks.task import Outcome, Playable
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, Scenario, WarehouseTask
+from swarm_logistics_env.tasks.task import Case, Outcome
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
 
 
 class Foraging(WarehouseTask):
@@ -23,11 +23,10 @@ class Foraging(WarehouseTask):
     def code(self) -> str:
         return "foraging 1"
 
-    def play(self, policy: object, condition: Playable, seed: int, policy_seed: int) -> Outcome:
-        assert isinstance(policy, str)
-        lost = sum(fault.robots for fault in condition.faults)
-        items = (condition.scenario.n_robots - lost) * 3 + seed % 2
-        return Outcome("", np.linspace(1.0, 9.0, items), ended_at=9.0, digest=f"{items} {policy}")
+    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
+        items = (case.scenario.n_robots - len(case.faults)) * 3 + seed % 2
+        times = np.linspace(1.0, 9.0, items)
+        return Outcome(times, ended_at=9.0, digest=f"{items} {case.policy.name}")
 
 
 FORAGING = Foraging()
@@ -43,7 +42,7 @@ def test_a_study_of_another_task(tmp_path: Path) -> None:
     )
     tally = study.run(processes=2)
     assert (tally.played, tally.failed) == (5 * 3, 0)
-    p = {cell.cell: cell.by_seed.tolist() for cell in rows_of(study.findings().performance)}
+    p = {cell.words: cell.by_seed.tolist() for cell in study.findings().cells}
     assert p["N = 2"] == [6, 7, 6]
     assert p["dead, m = 1"] == p["removed, m = 1"] == [72, 73, 72]
     study.report()
@@ -51,8 +50,8 @@ def test_a_study_of_another_task(tmp_path: Path) -> None:
 
 
 def test_conditions_of_two_tasks_never_share_runs() -> None:
-    policy = StudiedPolicy("x", "x", "x")
-    own, other = (Condition(policy, Scenario(), task=t) for t in (WAREHOUSE, Foraging()))
+    policy = PolicySpec(name="x")
+    own, other = (Case(policy, "x", Scenario(), task=t) for t in (WAREHOUSE, Foraging()))
     assert own.key != other.key
 
 
@@ -83,7 +82,7 @@ def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_p
 
 def test_a_task_that_was_an_object_is_handed_over_again(tmp_path: Path) -> None:
     Study(out=tmp_path, task=FORAGING, seeds=1, sizes=[{"values": [2, 4]}]).run()
-    with pytest.raises(StudyError, match=r"task 'toy', an object.*Study\.stored\("):
+    with pytest.raises(StudyError, match=r"task 'toy'.*Study\.stored\("):
         Study.stored(tmp_path, trust_code=True)
     assert Study.stored(tmp_path, task=FORAGING).run().kept == 2
 

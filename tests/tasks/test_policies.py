@@ -9,11 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
-from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.tasks.policy_choice import policy_of
 
 FILE = """
 seeds = 1
@@ -37,35 +36,24 @@ values = [2, 3]
 LABELS = ["swarm-dt", "swarm-dt (taxis_gain = 0.5, diffusion = 0.7)", "half-hearted"]
 
 
-@pytest.fixture
-def study(tmp_path: Path) -> Study:
-    path = tmp_path / "mine.toml"
-    path.write_text(FILE)
-    return Study.from_file(path, out=tmp_path / "out")
-
-
-def test_parameters_are_part_of_what_a_run_is_and_are_told(study: Study) -> None:
+def test_parameters_are_part_of_what_a_run_is_and_are_told(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(FILE)
+    study = Study.from_file(tmp_path / "mine.toml", out=tmp_path / "out")
     plan = study.plan()
-    played = {c.policy.label: c.policy for c in plan.conditions}
+    played = {case.policy.title: case for case in plan.cases}
     assert list(played) == LABELS
-    assert len({policy.identity for policy in played.values()}) == 3
-    assert len({run.key for run in plan.runs()}) == 3 * 2
+    assert len({case.identity for case in played.values()}) == 3
+    assert len({run.key for run in plan.runs}) == 3 * 2
     assert study.run().failed == 0
     study.report()
-    assert study.out is not None
-    text = (study.out / "report.md").read_text()
+    text = (tmp_path / "out" / "report.md").read_text()
     (row,) = (line for line in text.splitlines() if line.startswith("| half-hearted | swarm_log"))
     assert "given: taxis_gain = 0.25" in row
-    # A store knows them again.
-    again = Study.stored(study.out)
+    # A store knows them again, and so does JSON.
+    again = Study.stored(tmp_path / "out")
     assert again.specification == study.specification
-    assert [c.key for c in again.plan().conditions] == [c.key for c in plan.conditions]
-
-
-def test_parameters_reach_the_policy() -> None:
-    chosen = PolicySpec(name="swarm-dt", parameters={"taxis_gain": 0.0})
-    # Swarm D-T without its taxis is the random walk.
-    assert policies.identity(policy_of(chosen)) == policies.identity(policies.load("random-walk"))
+    assert again.plan().cases == plan.cases
+    assert Specification.from_json(study.specification.to_json()) == study.specification
 
 
 class Silent:
@@ -81,11 +69,27 @@ class Silent:
         return np.full((self.n_robots, 4), self.speed)
 
 
-def test_parameters_count_where_the_policy_does_not_tell_them() -> None:
-    name = f"{__name__}:Silent"
-    chosen = [{"name": name, "parameters": {"speed": speed}} for speed in (0.1, 0.2)]
-    plan = Study(policies=chosen, sizes=[{"values": [2, 3]}]).plan()
-    assert len(plan.conditions) == 4
+def test_parameters_reach_the_policy_and_count_where_it_does_not_tell_them() -> None:
+    chosen = PolicySpec(name="swarm-dt", parameters={"taxis_gain": 0.0})
+    # Swarm D-T without its taxis is the random walk.
+    assert policies.identity(chosen.load()) == PolicySpec.of("random-walk").identity()
+    silent = [
+        PolicySpec.of({"name": f"{__name__}:Silent", "parameters": {"speed": speed}})
+        for speed in (0.1, 0.2)
+    ]
+    assert silent[0].identity() != silent[1].identity()
+    assert [policy.runs_code for policy in (*silent, chosen)] == [True, True, False]
+
+
+def test_an_object_is_a_policy_of_its_own_that_each_run_copies() -> None:
+    own = SwarmDT(taxis_gain=0.0)
+    spec = PolicySpec.of(own)
+    assert (spec.title, spec.runs_code) == ("SwarmDT", False)
+    assert spec.load() is not own
+    assert spec.identity() == policies.identity(own)
+    assert PolicySpec.of(spec) is spec
+    with pytest.raises(PolicyError, match="should have the methods reset and act"):
+        PolicySpec(name="x", made=object()).load()
 
 
 def test_file_may_not_name_code_by_way_of_parameters(tmp_path: Path) -> None:
@@ -94,16 +98,7 @@ def test_file_may_not_name_code_by_way_of_parameters(tmp_path: Path) -> None:
     path.write_text(f"policies = [{policy}]\n[[sizes]]\nvalues = [2, 3]\n")
     with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(path)
-    assert Study.from_file(path, trust_code=True).plan().conditions
-
-
-def test_specification_survives_json_and_its_store(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(FILE)
-    study = Study.from_file(path, out=tmp_path)
-    assert Specification.from_json(study.specification.to_json()) == study.specification
-    study.run()
-    assert [c.policy for c in Study.stored(tmp_path).plan().comparisons] == LABELS
+    assert Study.from_file(path, trust_code=True).plan().cases
 
 
 @pytest.mark.parametrize(
