@@ -289,7 +289,7 @@ def _rows(found: Answer, width: int) -> Iterator[str]:
         lambda line: line.interval,
     )
     widths = [max(len(of(line)) for line in found.lines) for of in columns]
-    widths[0] = min(widths[0], max(12, width - sum(widths[1:]) - 16))
+    widths[0] = min(widths[0], max(8, width - sum(widths[1:]) - 16))
     for policy, lines in grouped(found.lines, lambda line: line.policy).items():
         if len({line.policy for line in found.lines}) > 1:
             yield f"{policy}:"
