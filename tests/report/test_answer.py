@@ -1,137 +1,118 @@
-"""The answer: one screen that counts, shows every verdict and says what surprises and is open."""
+"""The answer: a line a question, with value, interval and verdict, on one screen."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from collections import Counter
+from pathlib import Path
 
 import pytest
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report.answer import DIGEST_LINES, answer, digest
-from swarm_logistics_env.report.verdict_matrix import text_lines, verdict_matrix
-from swarm_logistics_env.spi.verdict_signs import SIGNS
-from swarm_logistics_env.studies.comparisons import Setting
-from swarm_logistics_env.studies.presets import PAPER
+from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
+from swarm_logistics_env.report.section import said
 from swarm_logistics_env.studies.results import StudyResults
-from tests.report.test_report_files import results
+from tests.studies.made_up import paper
 
 
-@pytest.fixture(scope="module")
-def found() -> StudyResults:
-    return results(4)
-
-
-@pytest.fixture(scope="module")
-def compared() -> StudyResults:
-    """Two policies: the second delivers half as much, and collapses under FM1."""
-
-    def p(policy: str, setting: Setting) -> float:
-        published = float(PAPER.performance.get(setting, 10.0))
-        collapses = setting.name == "FM1"
-        return published if policy == "swarm-dt" else published * (0.1 if collapses else 0.5)
-
-    return results(10, p, policies=["swarm-dt", "swarm-dt-follow"])
-
-
-def test_every_question_has_the_sign_of_its_verdict(found: StudyResults) -> None:
-    matrix = verdict_matrix(found)
-    cells = list(matrix.cells())
-    assert len(cells) == len(found.indicators)
-    assert [cell.verdict for cell in cells].count("supported") == (
-        found.indicators["answer_holm"].eq("supported").sum()
-    )
-    (faults,) = (block for block in matrix.blocks if block.axis == "m = 1 2 3")
-    assert [row.label for row in faults.rows] == [
-        f"{symbol} FM{mode}" for symbol in ("FT", "R") for mode in (1, 2, 3, 4)
+def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
+    lines = answer(few, most=None).lines
+    assert sorted(number for line in lines for number in line.numbers) == [
+        *range(len(few.verdicts))
     ]
-    for row in faults.rows:
-        for m, cell in zip((1, 2, 3), row.cells["swarm-dt"]):
-            assert cell is not None
-            assert (cell.test.factor, cell.test.after) == (row.factor, m)
-            assert cell.mark == SIGNS[cell.test.conclusion or "blocked"].mark
+    for line in lines:
+        ((number,), (test,)) = line.numbers, line.tests
+        assert test is few.verdicts[number]
+        assert test.interval is not None
+        value, low, high = test.interval
+        assert line.value == f"{value:.2f}" + "†" * test.saturated
+        assert line.interval == f"[{low:.2f}, {high:.2f}]"
+        assert line.verdict.startswith(said(test.conclusion))
+        assert line.question.startswith(test.compared.indicator)
+        more = re.fullmatch(r"open: (\d+) more seeds tell 0.1", line.verdict)
+        if more:
+            assert test.estimate is not None
+            effect = test.compared.threshold + (0.1 if value > test.compared.threshold else -0.1)
+            assert spi.seeds_for_power(test.estimate, effect) == 4 + int(more[1])
+
+
+def test_what_is_alike_shares_a_line_and_no_question_is_lost(few: StudyResults) -> None:
+    lines = answer(few).lines
+    assert len(lines) <= MOST_LINES - 5
+    assert sum(len(line.tests) for line in lines) == len(few.verdicts)
+    for line in lines:
+        assert len({(test.compared.policy, test.compared.indicator) for test in line.tests}) == 1
+        if len(line.tests) > 1:
+            counts = Counter(said(test.conclusion) for test in line.tests)
+            for word, count in counts.items():
+                assert word in line.verdict
+                assert len(counts) == 1 or f"{count} {word}" in line.verdict
+    assert [line.question for line in lines if "FM4" in line.question] == [
+        "FT FM4, 1, 2, 3 of 25", "R FM4, 1, 2, 3 of 25"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])
+@pytest.mark.parametrize("name", ["few", "compared"])
 def test_digest_fits_the_screen_and_nothing_is_cut(
-    width: int, found: StudyResults, compared: StudyResults
+    width: int, name: str, request: pytest.FixtureRequest
 ) -> None:
-    for one in (found, compared):
-        lines = digest(answer(one), width, None).splitlines()
-        assert len(lines) <= DIGEST_LINES
-        assert max(map(len, lines)) <= width
-        assert not any("…" in line for line in lines if "N 5→" not in line)
-    whole = text_lines(verdict_matrix(compared), width)
-    for block in verdict_matrix(compared).blocks:
-        for row in block.rows:
-            for cells in row.cells.values():
-                signs = "".join(cell.mark if cell else "·" for cell in cells)
-                assert any(signs in line for line in whole), row.label
+    found: StudyResults = request.getfixturevalue(name)
+    lines = digest(answer(found), width, Path("results") / "a-study").splitlines()
+    assert len(lines) <= MOST_LINES
+    assert max(map(len, lines)) <= width
+    assert not any("…" in line for line in lines if "N 5→" not in line)
+    whole = digest(answer(found, most=None), width, None, most=None)
+    assert max(map(len, whole.splitlines())) <= width
+    assert len(whole.splitlines()) >= len(found.verdicts)
 
 
-def test_digest_counts_claims_and_names_what_contradicts_the_paper(found: StudyResults) -> None:
-    text = digest(answer(found), 80, None)
-    claims = found.indicators[found.indicators["claim"].notna()]
-    supported = int(claims["claim_verdict_holm"].eq("supported").sum())
-    assert f"swarm-dt: {supported} supported, " in text
-    assert f" of {len(claims)} claims." in text
-    assert "if the paper is right, 20 seeds decide " in text
+def test_claims_are_counted_and_what_contradicts_the_paper_is_marked(few: StudyResults) -> None:
+    claims = Counter(said(test.claim_verdict_holm) for test in few.verdicts if test.claim)
+    assert f"of {claims.total()} claims {claims['supported']} supported, " in answer(few).last
     # The robots of a fleet that FM4 spares deliver all the same: the paper says they do not.
-    tough = results(10, lambda _, setting: 39.0 if setting.name == "FM4" else 20.0)
-    surprises = answer(tough).surprises
-    assert any("FM4, m=3" in one and "swarm-dt is tolerant, " in one for one in surprises)
+    tough = answer(paper(lambda _, at: 39.0 if at.name == "FM4" else 20.0), most=None)
+    against = {line.question for line in tough.lines if line.contradicts}
+    assert {"FT FM4, 3 of 25", "R FM4, 3 of 25"} <= against
+    assert not any(line.contradicts for line in answer(few).lines)
 
 
-def test_blocked_questions_tell_why() -> None:
-    said = answer(results(1, lambda *_: 0.0)).unanswered
-    assert "blocked, the first because mean of p_n = 0: nothing was delivered" in said
+def test_words_for_what_is_no_plain_verdict(few: StudyResults) -> None:
+    nothing = answer(paper(lambda *_: 0.0, seeds=1), most=None)
+    assert {line.verdict for line in nothing.lines if line.indicator == "S"} == {
+        "undefined: it delivers nothing"
+    }
+    same = answer(paper(same=frozenset({"FM2"})), most=None)
+    assert [line.verdict for line in same.lines if line.question.startswith("R FM2")] == [
+        "same runs, exact"
+    ] * 3
+    assert "provisional (below ten seeds" in answer(few).last
+    assert "† P is capped" in answer(few).last
+    assert "provisional" not in same.last
 
 
-def test_what_is_provisional_surprises_nobody() -> None:
-    def p(policy: str, setting: Setting) -> float:
-        return 39.0 if setting.name == "FM4" and policy == "swarm-dt" else 20.0
-
-    few = results(4, p, policies=["swarm-dt", "swarm-dt-follow"])
-    assert "refuted" in set(few.indicators["claim_verdict_holm"])
-    assert not answer(few).surprises
-
-
-def test_the_furthest_of_many_answers_is_no_surprise_by_chance() -> None:
-    for seeds in (15, 20, 29):  # the same policy twice
-        twins = results(seeds, policies=["swarm-dt", "swarm-dt-follow"])
-        assert not any("differs most" in one for one in answer(twins).surprises)
+def test_policies_stand_one_below_the_other_with_p_as_a_multiple(compared: StudyResults) -> None:
+    text = digest(answer(compared), 80, None)
+    first, second = text.index("\nswarm-dt:\n"), text.index("\nswarm-dt-follow:\n")
+    assert first < second
+    assert re.search(r"P at N = 25, no fault: swarm-dt 39\.\d \[[\d., ]+\],\s+swarm-dt-f", text)
+    assert re.search(r"\(0\.5\d\s+times\)", text)
+    rows = answer(compared).section.rows
+    assert {row[0].split(":")[0] for row in rows} == {"swarm-dt", "swarm-dt-follow"}
 
 
-def test_policies_stand_side_by_side_with_their_greatest_contrast(compared: StudyResults) -> None:
-    found = answer(compared)
-    assert found.matrix.policies == ("swarm-dt", "swarm-dt-follow")
-    assert any(
-        "FM1" in one and "differs most" in one and "swarm-dt-follow -0." in one
-        for one in found.surprises
-    )
-    text = digest(found, 80, None)
-    assert "P at N = 25, no fault: swarm-dt 4" in text
-    assert "times)" in text
+def test_a_sentence_for_a_paper_names_counts_and_the_lowest_value(single: StudyResults) -> None:
+    found = paper()
+    text = in_a_sentence(found)
+    worst = min(found.verdicts, key=lambda test: test.value or 0.0)
+    assert text.startswith("swarm-dt: P at N = 25, no fault: ")
+    assert " over 10 paired seeds (0 to 9); of 43 questions " in text
+    assert f"the lowest is {worst.compared.indicator} " in text
+    assert f"= {worst.value:.2f} [" in text
+    assert "[" not in in_a_sentence(single).split("the lowest is ")[1]
 
 
-def test_more_policies_than_fit_stand_below_each_other(compared: StudyResults) -> None:
-    matrix = verdict_matrix(compared)
-    many = tuple(f"a-policy-of-a-long-name-{number}" for number in range(12))
-    rows = [
-        replace(
-            block,
-            rows=tuple(
-                replace(row, cells=dict.fromkeys(many, row.cells["swarm-dt"])) for row in block.rows
-            ),
-        )
-        for block in matrix.blocks
-    ]
-    lines = text_lines(replace(matrix, policies=many, blocks=tuple(rows)), 80)
-    assert max(map(len, lines)) <= 80
-    assert all(f"({number}) {name}" in "\n".join(lines) for number, name in enumerate(many, 1))
-    assert sum("S superlinear" in line for line in lines) > 1
-
-
-def test_an_estimate_prints_as_one_cell_of_the_matrix() -> None:
+def test_an_estimate_prints_as_one_line() -> None:
     estimate = spi.robustness([40.0, 42, 41, 43], [20.0, 22, 20, 21], n=25, m=1)
     text = str(estimate)
     assert text.startswith(f"✗ R = {estimate.value:.3f} [{estimate.low:.3f}, ")

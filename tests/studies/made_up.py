@@ -37,6 +37,7 @@ def paper(
     p: Callable[[str, Setting], float] = published,
     *,
     seeds: int = 10,
+    noise: float = 1.0,
     full: Setting | None = None,
     same: frozenset[str] = frozenset(),
     **fields: Any,
@@ -47,10 +48,10 @@ def paper(
         full: the setting whose runs deliver every item, on one seed.
         same: failure modes whose runs are those without a fault.
     """
-    noise = np.random.default_rng(0)
+    rng = np.random.default_rng(0)
 
     def play(policy: str, setting: Setting, seed: int) -> Outcome:
-        count = round(p(policy, setting) + (noise.normal() if seeds > 1 else 0.0))
+        count = round(p(policy, setting) + (rng.normal(0.0, noise) if seeds > 1 else 0.0))
         digest = f"{policy} {setting} {seed}"
         if setting.name in same or setting == NO_FAULT:
             count, digest = round(p(policy, NO_FAULT)) + seed % 3, f"{policy} no fault {seed}"
