@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,8 +8,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
 from swarm_logistics_env import observations as row
-
-Build = Callable[..., Warehouse]
+from tests.warehouse.conftest import Build
 
 BEAMS = slice(observations.RANGE_WALLS, observations.RANGE_ITEMS + observations.N_BEAMS)
 
@@ -44,7 +42,7 @@ def test_what_is_missed_is_drawn_for_each_robot_thing_and_sense_alone(build: Bui
     )
     n, far = len(places), np.abs(places[:, :1] - places[:, 0])
     missed = []
-    for _ in range(250):
+    for _ in range(160):
         rows = world.step(np.hstack([np.zeros((n, 4)), np.ones((n, 1))]))
         heard, there = np.zeros((n, n), bool), np.zeros((n, n), bool)
         for me in range(n):
