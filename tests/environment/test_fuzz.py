@@ -178,27 +178,6 @@ def test_any_command_is_taken_or_refused(data: st.DataObject) -> None:
 
 
 @given(
-    st.sampled_from(["array", "junk"]).flatmap(
-        lambda kind: (
-            junk
-            if kind == "junk"
-            else st.lists(commands, max_size=4).map(lambda rows: np.array(rows))
-        )
-    )
-)
-def test_any_array_of_commands_is_taken_or_refused(given_commands: Any) -> None:
-    env = SwarmLogisticsEnv(SMALL)
-    env.reset_arrays(seed=0)
-    try:
-        rows, rewards, *_ = env.step_arrays(given_commands)
-    except SwarmLogisticsError as error:
-        assert_says_why(error)
-    else:
-        assert np.isfinite(rows).all()
-        assert np.isfinite(rewards).all()
-
-
-@given(
     st.sampled_from(["faults", "size", "change"]),
     st.sampled_from([*sorted(Scenario.model_fields), *FAILURE_MODES, "abc"]) | junk,
     st.lists(junk, max_size=3) | junk,

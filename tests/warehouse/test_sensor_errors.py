@@ -42,7 +42,7 @@ def test_what_is_missed_is_drawn_for_each_robot_thing_and_sense_alone(build: Bui
     )
     n, far = len(places), np.abs(places[:, :1] - places[:, 0])
     missed = []
-    for _ in range(160):
+    for _ in range(250):
         rows = world.step(np.hstack([np.zeros((n, 4)), np.ones((n, 1))]))
         heard, there = np.zeros((n, n), bool), np.zeros((n, n), bool)
         for me in range(n):
