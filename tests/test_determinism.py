@@ -19,7 +19,10 @@ STEPS = 1500
 def wrapped(seed: int) -> Any:
     """Return an environment with faults, robots that leave and a parameter that changes."""
     env = swarm_logistics_v0.parallel_env(duration=STEPS / 10, restock=True, radio_loss=0.1)
-    onsets = {"onset": lambda rng: rng.uniform(10.0, 100.0, size=3), "duration": 40.0}
+    onsets: dict[str, Any] = {
+        "onset": lambda rng: rng.uniform(10.0, 100.0, size=3),
+        "duration": 40.0,
+    }
     wrapper: Any = FaultInjection(env, "motor_slow", robots=2, **onsets)
     wrapper = SwarmSize(wrapper, [16, 20], leave=[(2, 60.0), (3, 90.0)])
     wrapper = ParameterChange(wrapper, "delivery_width", [1.0, 3.0], at=[50.0, 100.0])

@@ -137,6 +137,6 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _info(self) -> dict[str, Any]:
         failed = np.zeros(self._rows.n_rows, np.int8)
-        modes = self.env.warehouse.state.failure_modes
-        failed[: len(modes)] = [bool(names) for names in modes]
+        state = self.env.warehouse.state
+        failed[: state.n_robots] = state.failed
         return {"failed": failed, **self.env.episode_info}

@@ -14,7 +14,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
 from .caption import Caption
-from .readings import N_BEAMS, Projection, Trails, followed, ranges
+from .readings import N_BEAMS, Projection, Trails, activity, followed, ranges
 from .sprites import Point, draw_line, new_canvas, stamp, words
 
 # What decides the picture's layout.
@@ -135,7 +135,7 @@ class Picture:
         faulty, headings = state.failed.tolist(), state.robot_heading.tolist()
         carried = state.robot_item.tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            colour = _state_colour(carried[robot], state.requested)
+            colour = palette.ACTIVITIES[activity(state, robot)]
             step = sprites.heading_step(headings[robot])
             body = sprites.robot(radius, colour, step, faulty[robot])
             stamps.append((body, robots[robot]))
@@ -147,7 +147,7 @@ class Picture:
         if state.requested == NOBODY:
             return
         at = items[state.requested]
-        is_carried = state.item_carrier[state.requested] != NOBODY
+        is_carried = state.carrier != NOBODY
         half = 0.5 * self._robot_radius if is_carried else 1.4 * self._item_half
         stamp(
             self._canvas,
@@ -166,12 +166,6 @@ class Picture:
             x, y = robots[robot]
             place = sprite.get_rect(center=(round(x + away), round(y - away)))
             self._canvas.blit(sprite, place.clamp(area))
-
-
-def _state_colour(carried: int, requested: int) -> palette.RGB:
-    if carried == NOBODY:
-        return palette.SEARCHING
-    return palette.DELIVERING if carried == requested else palette.SHUFFLING
 
 
 def background(
@@ -249,9 +243,7 @@ def draw_links(
         radius: the radius of a robot [px].
         all_links: whether to draw thin arrows from all other robots as well.
     """
-    carrier = NOBODY
-    if state.requested != NOBODY:
-        carrier = int(state.item_carrier[state.requested])
+    carrier = state.carrier
     if all_links:
         for robot in range(state.n_robots):
             leader = followed(state, scenario, robot)

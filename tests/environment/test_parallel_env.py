@@ -116,7 +116,7 @@ def test_what_is_no_dict_of_commands_is_refused(actions: Any) -> None:
         ({"max_robots": 24}, SetupError, "max_robots = 24: should be None or .* n_robots = 25"),
         ({"max_robots": "40"}, SetupError, "max_robots = '40': should be None or a whole number"),
         ({"max_robots": 9000}, ScenarioError, "n_robots = 9000 of radius .* do not fit"),
-        ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be None or a whole number"),
+        ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be a whole number"),
         ({"max_cycles": "9"}, SetupError, "max_cycles = '9': should be"),
         ({"max_cycles": 9.5}, SetupError, "max_cycles = 9.5: should be"),
         ({"rewards": ["delivery"]}, SetupError, r"rewards = \[.*\]: should be None or a dict"),

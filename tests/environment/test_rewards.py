@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms, carrier_of_requested
+from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
@@ -121,12 +121,12 @@ def test_what_a_potential_pays_depends_on_where_an_episode_begins_and_ends_alone
     rng = np.random.default_rng(1)
     total, n_steps, n_changes = np.zeros(8), 400, 0
     for step in range(n_steps):
-        carrier = carrier_of_requested(world)
+        carrier = world.state.carrier
         world.step(rng.uniform(-1.0, 1.0, (8, 4)))
         total += discount**step * terms.pay(world)
-        n_changes += carrier != carrier_of_requested(world)
+        n_changes += carrier != world.state.carrier
     last = np.zeros(8)
-    if (carrier := carrier_of_requested(world)) != NOBODY:
+    if (carrier := world.state.carrier) != NOBODY:
         x = world.state.robot_position[carrier, 0]
         last[carrier] = 1.0 if term == "carrying" else min(x, world.scenario.storage_width)
     assert n_changes >= 10
@@ -155,7 +155,7 @@ def test_approach_can_be_collected_in_circles_and_carried_way_cannot() -> None:
         to_x, to_y = state.item_position[0] - state.robot_position[0]
         drive(2.0 * to_x, 2.0 * to_y, -1.0)
     drive(0.0, 0.0, 1.0)
-    assert carrier_of_requested(world) == 0
+    assert world.state.carrier == 0
     sums = dict.fromkeys(paid, 0.0)
     for terms in paid.values():
         terms.begin(world)
@@ -165,7 +165,7 @@ def test_approach_can_be_collected_in_circles_and_carried_way_cannot() -> None:
             drive(x, 0.0, gripper)
             for name, terms in paid.items():
                 sums[name] += terms.pay(world)[0]
-    assert carrier_of_requested(world) == 0
+    assert world.state.carrier == 0
     assert sums["approach"] > 1.0
     assert sums["carried_way"] == pytest.approx(state.robot_position[0, 0] - begun)
     assert abs(sums["carried_way"]) < 0.1

@@ -182,7 +182,7 @@ def test_every_mode_takes_something_from_its_robots_only_and_nothing_before_its_
     policy.reset(8, 0)
     for _ in range(60):
         same.append(
-            np.array_equal(*rows)
+            np.array_equal(rows[0], rows[1])
             and np.array_equal(healthy.state.robot_position, failing.state.robot_position)
             and np.array_equal(healthy.state.robot_told, failing.state.robot_told, equal_nan=True)
         )
