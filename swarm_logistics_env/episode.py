@@ -80,8 +80,7 @@ class Play:
 
     def sensed(self, robot: int) -> NDArray[np.float32]:
         """Return the observation row (D,) that `robot` acts on next."""
-        row: NDArray[np.float32] = self._observations[robot]
-        return row
+        return self._observations[robot]
 
     def step(self) -> None:
         """Take one control period, or do nothing once the episode is over.

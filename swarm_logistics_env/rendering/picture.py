@@ -72,9 +72,12 @@ class Picture:
         if self.trails is not None:
             self.trails.note(state)
             draw_trails(canvas, projection, self.trails)
-        self._draw_obstacles(state)
+        obstacle = sprites.obstacle(self._obstacle_radius)
+        stamp(canvas, ((obstacle, at) for at in projection.points(state.obstacle_position)))
         self._draw_halos(state, scenario, robots)
-        self._draw_stored_items(state, items)
+        item = sprites.item(self._item_half, False)
+        stored = np.flatnonzero(state.item_status == STORED).tolist()
+        stamp(canvas, ((item, items[number]) for number in stored))
         draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self._all_links)
         watched = self._show_beams_of
         if watched is not None and watched < state.n_robots and state.robot_present[watched]:
@@ -108,11 +111,6 @@ class Picture:
         self._obstacle_radius = max(3.0, projection.length(scenario.obstacle_radius))
         self._shape = _shape(scenario)
 
-    def _draw_obstacles(self, state: WarehouseState) -> None:
-        sprite = sprites.obstacle(self._obstacle_radius)
-        obstacles = self.projection.points(state.obstacle_position)
-        stamp(self._canvas, ((sprite, at) for at in obstacles))
-
     def _draw_halos(self, state: WarehouseState, scenario: Scenario, robots: list[Point]) -> None:
         age = state.robot_timer / scenario.timer_limit
         glowing = np.flatnonzero(state.robot_present & (age < 1.0)).tolist()
@@ -123,11 +121,6 @@ class Picture:
                 for robot in glowing
             ),
         )
-
-    def _draw_stored_items(self, state: WarehouseState, items: list[Point]) -> None:
-        sprite = sprites.item(self._item_half, False)
-        stored = np.flatnonzero(state.item_status == STORED).tolist()
-        stamp(self._canvas, ((sprite, items[item]) for item in stored))
 
     def _draw_robots(self, state: WarehouseState, robots: list[Point]) -> None:
         radius, stamps = self._robot_radius, []
