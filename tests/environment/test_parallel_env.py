@@ -299,6 +299,7 @@ def test_everybody_is_truncated_when_the_time_is_up(arguments: dict[str, Any], s
         env.reset(seed=0)
         for step in range(1, steps + 1):
             _, _, terminated, truncated, _ = env.step(still(env))
+            assert env.warehouse.state.time == pytest.approx(0.1 * step)
             assert not any(terminated.values())
             assert set(truncated.values()) == {step == steps}
         assert env.agents == []

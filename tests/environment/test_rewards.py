@@ -133,44 +133,6 @@ def test_what_a_potential_pays_depends_on_where_an_episode_begins_and_ends_alone
     assert total == pytest.approx(discount**n_steps * last, abs=1e-12)
 
 
-def test_approach_can_be_collected_in_circles_and_carried_way_cannot() -> None:
-    """A robot puts the item down, steps back, pulls it near by lifting it, and drives forward."""
-    world = Warehouse(
-        Scenario(n_robots=1, n_items=1, heading_drift=0.0, warehouse_width=5, warehouse_height=4)
-    )
-    world.reset(0)
-    state = world.state
-    paid = {
-        "approach": RewardTerms({"approach": 1.0}),
-        "carried_way": RewardTerms({"carried_way": 1.0, "discount": 1.0}),
-    }
-
-    def drive(x: float, y: float, gripper: float) -> None:
-        heading = state.robot_heading[0]
-        ahead = x * np.cos(heading) + y * np.sin(heading)
-        aside = y * np.cos(heading) - x * np.sin(heading)
-        world.step(np.array([[ahead, aside, 0.0, gripper]]))
-
-    for _ in range(200):
-        to_x, to_y = state.item_position[0] - state.robot_position[0]
-        drive(2.0 * to_x, 2.0 * to_y, -1.0)
-    drive(0.0, 0.0, 1.0)
-    assert world.state.carrier == 0
-    sums = dict.fromkeys(paid, 0.0)
-    for terms in paid.values():
-        terms.begin(world)
-    begun = state.robot_position[0, 0]
-    for _ in range(10):
-        for x, gripper in ((0.0, -1.0), (-1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, 0.0)):
-            drive(x, 0.0, gripper)
-            for name, terms in paid.items():
-                sums[name] += terms.pay(world)[0]
-    assert world.state.carrier == 0
-    assert sums["approach"] > 1.0
-    assert sums["carried_way"] == pytest.approx(state.robot_position[0, 0] - begun)
-    assert abs(sums["carried_way"]) < 0.1
-
-
 def test_stocking_pays_the_way_of_every_item_so_that_no_circle_earns() -> None:
     world = Warehouse(
         Scenario(n_robots=8, n_items=12, warehouse_width=4, warehouse_height=3, restock=True)

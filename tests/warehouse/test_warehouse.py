@@ -19,7 +19,6 @@ from swarm_logistics_env.errors import (
 )
 from swarm_logistics_env.observations import unflatten
 from swarm_logistics_env.warehouse import stepping
-from swarm_logistics_env.warehouse.state import STORED
 from tests.warehouse.conftest import EAST, SMALL, STAY, steps
 
 TWO = Scenario(n_robots=2, n_items=3)
@@ -139,27 +138,6 @@ def test_reset_takes_another_scenario_from_then_on() -> None:
     assert world.reset(0, scenario=Scenario(n_robots=5)).shape[0] == 5
     assert steps(world, *[STAY] * 5).shape[0] == 5
     assert world.reset(0).shape[0] == 5
-
-
-def test_time_is_counted_in_control_periods_until_the_duration() -> None:
-    world = Warehouse(Scenario(n_robots=1, duration=0.7, control_period=0.1))
-    world.reset(0)
-    over = []
-    for _ in range(7):
-        steps(world, STAY)
-        over.append(world.is_over_time)
-    assert over == [False] * 6 + [True]
-    assert world.state.time == pytest.approx(0.7)
-
-
-def test_at_the_start_all_are_in_the_storage_and_timers_are_silent() -> None:
-    world = Warehouse(Scenario())
-    world.reset(0)
-    state = world.state
-    assert (state.robot_position[:, 0] < world.scenario.storage_width).all()
-    assert np.isnan([state.robot_timer, state.robot_told]).all()
-    assert (state.item_status == STORED).all()
-    assert (state.delivered, state.time) == (0, 0.0)
 
 
 def test_what_is_assigned_to_the_state_is_what_the_next_step_works_on() -> None:
