@@ -80,7 +80,8 @@ class Play:
 
     def sensed(self, robot: int) -> NDArray[np.float32]:
         """Return the observation row (D,) that `robot` acts on next."""
-        return self._observations[robot]
+        row: NDArray[np.float32] = self._observations[robot]
+        return row
 
     def step(self) -> None:
         """Take one control period, or do nothing once the episode is over.
