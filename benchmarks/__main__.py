@@ -6,15 +6,17 @@ python -m benchmarks --peers .venvs/peers/bin/python --out results/benchmark
 from __future__ import annotations
 
 import argparse
+import json
+import subprocess
 from pathlib import Path
 
 from rich.console import Console
 
 from benchmarks import ours
+from benchmarks.floor import record
 from benchmarks.instructions import instructions_of_a_step
-from benchmarks.recording import record
+from benchmarks.peers import PEERS
 from benchmarks.results import as_json, save, show
-from benchmarks.rivals import rivals
 from benchmarks.start_up import (
     bytes_per_robot,
     compile_seconds,
@@ -41,22 +43,34 @@ def contestants_of_ours() -> list[Contestant]:
     return found
 
 
+def peers(interpreter: str, repeats: int) -> tuple[list[Contestant], dict[str, str]]:
+    """Return the peers that run, measured, and why the others do not."""
+    measured, missing = [], {}
+    for key, (name, _) in PEERS.items():
+        script = [interpreter, str(Path(__file__).with_name("peers.py")), key, str(repeats)]
+        done = subprocess.run(script, capture_output=True, text=True, check=False)
+        last = (done.stderr if done.returncode else done.stdout).strip().splitlines()[-1]
+        if done.returncode:
+            missing[name] = last
+            continue
+        agent_steps, steps, includes, seconds = json.loads(last)
+        one = Contestant(name, includes, lambda: None, agent_steps, steps, seconds=seconds)
+        measured.append(one)
+    return measured, missing
+
+
 def main() -> None:
     """Measure, print and save."""
     parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
     parser.add_argument("--repeats", type=int, default=15, help="turns of everybody")
     parser.add_argument("--peers", default="", help="the interpreter that has the peers")
-    parser.add_argument("--out", type=Path, help="folder for benchmark.json and benchmark.png")
+    parser.add_argument("--out", type=Path, help="folder for benchmark.json")
     given = parser.parse_args()
 
     console = Console(width=150)
     found = contestants_of_ours()
-    others, processes, missing = rivals(given.peers) if given.peers else ([], [], {})
-    try:
-        in_turns([*found, *others], given.repeats)
-    finally:
-        for process in processes:
-            process.close()
+    in_turns(found, given.repeats)
+    others, missing = peers(given.peers, given.repeats) if given.peers else ([], {})
     title = (
         f"Medians of {given.repeats} interleaved runs, processor time; N = 25 unless said; "
         "cost: per agent-step"

@@ -8,21 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.floor import ForceFloor, JointFloor
-from benchmarks.recording import Recording, record
+from benchmarks.floor import ForceFloor, Recording, record
 from benchmarks.timing import Contestant
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.policies.policy import start
 
-FLOOR, JOINTS, ARRAYS = "force floor", "joint floor", "env.step_arrays"
+FLOOR, ARRAYS = "force floor", "env.step_arrays"
 _STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
 _WORLDS, _STEPS_OF_WORLDS = 8, 1000
 SENSES = "all sensors, logistics, timers"
 
 
 def paths(recording: Recording) -> Iterator[Contestant]:
-    """Yield the floors and the ways to step one world, on the same commands."""
+    """Yield the floor and the ways to step one world, on the same commands."""
     n, steps = recording.scenario.n_robots, len(recording.commands)
     actions = [
         {f"robot_{row}": command for row, command in enumerate(commands)}
@@ -31,9 +30,6 @@ def paths(recording: Recording) -> Iterator[Contestant]:
 
     def floor() -> float:
         return _timed(ForceFloor(recording).step, range(steps))
-
-    def joints() -> float:
-        return _timed(JointFloor(recording).step, range(steps))
 
     def world() -> float:
         made = Warehouse(recording.scenario)
@@ -52,7 +48,6 @@ def paths(recording: Recording) -> Iterator[Contestant]:
 
     for name, includes, run, base in (
         (FLOOR, "bodies alone, no sensing", floor, None),
-        (JOINTS, "the same driven by pivot joints, from Python", joints, FLOOR),
         ("Warehouse.step", SENSES, world, FLOOR),
         (ARRAYS, f"{SENSES}, rewards, ends", arrays, FLOOR),
         ("env.step", "the same, as PettingZoo's dicts", dicts, ARRAYS),

@@ -1,10 +1,10 @@
 """A worker that steps another project's environment; run by an interpreter that has it.
 
-    python benchmarks/peers.py rware
+    python benchmarks/peers.py rware 15
 
-Once it stands it prints a line of JSON: agent-steps per run, and what a step includes. Then, for
-every line it reads, it takes its steps once and prints the seconds of processor time they took.
-It imports nothing of this package, which need not be installed beside the peers.
+It ends with a line of JSON: agent-steps and control steps per run, what a step includes, and the
+seconds of processor time that each of 15 runs took. It imports nothing of this package, which need
+not be installed beside the peers.
 """
 
 from __future__ import annotations
@@ -90,15 +90,15 @@ PEERS: dict[str, tuple[str, Callable[[], Steps]]] = {
 
 
 def main() -> None:
-    """Serve the peer named on the command line."""
+    """Measure the peer named on the command line."""
     run, steps, agents, includes = PEERS[sys.argv[1]][1]()
     run()
-    made = {"agent_steps": steps * agents, "control_steps": steps, "includes": includes}
-    print(json.dumps(made), flush=True)
-    for _ in sys.stdin:
+    seconds = []
+    for _ in range(int(sys.argv[2])):
         began = time.process_time()
         run()
-        print(time.process_time() - began, flush=True)
+        seconds.append(time.process_time() - began)
+    print(json.dumps([steps * agents, steps, includes, seconds]), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What was measured, as a table, as JSON and as a plot."""
+"""What was measured, as a table and as JSON."""
 
 from __future__ import annotations
 
@@ -76,31 +76,9 @@ def as_json(contestants: Sequence[Contestant], **more: Any) -> dict[str, Any]:
 
 
 def save(folder: Path, found: Mapping[str, Any]) -> None:
-    """Write benchmark.json and benchmark.png."""
+    """Write benchmark.json."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "benchmark.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    _plot(folder / "benchmark.png", found)
-
-
-def _plot(path: Path, found: Mapping[str, Any]) -> None:
-    from matplotlib.figure import Figure
-
-    rows = sorted(found["contestants"], key=lambda row: row["agent_steps_per_second"])
-    figure = Figure(figsize=(8.0, 0.32 * len(rows) + 1.2), layout="constrained")
-    axes = figure.subplots()
-    peers = {"RWARE", "MPE2", "VMAS"}
-    colours = ["0.7" if row["name"].split()[0] in peers else "tab:blue" for row in rows]
-    bars = axes.barh(
-        [row["name"] for row in rows],
-        [row["agent_steps_per_second"] for row in rows],
-        color=colours,
-    )
-    axes.bar_label(bars, fmt="{:,.0f}", padding=3, fontsize=8)
-    axes.set_xscale("log")
-    axes.margins(x=0.15)
-    axes.set_xlabel("agent-steps per second, one core unless threads are named")
-    axes.set_title(found["machine"]["processor"], fontsize=9)
-    figure.savefig(path, dpi=150)
 
 
 def _ratio(contestant: Contestant, contestants: Sequence[Contestant]) -> float | None:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 import question_tables as tables
-from play_tables import OUT, ROOT, play, rewritten
+from play_tables import OUT, ROOT, play
+from tables import rewritten
 
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import front_page
 import score_cards
-from front_page import rewritten
 from table_blocks import costs_block, paper_block, policies_block
+from tables import rewritten
 
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults

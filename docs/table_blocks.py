@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
-from record_tables import table
+from tables import table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording

@@ -1,5 +1,7 @@
 """BenchMARL goes on from the shipped network, and is judged beside Swarm D-T on the same seeds.
 
+python -m interop.benchmarl_learning
+
 The warehouse of the paper, with 10 robots that read and command in the frame of their motion. It
 shows that BenchMARL plays and trains the network, not that BenchMARL learned to win from nothing.
 """
@@ -13,12 +15,11 @@ from typing import Any
 import numpy as np
 import torch
 from benchmarl.algorithms import IppoConfig
+from benchmarl.environments.pettingzoo.common import PettingZooClass
 from benchmarl.experiment import Experiment, ExperimentConfig
 from benchmarl.models.mlp import MlpConfig
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from interop.benchmarl_mappo import SwarmTask
-from interop.results import passes, runs_with
 from interop.torchrl_worlds import TorchRLWorlds
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
 from swarm_logistics_env.motion import INPUTS
@@ -32,20 +33,37 @@ WORLDS, STEPS, ITERATIONS = 8, 125, 4
 SEEDS = range(10_000, 10_010)  # nothing was learned on them
 
 
-class WorldsTask(SwarmTask):
+class WorldsTask(PettingZooClass):  # type: ignore[misc]  # BenchMARL is not in the gate
     """The warehouse as a batch of worlds, as BenchMARL has it of vectorised simulators."""
 
     def get_env_fun(self, num_envs: int, continuous_actions: bool, seed: Any, device: Any) -> Any:
         """Return a maker of that many worlds."""
         return lambda: TorchRLWorlds(make, range(seed, seed + num_envs))
 
+    def supports_continuous_actions(self) -> bool:
+        """Return True."""
+        return True
+
+    def supports_discrete_actions(self) -> bool:
+        """Return False."""
+        return False
+
     def has_state(self) -> bool:
+        """Return False."""
+        return False
+
+    def has_render(self, env: Any) -> bool:
         """Return False."""
         return False
 
     def max_steps(self, env: Any) -> int:
         """Return the length of an episode."""
         return SCENARIO.n_steps
+
+    @staticmethod
+    def env_name() -> str:
+        """Return the name."""
+        return "swarm_logistics"
 
     def observation_spec(self, env: TorchRLWorlds) -> Any:
         """Return the observations of one world."""
@@ -67,7 +85,6 @@ class WorldsTask(SwarmTask):
 
 def main() -> None:
     """Learn for a few iterations, then play ten seeds with both."""
-    runs_with("benchmarl", "torchrl", "torch", "pettingzoo", "gymnasium")
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
         experiment = prepared(folder)
@@ -80,7 +97,7 @@ def main() -> None:
     differences = np.subtract(learned, scripted)
     error = differences.std(ddof=1) / len(SEEDS) ** 0.5
     assert differences.mean() > 2.262 * error, (learned, scripted)  # the 95 % interval, 9 d.o.f.
-    passes(
+    print(
         f"IPPO goes on from ppo-delivery, 10 robots, {experiment.total_frames * 10:,} agent-steps, "
         f"{minutes:.1f} minutes, P on {len(SEEDS)} new seeds {np.mean(learned):.1f}, of Swarm D-T "
         f"{np.mean(scripted):.1f}, difference {differences.mean():.1f} +- {2.262 * error:.1f}"

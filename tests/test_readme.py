@@ -53,9 +53,7 @@ def test_what_it_says_of_results_is_what_the_page_of_results_says(
 ) -> None:
     monkeypatch.syspath_prepend(ROOT / "docs")
     script = importlib.import_module("front_page")
-    assert script.rewritten(README, script.blocks()) == README, (
-        "stale: run `python docs/front_page.py`"
-    )
+    assert script.written() == README, "stale: run `python docs/front_page.py`"
     # Every number with an interval there stands in a table of that page.
     results = script.RESULTS.read_text(encoding="utf-8")
     told = re.findall(r"-?[\d.]+ \[-?[\d.]+, -?[\d.]+\]", script.findings(results))
@@ -97,7 +95,7 @@ def test_links_lead_to_files_or_the_page_says_where_they_do_not(
 ) -> None:
     monkeypatch.syspath_prepend(ROOT / "docs")
     script = importlib.import_module("front_page")
-    page = script.rewritten(README, script.pictures_and_links(address))
+    page = script.with_address(README, address)
     targets = re.findall(r'^\[[^]]+\]: (\S+)|src="([^"]+)"|\]\(([^)]+)\)', page, flags=re.MULTILINE)
     found = {target for group in targets for target in group if target}
     assert {"docs/media/fm4.gif", "docs/training.md"} <= {t.removeprefix(f"{address}/raw/main/")

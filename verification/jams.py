@@ -1,12 +1,8 @@
-"""Swarms driven to one point, to a wall and into a corner for 40 s: how deep bodies overlap.
-
-python -m verification.jams 5      # with the seeds 0 to 4
-"""
+"""Swarms driven to one point, to a wall and into a corner for 40 s: how deep bodies overlap."""
 
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,21 +84,3 @@ def _depths(world: Warehouse) -> NDArray[np.float64]:
     np.fill_diagonal(gaps, np.inf)
     far = np.array([scenario.warehouse_width, scenario.warehouse_height])
     return -np.hstack([gaps, np.hstack([at, far - at]) - scenario.robot_radius])
-
-
-def main() -> int:
-    """Play every jam with the seeds asked for; ends with 1 if a bound is broken."""
-    n_seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 1
-    broken = 0
-    for seed in range(n_seeds):
-        for n_robots in SIZES:
-            for target in TARGETS:
-                found = overlaps(n_robots, target, seed)
-                problem = found.problem(Scenario())
-                broken += problem is not None
-                print(f"{n_robots} robots, {target}, seed {seed}: {problem or found}", flush=True)
-    return 1 if broken else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
