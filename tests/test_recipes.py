@@ -151,7 +151,7 @@ DOCS = """
 import sys
 sys.path.append(sys.argv[1])
 import generate
-print(generate.page())
+print(generate.written("environment"))
 """
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,6 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.performance_table import rows_of
-from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
 ROOT = Path(__file__).parents[1]
@@ -160,28 +157,3 @@ def test_no_table_is_typed_by_hand(page: str) -> None:
     assert not [line for line in rest.splitlines() if line.startswith("|")]
     # Nor is a value with its interval: "9.2 [8.3, 10.1]".
     assert not re.findall(r"\d \[-?\d", rest)
-
-
-def test_the_seeds_that_claims_take_stand_beside_the_fixed_plan(tables: Any) -> None:
-    def made_up(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
-        """Counts around 40, and around 10 under FM4."""
-        for run in runs:
-            mean = 10.0 if any(fault.mode == "FM4" for fault in run.condition.faults) else 40.0
-            count = np.random.default_rng(int(run.key[:8], 16)).poisson(mean)
-            yield run, Outcome(run.key, np.arange(float(count)), digest=run.key)
-
-    script = importlib.import_module("play_until_clear")
-    asked: dict[str, Any] = {
-        "seeds": 30,
-        "reference": "paper",
-        "faults": [{"modes": ["FM2", "FM4"], "robots": [1]}],
-    }
-    both = (Study(until_clear=True, **asked), Study(**asked))
-    played = [study.run(made_up).played for study in both]
-    text = script.spent(*(study.findings() for study in both))
-    assert "| robust, FM4 | m = 1 | 20 | refuted | the same |" in text
-    assert "| robust, FM2 | m = 1 | 30 (open) | inconclusive | the same |" in text
-    assert f"{played[0]:,} runs instead of the fixed plan's {played[1]:,}. 2 of 4" in text
-    assert played == [4 * 30 - 10, 4 * 30]
-    page = script.STUDIES.read_text(encoding="utf-8")
-    assert script.rewritten(page, {"spent": "x"}).count("| ---") < page.count("| ---")

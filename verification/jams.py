@@ -1,4 +1,4 @@
-"""Swarms driven to one point, to a wall and into a corner for 40 s: how deep bodies overlap."""
+"""Swarms driven to one point, to a wall and into a corner for 15 s: how deep bodies overlap."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from swarm_logistics_env import Scenario, Warehouse
 from verification.invariants import JAM, SUSTAINED
 
 SIZES = (25, 150)
-SECONDS = 40.0
+SECONDS = 15.0
 # The point that all robots drive to [m]; along an axis that is None each stays where it is.
 TARGETS: dict[str, tuple[float, float | None]] = {
     "point": (5.0, 5.0),

@@ -165,9 +165,9 @@ def _t_statistic(p_o: Floats, p_new: Floats, threshold: float) -> Floats:
 
 
 def planned_seeds(model: str) -> int:
-    """Return the seeds planned for a power of 80 % at no change, from a pilot of 4,000."""
+    """Return the seeds planned for a power of 80 % at no change, from a pilot of 1,000."""
     draw, mean_o, _ = _ALL[model]
-    pilot = draw(np.random.default_rng(0), (4_000,), mean_o)
+    pilot = draw(np.random.default_rng(0), (1_000,), mean_o)
     return spi.seeds_for_equivalence(spi.equivalence(*pilot)) or 0
 
 

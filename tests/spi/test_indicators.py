@@ -55,15 +55,6 @@ def test_robustness_credits_the_share_of_faulty_robots() -> None:
     assert three.low - one.low == pytest.approx(2 / 25)
 
 
-def test_fewer_deliveries_lower_every_indicator() -> None:
-    for name, indicator in INDICATORS.items():
-        assert indicator(P, LESS).value < indicator(P, P).value, name
-
-
-def test_more_removed_deliveries_lower_fault_tolerance() -> None:
-    assert spi.fault_tolerance(P, LESS, P).value < spi.fault_tolerance(P, LESS, LESS).value == 0
-
-
 @over_indicators
 def test_one_seed_gives_the_value_and_nothing_else(name: str) -> None:
     estimate = INDICATORS[name]([39], [35], **({"p_s": [30]} if name == "FT" else {}))
@@ -73,6 +64,7 @@ def test_one_seed_gives_the_value_and_nothing_else(name: str) -> None:
     assert estimate.pairing_correlation is None
     assert estimate.n_seeds == 1
     assert estimate.flags == ("single_seed",)
+    assert estimate.threshold == 0.0
     assert estimate.mean_denominator == 39
 
 
@@ -84,12 +76,8 @@ def test_an_estimate_describes_its_input() -> None:
     d = np.array(LESS) - P - (0.1 - 2 / 25) * np.array(P)
     assert r.difference_sd == pytest.approx(d.std(ddof=1))
     assert r.degrees_of_freedom == 3
-
-
-def test_fault_tolerance_reports_how_faulty_and_removed_pair() -> None:
-    p_f, p_s = [3.0, 5.0, 9.0, 4.0], [4.0, 6.0, 8.0, 1.0]
-    ft = spi.fault_tolerance(P, p_f, p_s)
-    assert ft.pairing_correlation == pytest.approx(np.corrcoef(p_f, p_s)[0, 1])
+    ft = spi.fault_tolerance(P, LESS, P[::-1])
+    assert ft.pairing_correlation == pytest.approx(np.corrcoef(LESS, P[::-1])[0, 1])
 
 
 BAD_SAMPLES: list[tuple[Any, str]] = [
@@ -109,11 +97,8 @@ def test_bad_samples_are_named(name: str, bad: Any, message: str) -> None:
         INDICATORS[name](bad, P)
     with pytest.raises(IndicatorError, match=r"^p_(f|nm|new)\b.*" + message):
         INDICATORS[name](P, bad)
-
-
-def test_bad_removed_sample_is_named() -> None:
-    with pytest.raises(IndicatorError, match=r"p_s\[0\] = -1"):
-        spi.fault_tolerance(P, P, [-1, 2, 3, 4])
+    with pytest.raises(IndicatorError, match=r"^p_s\b.*" + message):
+        spi.fault_tolerance(P, P, bad)
 
 
 @over_indicators
@@ -146,17 +131,10 @@ def test_counts_are_checked(
         indicator(P, P, n=n, m=m)
 
 
-def test_more_faulty_robots_than_robots_are_an_error() -> None:
+def test_a_fault_hits_robots_that_are_there_and_fault_tolerance_leaves_one() -> None:
     with pytest.raises(IndicatorError, match="m = 26: should be at most n = 25"):
         spi.robustness(P, P, n=25, m=26)
     assert spi.robustness(P, P, n=25, m=25).value == 1.0
-
-
-def test_scalability_may_double_the_swarm_and_more() -> None:
-    assert spi.scalability([9], [27], n=5, m=10).value == 1.0
-
-
-def test_fault_tolerance_leaves_a_robot() -> None:
     with pytest.raises(IndicatorError, match="m = 25 of n = 25"):
         spi.fault_tolerance(P, P, P, n=25, m=25)
     with pytest.raises(IndicatorError, match="m = 0"):
@@ -188,26 +166,6 @@ def test_threshold_and_confidence_are_checked() -> None:
     for confidence in confidences:
         with pytest.raises(IndicatorError, match="confidence"):
             spi.relative_change(P, P, confidence=confidence)
-
-
-def test_an_ablation_that_costs_a_third_refutes_less() -> None:
-    p_o = np.array([36.0, 40, 33, 38, 41, 35])
-    half = spi.relative_change(p_o, p_o / 2 + [1, -1, 0, 1, -1, 0], threshold=-1 / 3)
-    assert half.verdict == "refuted"
-    tenth = spi.relative_change(p_o, p_o * 0.9 + [1, -1, 0, 1, -1, 0], threshold=-1 / 3)
-    assert tenth.verdict == "supported"
-
-
-def test_every_indicator_is_tested_against_0_unless_told_otherwise() -> None:
-    p = [30.0, 40.0, 50.0], [31.0, 42.0, 49.0]
-    estimates = (
-        spi.scalability(*p, n=5, m=5),
-        spi.robustness(*p, n=5, m=1),
-        spi.fault_tolerance(*p, p[0]),
-        spi.adaptability(*p, x_o=1.0, x_new=2.0),
-        spi.relative_change(*p),
-    )
-    assert [estimate.threshold for estimate in estimates] == [0.0] * 5
 
 
 def test_skewed_differences_are_flagged() -> None:

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKI
 TRAINING = """\
 name = "tiny"
 threads = 1
-agent_steps = 3200
+agent_steps = 1600
 
 [[worlds]]
 n_robots = 3
@@ -55,8 +55,8 @@ epochs = 2
 value_hidden = [8]
 
 [evaluation]
-every = 800
-seeds = 4
+every = 400
+seeds = 2
 n_robots = 5
 faults = { FM4 = 1 }
 
@@ -94,7 +94,7 @@ def test_a_training_that_was_killed_ends_as_one_that_was_not(tmp_path: Path) -> 
     words = ["train", str(tmp_path / "tiny.toml"), "--out", str(whole.parent), "--device", "cpu"]
     assert app.run(words) == 0
     cut = tmp_path / "cut"
-    code, told = started(tmp_path, 10)
+    code, told = started(tmp_path, 5)
     assert code == -signal.SIGKILL, told
     assert not (cut / "tiny.safetensors").exists()
     code, told = started(tmp_path, 0)
