@@ -102,18 +102,6 @@ def test_a_release_is_published_without_a_password_and_with_attestations() -> No
     assert "secrets." not in everything
 
 
-def test_issue_forms_ask_for_something() -> None:
-    forms = [path for path in HOST.glob("ISSUE_TEMPLATE/*.yml") if path.name != "config.yml"]
-    assert len(forms) == 3
-    for path in forms:
-        form = yaml.safe_load(path.read_text(encoding="utf-8"))
-        assert {"name", "description", "body"} <= form.keys()
-        names = [part["id"] for part in form["body"]]
-        assert len(set(names)) == len(names)
-        assert any(part.get("validations", {}).get("required") for part in form["body"])
-        assert all(part["attributes"]["label"] for part in form["body"])
-
-
 def test_links_of_the_readme_exist() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     links = re.findall(r"\]\(([^)]+)\)|^\[[^\]]+\]: (\S+)$", readme, flags=re.MULTILINE)

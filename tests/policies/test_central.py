@@ -53,10 +53,6 @@ def test_it_gets_on_with_robots_that_fail(mode: str) -> None:
     assert delivered(SMALL, Fault(mode, 2)) >= 8
 
 
-def test_when_nobody_hears_nothing_is_delivered() -> None:
-    assert delivered(SMALL, Fault("FM3_hear", 6)) == 0
-
-
 def test_it_needs_the_state_and_nothing_else() -> None:
     world, policy = Warehouse(SMALL), load("central")
     observations = world.reset(0)

@@ -37,12 +37,6 @@ def test_pivots_are_students_statistic_of_resampled_seeds() -> None:
         assert np.quantile(pivots, share) == pytest.approx(np.quantile(by_hand, share), abs=0.12)
 
 
-def test_many_studies_at_once_are_the_studies_one_by_one() -> None:
-    together = resampled_pivots(np.stack([RESIDUAL, RESIDUAL**3]))
-    assert together.shape == (RESAMPLES, 2)
-    assert together[:, 1] == pytest.approx(resampled_pivots(RESIDUAL**3))
-
-
 @pytest.mark.parametrize("alpha", [0.05, 0.0005, 0.3])
 def test_the_critical_value_is_the_largest_statistic_that_is_kept(alpha: float) -> None:
     pivots = resampled_pivots(RESIDUAL)

@@ -85,18 +85,6 @@ def test_wrong_verdicts_are_bounded_on_either_side(
     assert max(above, below) <= most
 
 
-def test_the_percentile_bootstrap_is_why_it_is_no_default() -> None:
-    n, studies, resamples = 5, 2_000, 400
-    rng = np.random.default_rng(0)
-    p_o, p_f = overdispersed(rng, (studies, n))
-    drawn = rng.integers(n, size=(resamples, studies, n))
-    rows = np.arange(studies)[:, np.newaxis]
-    ratios = p_f[rows, drawn].mean(axis=2) / p_o[rows, drawn].mean(axis=2) - 1 + M_OVER_N
-    low, high = np.quantile(ratios, [0.025, 0.975], axis=0)
-    percentile = float(((low <= TRUE_R) & (high >= TRUE_R)).mean())
-    assert 0.78 < percentile < 0.88
-
-
 def test_the_unpaired_interval_covers_independent_samples_of_unequal_size() -> None:
     studies, rng = 1_000, np.random.default_rng(6)
     covered = 0

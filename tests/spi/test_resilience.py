@@ -17,16 +17,6 @@ def test_the_index_counts_deliveries_after_the_onset() -> None:
     assert (index.indicator, index.threshold, index.n_seeds) == ("resilience", 1.0, 2)
 
 
-def test_it_is_judged_like_any_ratio() -> None:
-    rng = np.random.default_rng(0)
-    reference = [rng.uniform(0, 2_000, 160) for _ in range(12)]
-    half = [times[::2] for times in reference]
-    against_removed = spi.resilience_index(half, reference, onset=1_000)
-    assert against_removed.verdict == "refuted"
-    against_share = spi.resilience_index(half, reference, onset=1_000, threshold=1 - 20 / 25)
-    assert against_share.verdict == "supported"
-
-
 BAD: list[tuple[Any, Any, str]] = [
     ([], [[1.0]], "faulty is empty"),
     ([[1.0]], [], "reference is empty"),

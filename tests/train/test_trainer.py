@@ -275,15 +275,6 @@ def test_deviations_keep_above_their_floor(small: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(ended["deviations"], [0.5, 0.4, 0.4], rtol=1e-5)
 
 
-def test_the_value_network_may_learn_alone_at_first(small: Any, tmp_path: Path) -> None:
-    training = small()
-    training = training.replace(ppo=training.ppo.replace(value_warmup=100))
-    path = train(training, tmp_path)
-    learner = make_learner(training, trainer._new_view(training), "cpu")
-    begun = tensors_of(learner.policy)
-    assert all((load_file(path)[name] == begun[name]).all() for name in begun)
-
-
 def test_checkpoints_hold_worlds_that_go_on(small: Any) -> None:
     view = trainer._new_view(small())
     view.seed(0)
