@@ -12,8 +12,8 @@ import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi import FaultBudget
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
-from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.resilience import SurvivalCurve
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome

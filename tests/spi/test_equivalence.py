@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -108,6 +110,6 @@ def test_holm_over_equivalences_is_stricter_than_each_alone() -> None:
 @pytest.mark.parametrize(
     "field", [{"margin": 0.0}, {"margin": 1.0}, {"margin": -0.1}, {"alpha": 0.0}, {"alpha": 0.5}]
 )
-def test_margin_or_alpha_out_of_range(field: dict[str, float]) -> None:
+def test_margin_or_alpha_out_of_range(field: dict[str, Any]) -> None:
     with pytest.raises(IndicatorError, match=next(iter(field))):
         spi.equivalence([39, 40], [38, 41], **field)
