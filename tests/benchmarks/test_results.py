@@ -25,16 +25,11 @@ def contestants() -> list[Contestant]:
     ]
 
 
-def test_ratios_are_medians_over_turns_and_rates_count_agent_steps() -> None:
-    base, twice = contestants()
-    in_turns([base, twice], 3)
+def test_ratios_are_medians_over_turns_and_results_name_who_is_missing(tmp_path: Path) -> None:
+    base, twice = found = contestants()
+    in_turns(found, 3)
     assert twice.ratio_to(base) == 2.0
     assert (base.rate, twice.microseconds) == (50.0, 400_000.0)
-
-
-def test_results_are_shown_and_written_with_who_is_missing(tmp_path: Path) -> None:
-    found = contestants()
-    in_turns(found, 3)
     console = Console(width=150, record=True)
     show(console, found, {"Absent": "No module named 'absent'"}, "title")
     text = console.export_text()
