@@ -16,14 +16,13 @@ from benchmarks import ours
 from benchmarks.floor import record
 from benchmarks.instructions import instructions_of_a_step
 from benchmarks.peers import PEERS
-from benchmarks.results import as_json, save, show
+from benchmarks.results import Contestant, as_json, in_turns, save, show
 from benchmarks.start_up import (
     bytes_per_robot,
     compile_seconds,
     first_step_seconds,
     import_seconds,
 )
-from benchmarks.timing import Contestant, in_turns
 from swarm_logistics_env import Scenario
 
 _STEPS, _MANY = 1000, (1_000, 10_000)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.floor import ForceFloor, Recording, record
-from benchmarks.timing import Contestant
+from benchmarks.results import Contestant
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.policies.policy import start

@@ -35,23 +35,8 @@ from swarm_logistics_env.train.settings import (
     WorldKind,
 )
 from swarm_logistics_env.train.training import Training, load_training, preset_names
-from swarm_logistics_env.warehouse.warehouse import COMMAND_COLUMNS
 
 DOCS = Path(__file__).parent
-INFOS = [
-    ("`failed`", "0 or 1", "1 while any failure mode holds for the robot, removal included"),
-    ("`delivered`", "items", "delivered so far by the whole swarm: the paper's P"),
-    ("`active`", "0 or 1", "with `FixedAgents` only: 1 if the agent's robot is there"),
-]
-
-# What -1, 0 and 1 do.
-COMMANDS = {
-    "forward": ("back at top speed", "no motion", "ahead at top speed"),
-    "left": ("to the right at top speed", "no motion", "to the left at top speed"),
-    "turn": ("right at the top turn rate", "no turn", "left at the top turn rate"),
-    "gripper": ("below -0.5: opens", "keeps its state", "above 0.5: holds"),
-}
-
 FACTORS = {"sizes": Sizes, "faults": Faults, "parameters": Parameter, "ablations": Ablation}
 PARTS = {
     "[network]": Network,
@@ -68,21 +53,11 @@ def environment() -> dict[str, str]:
     """Return the blocks of the page about the environment."""
     scenario = Scenario()
     env = SwarmLogisticsEnv(scenario)
-    facts = {
-        "Import": "`from swarm_logistics_env import swarm_logistics_v0`",
-        "Actions": "continuous",
-        "Parallel API": "yes",
-        "Manual control": "no",
-        "Agents": f"`[robot_0, .., robot_{scenario.n_robots - 1}]`",
-        "Number of agents": scenario.n_robots,
-        "Action shape": env.action_space("robot_0").shape,
-        "Action values": "[-1, 1]",
-        "Observation shape": env.observation_space("robot_0").shape,
-        "Observation values": "see below",
-        "State shape": env.state_space.shape,
-        "Render modes": ", ".join(env.metadata["render_modes"]),
+    shapes = {
+        "observations": env.observation_space("robot_0").shape,
+        "actions": env.action_space("robot_0").shape,
+        "state": env.state_space.shape,
     }
-    commands = [(place, f"`{name}`", *COMMANDS[name]) for place, name in enumerate(COMMAND_COLUMNS)]
     rewards = [
         (f"`{name}`", f"{DEFAULT_WEIGHTS.get(name, 0.0):g}", summary(term))
         for name, term in REWARD_TERMS.items()
@@ -92,12 +67,10 @@ def environment() -> dict[str, str]:
     sources = ", ".join(f"[{name}]({address})" for name, address in SOURCES.items())
     state = [("robot", ", ".join(ROBOT_FEATURES)), ("item", ", ".join(ITEM_FEATURES))]
     return {
-        "facts": table(("", ""), list(facts.items())),
+        "shapes": table(("of 25 robots", "shape"), list(shapes.items())),
         "observations": observation_table(scenario),
-        "commands": table(("column", "name", "-1", "0", "1"), commands),
         "state": table(("of each", "numbers"), [*state, ("world", "the time [s]")]),
         "rewards": table(("term", "default weight", "pays"), rewards),
-        "infos": table(("key", "unit", "meaning"), INFOS),
         "arguments": arguments_list(),
         "scenario": f"{scenario_table(scenario)}\n\nSources: {sources}.",
         "fault": f"`Fault({', '.join(Fault.model_fields)})`",

@@ -8,7 +8,7 @@ runs stall, with the errors that only the runs seen would make, and what plans f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -196,81 +196,83 @@ def planned_power(
     return float(np.median(planned)), float(np.mean(found))
 
 
-def until_clear_table(studies: int = STUDIES) -> str:
-    """Return the errors of studies that run until they are clear, as Markdown."""
-    heading = "| counts | most seeds | wrong | above, below | in a family of 12 |"
-    lines = [heading, "| --- " * 5 + "|"]
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table."""
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
 
+
+def until_clear_rows(studies: int = STUDIES) -> Iterator[Sequence[str]]:
+    """Yield the errors of studies that run until they are clear, alone and in a family."""
     for model in MODELS:
         for most in (60, 200):
             looks = looks_up_to(most)
             one = wrong_verdicts(model, looks, studies)
             each = wrong_verdicts(model, looks, FAMILY * studies, 0.05 / FAMILY).share
-            family = 1 - (1 - each) ** FAMILY
             sides = f"{one.above:.3f}, {one.below:.3f}"
-            lines.append(f"| {model} | {most} | {one.share:.3f} | {sides} | {family:.3f} |")
-    return "\n".join(lines)
+            yield model, str(most), f"{one.share:.3f}", sides, f"{1 - (1 - each) ** FAMILY:.3f}"
 
 
-def equivalence_table(studies: int = STUDIES) -> str:
-    """Return the errors and the power of equivalence at a margin of 0.1, as Markdown."""
-    heading = "wrong at a change of -0.1 and 0.1, 30 seeds"
-    lines = [f"| counts | {heading} | planned seeds | their power |", "| --- " * 4 + "|"]
+def equivalence_rows(studies: int = STUDIES) -> Iterator[Sequence[str]]:
+    """Yield the errors and the power of equivalence at a margin of 0.1."""
     for model in ("poisson", "overdispersed"):
         wrong = (share_equivalent(model, 30, change, studies) for change in (-EDGE, EDGE))
         seeds = planned_seeds(model)
-        told = ", ".join(f"{share:.3f}" for share in wrong)
         power = share_equivalent(model, seeds, 0.0, studies)
-        lines.append(f"| {model} | {told} | {seeds} | {power:.2f} |")
-    return "\n".join(lines)
+        yield model, ", ".join(f"{share:.3f}" for share in wrong), str(seeds), f"{power:.2f}"
 
 
-def stall_table(studies: int = STALL_STUDIES) -> str:
-    """Return the errors at the true value where some runs stall, as Markdown.
+def stall_rows(studies: int = STALL_STUDIES) -> Iterator[Sequence[str]]:
+    """Yield the errors at the true value where some runs stall, until clear as well.
 
     In brackets those that the runs seen alone would make. What is called wrong above the truth, and
     equivalent though P falls by a tenth, is the harm that stalls do.
     """
-    lines = [
-        "| runs | seeds | wrong above | wrong below | wrongly equivalent |",
-        "| --- " * 5 + "|",
-    ]
+    fixed: list[Sequence[int]] = [[n] for n in (10, 20, 30, 50, 100)]
     for model in STALLS:
-        for n in (10, 20, 30, 50, 100):
-            one, seen = (
-                wrong_verdicts(model, [n], studies, only_seen=only) for only in (False, True)
+        for looks in (*fixed, looks_up_to(60), looks_up_to(200)):
+            one, seen = (wrong_verdicts(model, looks, studies, only_seen=o) for o in (False, True))
+            equal = ""
+            if len(looks) == 1:
+                both = (
+                    share_equivalent(model, looks[0], -EDGE, studies, only_seen=only)
+                    for only in (False, True)
+                )
+                equal = "{:.3f} ({:.3f})".format(*both)
+            above, below = (
+                f"{getattr(one, side):.3f} ({getattr(seen, side):.3f})"
+                for side in ("above", "below")
             )
-            equal, equal_seen = (
-                share_equivalent(model, n, -EDGE, studies, only_seen=only) for only in (False, True)
-            )
-            lines.append(
-                f"| {model} | {n} | {one.above:.3f} ({seen.above:.3f}) | {one.below:.3f} "
-                f"({seen.below:.3f}) | {equal:.3f} ({equal_seen:.3f}) |"
-            )
-        for most in (60, 200):
-            one, seen = (
-                wrong_verdicts(model, looks_up_to(most), studies, only_seen=only)
-                for only in (False, True)
-            )
-            lines.append(
-                f"| {model} | until clear, {most} | {one.above:.3f} ({seen.above:.3f}) | "
-                f"{one.below:.3f} ({seen.below:.3f}) | |"
-            )
-    return "\n".join(lines)
+            seeds = str(looks[0]) if equal else f"until clear, {looks[-1]}"
+            yield model, seeds, above, below, equal
 
 
-def planned_table(pilots: int = PILOTS) -> str:
-    """Return the power of the seeds that pilots plan for 80 %, as Markdown."""
-    lines = ["| runs | pilot | planned seeds | their power |", "| --- " * 4 + "|"]
+def planned_rows(pilots: int = PILOTS) -> Iterator[Sequence[str]]:
+    """Yield the power of the seeds that pilots plan for 80 %."""
     for model, distance in {**dict.fromkeys(MODELS, -0.1), **dict.fromkeys(STALLS, 0.1)}.items():
         for pilot_seeds in (10, 20, 100):
             seeds, power = planned_power(model, distance, pilot_seeds, pilots)
-            lines.append(f"| {model} | {pilot_seeds} | {seeds:.0f} | {power:.2f} |")
-    return "\n".join(lines)
+            yield model, str(pilot_seeds), f"{seeds:.0f}", f"{power:.2f}"
 
+
+TABLES: Mapping[str, tuple[Sequence[str], Callable[[], Iterable[Sequence[str]]]]] = {
+    f"Until clear, {STUDIES:,} studies": (
+        ("counts", "most seeds", "wrong", "above, below", f"in a family of {FAMILY}"),
+        until_clear_rows,
+    ),
+    f"Equivalence, {STUDIES:,} studies": (
+        ("counts", "wrong at -0.1 and 0.1, 30 seeds", "planned seeds", "their power"),
+        equivalence_rows,
+    ),
+    f"Where runs stall, {STALL_STUDIES:,} studies": (
+        ("runs", "seeds", "wrong above", "wrong below", "wrongly equivalent"),
+        stall_rows,
+    ),
+    f"Planned for 80 %, {PILOTS} pilots of each size": (
+        ("runs", "pilot", "planned seeds", "their power"),
+        planned_rows,
+    ),
+}
 
 if __name__ == "__main__":
-    print(f"Until clear, {STUDIES:,} studies:\n\n{until_clear_table()}\n")
-    print(f"Equivalence, {STUDIES:,} studies:\n\n{equivalence_table()}\n")
-    print(f"Where runs stall, {STALL_STUDIES:,} studies:\n\n{stall_table()}\n")
-    print(f"Planned for 80 %, {PILOTS} pilots of each size:\n\n{planned_table()}")
+    for title, (heading, told) in TABLES.items():
+        print(f"{title}:\n\n{markdown(heading, told())}\n")

@@ -12,8 +12,7 @@ from rich.console import Console
 
 from benchmarks import __main__ as benchmark
 from benchmarks.floor import ForceFloor, record
-from benchmarks.results import as_json, save, show
-from benchmarks.timing import Contestant, in_turns
+from benchmarks.results import Contestant, as_json, in_turns, save, show
 from swarm_logistics_env import Scenario, Warehouse
 
 
