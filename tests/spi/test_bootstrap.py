@@ -13,6 +13,7 @@ from swarm_logistics_env.spi.bootstrap import (
     resampled_pivots,
     upper_p,
 )
+from swarm_logistics_env.spi.ratio import paired_ratio
 
 rng = np.random.default_rng(2)
 P_O = rng.poisson(39, 12).astype(float)
@@ -66,3 +67,10 @@ def test_from_ten_seeds_on_the_larger_p_counts() -> None:
     nine = spi.robustness(p_o[:9], lucky[:9], n=25, m=2, threshold=-0.6)
     assert nine.p_value == pytest.approx(ttest_1samp(difference[:9], 0.0).pvalue)
     assert "assumes_normal" in nine.flags
+
+
+def test_the_two_sides_mirror_each_other() -> None:
+    skewed = P_O * 0.9 - 4.0 + np.geomspace(0.1, 12.0, 12) - P_O
+    one, other = (paired_ratio(side * skewed, P_O, threshold=side * -0.05) for side in (1, -1))
+    assert one.p_value == other.p_value
+    assert (one.low, one.high) == (pytest.approx(-other.high), pytest.approx(-other.low))
