@@ -10,7 +10,6 @@ STUDY := .venvs/study
 DOCS  := .venvs/docs
 
 BENCHMARK := .venvs/benchmark
-PEERS     := .venvs/peers
 
 TORCHRL   := .venvs/torchrl
 BENCHMARL := .venvs/benchmarl
@@ -32,7 +31,7 @@ help:
 	@echo "make combined-faults  2,000 small worlds whose faults meet, against a slow reference"
 	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
-	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
+	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
 	@echo "make interop         TorchRL, BenchMARL, RLlib and SuperSuit on the environment; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make docs            the documentation site, site/index.html"
@@ -87,8 +86,8 @@ test-lowest test-newest: test-%: .venvs/%/wheel
 	git ls-files -z | grep -zv '^swarm_logistics_env/\|^policies$$\|^train$$' | xargs -0 tar -cf - | tar -xf - -C build/installed-$*
 	cd build/installed-$* && $(CURDIR)/.venvs/$*/bin/python -m pytest --numprocesses=2 --dist=loadgroup
 
-benchmark: $(BENCHMARK)/installed $(PEERS)/installed
-	$(BENCHMARK)/bin/python -m benchmarks --peers $(PEERS)/bin/python --out results/benchmark
+benchmark: $(BENCHMARK)/installed
+	$(BENCHMARK)/bin/python -m benchmarks --out results/benchmark
 
 # Each library in an environment of its own: calls of its wrappers as tests, and what learns with it.
 interop: $(TORCHRL)/installed $(BENCHMARL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
@@ -155,15 +154,6 @@ $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
 	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
 		"$$(echo build/wheels/*.whl)[study,render,watch]" build hypothesis pytest pytest-xdist setuptools
-
-# What is measured beside this package: an environment of their own, as their requirements clash
-# with ours. One that cannot be installed is named in the benchmark's table.
-$(PEERS)/installed: constraints.txt
-	$(PYTHON) -m venv $(PEERS)
-	for peer in rware mpe2 vmas; do \
-		$(PEERS)/bin/python -m pip install --constraint constraints.txt $$peer || true; \
-	done
-	@touch $@
 
 $(BENCHMARK)/installed: EXTRAS := study,train
 

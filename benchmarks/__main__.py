@@ -1,13 +1,11 @@
-"""Measure the package beside the bare physics and its peers, in one run.
+"""Measure the package beside the bare physics, in one run.
 
-python -m benchmarks --peers .venvs/peers/bin/python --out results/benchmark
+python -m benchmarks --out results/benchmark
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import subprocess
 from pathlib import Path
 
 from rich.console import Console
@@ -15,10 +13,8 @@ from rich.console import Console
 from benchmarks import ours
 from benchmarks.floor import record
 from benchmarks.instructions import instructions_of_a_step
-from benchmarks.peers import PEERS
 from benchmarks.results import Contestant, as_json, in_turns, save, show
 from benchmarks.start_up import (
-    bytes_per_robot,
     compile_seconds,
     first_step_seconds,
     import_seconds,
@@ -42,49 +38,30 @@ def contestants_of_ours() -> list[Contestant]:
     return found
 
 
-def peers(interpreter: str, repeats: int) -> tuple[list[Contestant], dict[str, str]]:
-    """Return the peers that run, measured, and why the others do not."""
-    measured, missing = [], {}
-    for key, (name, _) in PEERS.items():
-        script = [interpreter, str(Path(__file__).with_name("peers.py")), key, str(repeats)]
-        done = subprocess.run(script, capture_output=True, text=True, check=False)
-        last = (done.stderr if done.returncode else done.stdout).strip().splitlines()[-1]
-        if done.returncode:
-            missing[name] = last
-            continue
-        agent_steps, steps, includes, seconds = json.loads(last)
-        one = Contestant(name, includes, lambda: None, agent_steps, steps, seconds=seconds)
-        measured.append(one)
-    return measured, missing
-
-
 def main() -> None:
     """Measure, print and save."""
     parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
     parser.add_argument("--repeats", type=int, default=15, help="turns of everybody")
-    parser.add_argument("--peers", default="", help="the interpreter that has the peers")
     parser.add_argument("--out", type=Path, help="folder for benchmark.json")
     given = parser.parse_args()
 
     console = Console(width=150)
     found = contestants_of_ours()
     in_turns(found, given.repeats)
-    others, missing = peers(given.peers, given.repeats) if given.peers else ([], {})
     title = (
         f"Medians of {given.repeats} interleaved runs, processor time; N = 25 unless said; "
         "cost: per agent-step"
     )
-    show(console, [*found, *others], missing, title)
+    show(console, found, title)
 
     package, needed = import_seconds(5)
-    first_step, memory = first_step_seconds(3), bytes_per_robot()
+    first_step = first_step_seconds(3)
     compiling = compile_seconds()
     counts = instructions_of_a_step()
     console.print(
         f"import swarm_logistics_env: {package:.2f} s, {package / needed:.2f} times pettingzoo, "
         f"pymunk and numba ({needed:.2f} s)\n"
-        f"second process, warm cache: first step after {first_step:.2f} s of wall time\n"
-        f"memory: {'unknown' if memory is None else f'{memory:,.0f} bytes'} a robot at N = 10,000"
+        f"second process, warm cache: first step after {first_step:.2f} s of wall time"
     )
     for what, seconds in compiling.items():
         console.print(f"{what}: {seconds:.1f} s of the processor")
@@ -98,10 +75,8 @@ def main() -> None:
         save(
             given.out,
             as_json(
-                [*found, *others],
-                peers_that_do_not_run=missing,
+                found,
                 seconds=start_up,
-                bytes_per_robot=memory,
                 instructions=counts,
             ),
         )

@@ -86,13 +86,8 @@ def machine() -> dict[str, Any]:
     }
 
 
-def show(
-    console: Console,
-    contestants: Sequence[Contestant],
-    missing: Mapping[str, str],
-    title: str,
-) -> None:
-    """Print one row per contestant, and one per peer that does not run."""
+def show(console: Console, contestants: Sequence[Contestant], title: str) -> None:
+    """Print one row per contestant."""
     table = Table(title=title)
     for column in ("", "agent-steps per s", "us per step", "cost", "a step includes"):
         left = column in ("", "a step includes")
@@ -105,8 +100,6 @@ def show(
             _cost(contestant, contestants),
             contestant.includes,
         )
-    for name, reason in missing.items():
-        table.add_row(name, "-", "-", "-", f"does not run: {reason}")
     console.print(table)
 
 

@@ -9,14 +9,10 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from tables import block_of, rewritten
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 DOCS = Path(__file__).parent
 README, RESULTS = DOCS.parent / "README.md", DOCS / "results.md"
@@ -95,7 +91,7 @@ def _learned(rows: Rows) -> Iterator[str]:
 
 
 def _faults(rows: Rows) -> Iterator[str]:
-    """Yield the greatest difference that a failure mode makes, and one the other way round."""
+    """Yield the greatest difference that a failure mode makes."""
     r = {mode: row for mode in _MODES if (row := rows.get(f"R, {mode}, m = 2"))}
     worst = {mode: min(row, key=lambda name: row[name].value) for mode, row in r.items()}
     best = {mode: max(row, key=lambda name: row[name].low) for mode, row in r.items()}
@@ -108,14 +104,6 @@ def _faults(rows: Rows) -> Iterator[str]:
         f"less (robustness R = {r[mode][lost].text}), while `{kept}` {bears} "
         f"({r[mode][kept].text})."
     )
-    for other, row in r.items():
-        if row[kept].high < 0.0 < row[lost].low:
-            yield (
-                f"**Under another fault it is the other way round**: with {other} "
-                f"({_MODES[other]}), R of `{kept}` is {row[kept].text}, of `{lost}` "
-                f"{row[lost].text}."
-            )
-            return
 
 
 _SHARE = 2 / 25  # of the robots that fail: R = (P_F - P_o) / P_o + m/N
@@ -160,25 +148,17 @@ def speed(page: str) -> str:
 # -- the picture --------------------------------------------------------------------------------
 
 
-@contextmanager
-def canvas(path: Path, width: float, height: float) -> Iterator[Figure]:
-    """Yield a figure of a size [inch], and write it; equal figures give equal bytes."""
+def draw(rows: Rows, path: Path) -> None:
+    """Draw the forest plot: a row a policy, a panel a question; equal rows give equal bytes."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
+    names = list(rows["P, N = 25"])
+    places = range(len(names), 0, -1)
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams |= {"svg.hashsalt": "front page", "font.size": 9.0, "axes.linewidth": 0.6}
-        figure = Figure(figsize=(width, height), layout="constrained")
-        yield figure
-        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
-
-
-def draw(rows: Rows, path: Path) -> None:
-    """Draw the forest plot: a row a policy, a panel a question."""
-    names = list(rows["P, N = 25"])
-    places = range(len(names), 0, -1)
-    with canvas(path, 9.2, 2.7) as figure:
+        figure = Figure(figsize=(9.2, 2.7), layout="constrained")
         panels = figure.subplots(1, len(_PANELS), sharey=True)
         for axes in panels[3:]:  # the modes on one scale
             axes.sharex(panels[2])
@@ -199,35 +179,7 @@ def draw(rows: Rows, path: Path) -> None:
             axes.set_axisbelow(True)
         panels[0].set_yticks(list(places), names)
         panels[0].set_xlim(left=0.0)
-
-
-_OURS = {"env.step_arrays": "this package, arrays", "env.step": "this package, dicts"}
-_OTHERS = ("RWARE", "MPE2", "VMAS")
-
-
-def draw_speed(costs: str, path: Path) -> None:
-    """Draw agent-steps a second of this package and of others, from the table of costs."""
-    rates = {
-        line.split("|")[1].partition(":")[0].strip(): float(line.split("|")[2].replace(",", ""))
-        for line in costs.splitlines()[2:]
-        if line.startswith("| ")
-    }
-    shown = {
-        _OURS.get(name, name): rate
-        for name, rate in rates.items()
-        if name in _OURS or name.startswith(_OTHERS)
-    }
-    with canvas(path, 7.2, 2.1) as figure:
-        axes = figure.subplots()
-        colours = ["#0072b2" if "this" in label else "#9aa0a8" for label in shown]
-        bars = axes.barh(list(shown), list(shown.values()), color=colours, height=0.65)
-        axes.bar_label(bars, [f"{rate:,.0f}" for rate in shown.values()], padding=4)
-        axes.set_xscale("log")
-        axes.set_xlim(1e3, 5e6)
-        axes.invert_yaxis()
-        axes.spines[["top", "right", "left"]].set_visible(False)
-        axes.tick_params(axis="y", length=0)
-        axes.set_xlabel("agent-steps a second, logarithmic")
+        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
 
 
 # -- links --------------------------------------------------------------------------------------
@@ -269,7 +221,6 @@ def main() -> None:
     README.write_text(written(), encoding="utf-8")
     page = RESULTS.read_text(encoding="utf-8")
     draw(rows_of(block_of(page, "policies")), MEDIA / "policies.svg")
-    draw_speed(block_of(page, "costs"), MEDIA / "speed.svg")
 
 
 if __name__ == "__main__":

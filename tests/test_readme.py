@@ -77,7 +77,6 @@ def test_a_finding_is_a_rule_not_a_sentence(script: Any) -> None:
     # R = (P_F - P_o) / P_o + m/N, with m/N = 0.08.
     assert "in mode FM1 (tells a false timer) `swarm-dt` delivers 58 % less" in said
     assert "while `ppo-b` withstands it (0.05 [0.01, 0.07])" in said
-    assert "with FM2 (lifts nothing), R of `ppo-b` is -0.2 [-0.3, -0.1], of `swarm-dt`" in said
     assert "`ppo-b` scales best (S = 0.5 [0.4, 0.6]), and `a` delivers less" in said
     assert "over 30 seeds" in said
 

@@ -1,12 +1,15 @@
-"""The table of indicators: a new row appears in plan, tables, figures and sentences."""
+"""The table of indicators, and what importing them costs and needs."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
 import pytest
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change
 from swarm_logistics_env.studies import Study
@@ -32,3 +35,25 @@ def test_references_are_those_that_the_paper_names() -> None:
 def test_an_indicator_that_no_row_defines_is_refused(small: dict[str, Any]) -> None:
     with pytest.raises(StudyError, match="no indicator 'FR'"):
         Study(**small, indicators=["FR"])
+
+
+def test_importing_the_indicators_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, swarm_logistics_env.spi;"
+        "heavy = ('scipy.special', 'scipy.optimize', 'scipy.stats', 'pandas');"
+        "print([name for name in heavy if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_public_name_is_there_and_documented() -> None:
+    for name in spi.__all__:
+        assert getattr(spi, name) is not None
+        if name not in ("Spending", "Verdict"):
+            assert getattr(spi, name).__doc__, name
+
+
+def test_a_removed_name_says_what_to_use_instead() -> None:
+    with pytest.raises(ImportError, match=r"removed in 0\.3\.0: use spi\.repair_times"):
+        from swarm_logistics_env.spi import self_repair  # type: ignore[attr-defined]  # noqa: F401

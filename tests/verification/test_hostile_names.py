@@ -30,20 +30,8 @@ WORDS = ["../../victim", "/tmp/victim", "..\\victim", "..", ".hidden", "con", "a
          "<script>alert(1)</script>", "<img src=x onerror=alert(1)>", "</script><script>alert(1)",
          "![x](http://x.test/y.png)", "[x](javascript:alert(1))", "{{ 7 * 7 }}", "$\\frac$",
          "[bold red]x[/]"]  # fmt: skip
-ALONE = [
-    "é" * 40,
-    "x" * 300,
-    "x" * 80,
-    "`" * 5,
-    "|",
-    "\\",
-    "a|b",
-    "-rf",
-    "%s%n",
-    "0",
-    "\ud800",
-    "]",
-]
+ALONE = ["é" * 40, "x" * 300, "x" * 80, "`" * 5, "|", "\\", "a|b", "-rf", "%s%n", "0", "\ud800",
+         "]"]  # fmt: skip
 # Each word as it is, and after one sign, in turn; each sign before one word.
 PAIRS = zip(itertools.cycle(SIGNS), WORDS, strict=False)
 NAMES = sorted({*WORDS, *(sign + word for sign, word in PAIRS), *ALONE})
