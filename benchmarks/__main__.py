@@ -27,7 +27,7 @@ _STEPS, _MANY = 1000, (1_000, 10_000)
 def contestants_of_ours() -> list[Contestant]:
     """Return everything of this package that is timed, compiled and warm."""
     recording = record(Scenario(restock=True), _STEPS)
-    found = [*ours.paths(recording), ours.policy(recording)]
+    found = [*ours.paths(recording)]
     found += [ours.vec_env(threads) for threads in (1, 2)]
     found[-1].base = found[-2].name
     for n_robots in _MANY:

@@ -10,9 +10,8 @@ import numpy as np
 
 from benchmarks.floor import ForceFloor, Recording, record
 from benchmarks.results import Contestant
-from swarm_logistics_env import Scenario, Warehouse, policies
+from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.policies.policy import start
 
 FLOOR, ARRAYS = "force floor", "env.step_arrays"
 _STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
@@ -53,22 +52,6 @@ def paths(recording: Recording) -> Iterator[Contestant]:
         ("env.step", "the same, as PettingZoo's dicts", dicts, ARRAYS),
     ):
         yield Contestant(name, includes, run, n * steps, steps, base)
-
-
-def policy(recording: Recording) -> Contestant:
-    """Return Swarm D-T alone, on the observations of an episode."""
-    scenario, steps = recording.scenario, len(recording.commands)
-    world, chosen = Warehouse(scenario), policies.load("swarm-dt")
-    observations = [world.reset(seed=0)]
-    observations += [world.step(commands) for commands in recording.commands[:-1]]
-
-    def run() -> float:
-        start(chosen, scenario, seed=0)
-        return _timed(chosen.act, observations)
-
-    return Contestant(
-        "policy swarm-dt", "its commands alone", run, scenario.n_robots * steps, steps, ARRAYS
-    )
 
 
 def many_robots(n_robots: int) -> Iterator[Contestant]:

@@ -260,16 +260,6 @@ def _depths(world: Warehouse) -> NDArray[np.float64]:
     return -np.hstack([gaps, np.hstack([at, far - at]) - scenario.robot_radius])
 
 
-def broken_jam() -> str | None:
-    """Press swarms to one point, to a wall and into a corner; returns what overlaps too much."""
-    for n_robots in SIZES:
-        for target in TARGETS:
-            problem = overlaps(n_robots, target, seed=0).problem(Scenario())
-            if problem:
-                return f"{n_robots} robots driven to a {target}: {problem}"
-    return None
-
-
 def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
     if source.random() < 0.5:
         try:
@@ -316,11 +306,6 @@ def main() -> int:
     parser.add_argument("--worlds", type=int, default=sys.maxsize, help="at most so many")
     parser.add_argument("--steps", type=int, default=400, help="of each world")
     asked = parser.parse_args()
-    if asked.first == 0:
-        problem = broken_jam()
-        if problem:
-            print(problem)
-            return 1
     until = time.monotonic() + 60.0 * asked.minutes
     said, tally = time.monotonic(), Tally()
     for number in range(asked.first, asked.first + asked.worlds):

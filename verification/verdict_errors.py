@@ -2,7 +2,7 @@
 
 It prints the errors of studies that run until they are clear, of a family of twelve of them, and of
 equivalence at the edge of its margin, with the power at the planned seeds; then the same where some
-runs stall, with the errors that only the runs seen would make, and what plans from pilots hold.
+runs stall, with the errors that only the runs seen would make.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ P_O, P_F = 39.0, 34.0  # true means [items]
 FAMILY = 12
 EDGE = 0.1
 STALL_SHARES = (0.0, 0.03, 0.05, 0.1)
-PILOTS, PILOT_SEEDS = 40, 20
 _CHUNK = 300  # studies whose resamples fit into memory at once
 
 Floats = NDArray[Any]
@@ -172,7 +171,7 @@ def planned_seeds(model: str) -> int:
 
 
 def planned_power(
-    model: str, distance: float, pilot_seeds: int, pilots: int = PILOTS
+    model: str, distance: float, pilot_seeds: int, pilots: int
 ) -> tuple[float, float]:
     """Return the seeds that pilots plan for a verdict on the change, and the power of these.
 
@@ -246,14 +245,6 @@ def stall_rows(studies: int = STALL_STUDIES) -> Iterator[Sequence[str]]:
             yield model, seeds, above, below, equal
 
 
-def planned_rows(pilots: int = PILOTS) -> Iterator[Sequence[str]]:
-    """Yield the power of the seeds that pilots plan for 80 %."""
-    for model, distance in {**dict.fromkeys(MODELS, -0.1), **dict.fromkeys(STALLS, 0.1)}.items():
-        for pilot_seeds in (10, 20, 100):
-            seeds, power = planned_power(model, distance, pilot_seeds, pilots)
-            yield model, str(pilot_seeds), f"{seeds:.0f}", f"{power:.2f}"
-
-
 TABLES: Mapping[str, tuple[Sequence[str], Callable[[], Iterable[Sequence[str]]]]] = {
     f"Until clear, {STUDIES:,} studies": (
         ("counts", "most seeds", "wrong", "above, below", f"in a family of {FAMILY}"),
@@ -266,10 +257,6 @@ TABLES: Mapping[str, tuple[Sequence[str], Callable[[], Iterable[Sequence[str]]]]
     f"Where runs stall, {STALL_STUDIES:,} studies": (
         ("runs", "seeds", "wrong above", "wrong below", "wrongly equivalent"),
         stall_rows,
-    ),
-    f"Planned for 80 %, {PILOTS} pilots of each size": (
-        ("runs", "pilot", "planned seeds", "their power"),
-        planned_rows,
     ),
 }
 
