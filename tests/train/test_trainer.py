@@ -20,7 +20,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.policies.spec import WEIGHTS
-from swarm_logistics_env.tasks.code_version import code_version
+from swarm_logistics_env.tasks.warehouse_task import code_version
 from swarm_logistics_env.train import Training, evaluation, trainer
 from swarm_logistics_env.train.evaluation import simulation
 from swarm_logistics_env.train.learner import KNOWN, make_learner, tensors_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import random
 import sqlite3
 import sys
@@ -18,10 +19,9 @@ from hypothesis import strategies as st
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.declaration import NOTE, merge
 from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.metadata import merge
-from swarm_logistics_env.studies.performance_table import rows_of
-from swarm_logistics_env.studies.store import FILE_NAME, Store, export
+from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
 
 STUDY = """\
 name = "mine"
@@ -147,7 +147,7 @@ def test_a_study_file_runs_no_code_unless_it_is_allowed_to(
     for arguments in (
         ["plan", "mine.toml"],
         ["run", "mine.toml", "--out", "out"],
-        ["power", "mine.toml"],
+        ["plan", "mine.toml", "--pilot", "2"],
     ):
         assert app.run(["study", *arguments]) == 2
         said = capsys.readouterr().err
@@ -177,8 +177,8 @@ def assert_nothing_was_guessed(table: str, path: Path, out: Path) -> None:
     """What is kept of a table whose header is whole is each row's number, as plain CSV reads it."""
     header, *rows = csv.reader(path.read_text(encoding="utf-8-sig").splitlines())
     if table == TABLE and header == table.splitlines()[0].split(","):
-        with Store.existing(out) as store:
-            kept = sorted(row["delivered"] for row in store.rows())
+        with Runs.existing(out) as store:
+            kept = sorted(store.frame()["delivered"])
         assert kept == sorted(float(row[header.index("delivered")]) for row in rows if any(row))
 
 
@@ -211,7 +211,7 @@ def read_all(out: Path) -> None:
 
 
 def exported(out: Path) -> None:
-    with Store.existing(out) as store:
+    with Runs.existing(out) as store:
         export(store, out / "rows.csv")
 
 
@@ -233,19 +233,18 @@ def test_any_store_is_read_or_refused(whole: Whole, source: random.Random) -> No
 def assert_same_or_missing(whole: Whole, out: Path) -> None:
     """P of a damaged store is that of the whole one, seed by seed, or is told to be missing."""
     try:
-        found = Study.stored(out).findings().performance
+        found = Study.stored(out).findings().cells
     except SwarmLogisticsError:
         return
-    sound = Study.stored(whole.path.parent).findings().performance
-    if list(found["cell"]) != list(sound["cell"]):
+    sound = Study.stored(whole.path.parent).findings().cells
+    if [cell.words for cell in found] != [cell.words for cell in sound]:
         return  # another study was noted
-    for here, there in zip(rows_of(found), rows_of(sound), strict=True):
+    for here, there in zip(found, sound, strict=True):
         if here.n_seeds == there.n_seeds:
             assert list(here.by_seed) == list(there.by_seed)
 
 
-COLUMNS = ["delivered", "delivery_times", "ended_at", "all_delivered", "failed_robots",
-           "anchoring_seconds", "error", "seed", "code", "condition", "run"]  # fmt: skip
+COLUMNS = ["key", "run", "failed", "outcome", "wall_seconds"]
 VALUES = [None, "x", "{", "[1, 2", -1, 1e300, b"\x01", b"\xff" * 16, "[]", "null", 2**62, "'"]
 NOTES = ["", "x", "null", "{}", "[]", "-1", '{"a": 1}', "[[1]]", "1e9", b"\xff", None]
 
@@ -256,15 +255,15 @@ def test_a_store_of_wrong_contents_is_read_or_refused(
     whole: Whole, column: str, value: Any, place: int
 ) -> None:
     def spoil(database: sqlite3.Connection) -> None:
-        keys = [key for (key,) in database.execute("SELECT run FROM runs ORDER BY run")]
-        change = f"UPDATE OR IGNORE runs SET {column} = ? WHERE run = ?"
+        keys = [key for (key,) in database.execute("SELECT key FROM runs ORDER BY key")]
+        change = f"UPDATE OR IGNORE runs SET {column} = ? WHERE key = ?"
         database.execute(change, (value, keys[place % len(keys)]))
 
     spoiled(whole, spoil)
 
 
 @given(
-    name=st.sampled_from(["specification", "code", "identities", "declared", "imported"]),
+    name=st.sampled_from(["", "specification", "code", "identities", "declared", "imported"]),
     value=st.sampled_from(NOTES),
 )
 @store_examples
@@ -272,9 +271,15 @@ def test_a_store_of_wrong_notes_is_read_or_refused(
     whole: Whole, name: str, value: str | bytes | None
 ) -> None:
     def spoil(database: sqlite3.Connection) -> None:
-        database.execute("DELETE FROM notes WHERE name = ?", (name,))
-        if value is not None:
-            database.execute("INSERT INTO notes VALUES (?, ?)", (name, value))
+        ((note,),) = database.execute("SELECT value FROM notes")
+        if name:
+            told = json.loads(note)
+            told[name] = value.decode("latin-1") if isinstance(value, bytes) else value
+            database.execute("UPDATE notes SET value = ?", (json.dumps(told),))
+        else:
+            database.execute("DELETE FROM notes")
+            if value is not None:
+                database.execute("INSERT INTO notes VALUES (?, ?)", (NOTE, value))
 
     spoiled(whole, spoil)
 

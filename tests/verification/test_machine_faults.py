@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.store import FILE_NAME, Store, export
+from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 
@@ -42,12 +42,12 @@ N_RUNS = 30
 
 
 def digest(directory: Path) -> str:
-    with Store.existing(directory) as store:
+    with Runs.existing(directory) as store:
         return export(store, directory.with_suffix(".csv"))[1]
 
 
 def finished(directory: Path) -> int:
-    with Store.existing(directory) as store:
+    with Runs.existing(directory) as store:
         return len(store.succeeded())
 
 
@@ -128,7 +128,7 @@ def test_what_cannot_be_written_whole_leaves_the_older_file(tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no /dev/full")
-@pytest.mark.parametrize("arguments", [("policies",), ("--help",)])
+@pytest.mark.parametrize("arguments", [("list", "policies"), ("--help",)])
 def test_an_output_that_is_full_ends_in_one_line(arguments: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -227,15 +227,15 @@ def test_a_node_that_is_lost_costs_no_run(undisturbed: str, tmp_path: Path) -> N
 
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
     added = [cluster.add_node(num_cpus=1)]
-    add = Store.add
+    add = Runs.add
 
-    def add_and_lose(store: Store, run: Any, outcome: Any) -> None:
+    def add_and_lose(store: Runs, run: Any, outcome: Any) -> None:
         add(store, run, outcome)
         if added and len(store) == 3:
             cluster.remove_node(added.pop(), allow_graceful=False)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Store, "add", add_and_lose)
+        patched.setattr(Runs, "add", add_and_lose)
         try:
             study = Study(out=tmp_path / "out", **STUDY)
             first = study.run("ray", address=cluster.address)
