@@ -10,7 +10,6 @@ STUDY := .venvs/study
 DOCS  := .venvs/docs
 
 BENCHMARK := .venvs/benchmark
-PEERS     := .venvs/peers
 
 TORCHRL   := .venvs/torchrl
 BENCHMARL := .venvs/benchmarl
@@ -20,7 +19,7 @@ TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark benchmark-learning interop tasks docs dist absolute-links format clean
+.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark interop tasks docs dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -32,9 +31,8 @@ help:
 	@echo "make combined-faults  2,000 small worlds whose faults meet, against a slow reference"
 	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
-	@echo "make benchmark       cost of a control step beside the bare physics and the peers; results/benchmark"
-	@echo "make benchmark-learning  PPO.learn on SwarmVecEnv beside SuperSuit's VecEnv; how soon the preset delivery passes scripted policies"
-	@echo "make interop         TorchRL, BenchMARL, RLlib, SuperSuit and two plain loops on the environment; see interop/"
+	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
+	@echo "make interop         TorchRL, BenchMARL, RLlib and SuperSuit on the environment; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
@@ -88,16 +86,15 @@ test-lowest test-newest: test-%: .venvs/%/wheel
 	git ls-files -z | grep -zv '^swarm_logistics_env/\|^policies$$\|^train$$' | xargs -0 tar -cf - | tar -xf - -C build/installed-$*
 	cd build/installed-$* && $(CURDIR)/.venvs/$*/bin/python -m pytest --numprocesses=2 --dist=loadgroup
 
-benchmark: $(BENCHMARK)/installed $(PEERS)/installed
-	$(BENCHMARK)/bin/python -m benchmarks --peers $(PEERS)/bin/python --out results/benchmark
+benchmark: $(BENCHMARK)/installed
+	$(BENCHMARK)/bin/python -m benchmarks --out results/benchmark
 
-benchmark-learning: $(SUPERSUIT)/installed
-	$(SUPERSUIT)/bin/python -m benchmarks.vec_env
-	$(SUPERSUIT)/bin/python -m benchmarks.learning_speed
-
-# Makes the environment of each library by the rule below, and runs its scripts there.
-interop:
-	$(PYTHON) -m interop
+# Each library in an environment of its own: calls of its wrappers as tests, and what learns with it.
+interop: $(TORCHRL)/installed $(BENCHMARL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
+	for library in torchrl benchmarl rllib supersuit; do \
+		.venvs/$$library/bin/python -m pytest -rs tests/test_interop.py || exit 1; \
+	done
+	$(BENCHMARL)/bin/python -m interop.benchmarl_learning
 
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
@@ -105,8 +102,6 @@ tasks: $(TASKS)/installed
 # study: autodoc reads the package. -W: a warning is an error.
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate.py
-	$(DOCS)/bin/python docs/generate_study_files.py
-	$(DOCS)/bin/python docs/generate_training_files.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
 
 # Each distribution is installed in an environment of its own and plays an episode, away from this tree.
@@ -136,13 +131,12 @@ clean:
 $(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
-$(TORCHRL)/installed: OTHERS := torch torchrl mpe2
-$(BENCHMARL)/installed: OTHERS := torch benchmarl
-$(RLLIB)/installed: OTHERS := torch "ray[rllib]"
+$(TORCHRL)/installed: OTHERS := hypothesis pytest torch torchrl
+$(BENCHMARL)/installed: OTHERS := hypothesis pytest torch benchmarl
+$(RLLIB)/installed: OTHERS := hypothesis pytest torch "ray[rllib]"
 # shimmy: the Gymnasium door of VMAS asks for it.
 $(TASKS)/installed: OTHERS := hypothesis pytest mpe2 rware shimmy vmas
-$(SUPERSUIT)/installed: EXTRAS := train
-$(SUPERSUIT)/installed: OTHERS := supersuit mpe2
+$(SUPERSUIT)/installed: OTHERS := hypothesis pytest supersuit
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
 .venvs/lowest.txt: pyproject.toml verification/lowest.py
@@ -160,15 +154,6 @@ $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
 	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
 		"$$(echo build/wheels/*.whl)[study,render,watch]" build hypothesis pytest pytest-xdist setuptools
-
-# What is measured beside this package: an environment of their own, as their requirements clash
-# with ours. One that cannot be installed is named in the benchmark's table.
-$(PEERS)/installed: constraints.txt
-	$(PYTHON) -m venv $(PEERS)
-	for peer in rware mpe2 vmas; do \
-		$(PEERS)/bin/python -m pip install --constraint constraints.txt $$peer || true; \
-	done
-	@touch $@
 
 $(BENCHMARK)/installed: EXTRAS := study,train
 

@@ -1,6 +1,6 @@
-"""Measure the package beside the bare physics and its peers, in one run.
+"""Measure the package beside the bare physics, in one run.
 
-python -m benchmarks --peers .venvs/peers/bin/python --out results/benchmark
+python -m benchmarks --out results/benchmark
 """
 
 from __future__ import annotations
@@ -11,17 +11,14 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks import ours
+from benchmarks.floor import record
 from benchmarks.instructions import instructions_of_a_step
-from benchmarks.recording import record
-from benchmarks.results import as_json, save, show
-from benchmarks.rivals import rivals
+from benchmarks.results import Contestant, as_json, in_turns, save, show
 from benchmarks.start_up import (
-    bytes_per_robot,
     compile_seconds,
     first_step_seconds,
     import_seconds,
 )
-from benchmarks.timing import Contestant, in_turns
 from swarm_logistics_env import Scenario
 
 _STEPS, _MANY = 1000, (1_000, 10_000)
@@ -30,7 +27,7 @@ _STEPS, _MANY = 1000, (1_000, 10_000)
 def contestants_of_ours() -> list[Contestant]:
     """Return everything of this package that is timed, compiled and warm."""
     recording = record(Scenario(restock=True), _STEPS)
-    found = [*ours.paths(recording), ours.policy(recording)]
+    found = [*ours.paths(recording)]
     found += [ours.vec_env(threads) for threads in (1, 2)]
     found[-1].base = found[-2].name
     for n_robots in _MANY:
@@ -45,33 +42,26 @@ def main() -> None:
     """Measure, print and save."""
     parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
     parser.add_argument("--repeats", type=int, default=15, help="turns of everybody")
-    parser.add_argument("--peers", default="", help="the interpreter that has the peers")
-    parser.add_argument("--out", type=Path, help="folder for benchmark.json and benchmark.png")
+    parser.add_argument("--out", type=Path, help="folder for benchmark.json")
     given = parser.parse_args()
 
     console = Console(width=150)
     found = contestants_of_ours()
-    others, processes, missing = rivals(given.peers) if given.peers else ([], [], {})
-    try:
-        in_turns([*found, *others], given.repeats)
-    finally:
-        for process in processes:
-            process.close()
+    in_turns(found, given.repeats)
     title = (
         f"Medians of {given.repeats} interleaved runs, processor time; N = 25 unless said; "
         "cost: per agent-step"
     )
-    show(console, [*found, *others], missing, title)
+    show(console, found, title)
 
     package, needed = import_seconds(5)
-    first_step, memory = first_step_seconds(3), bytes_per_robot()
+    first_step = first_step_seconds(3)
     compiling = compile_seconds()
     counts = instructions_of_a_step()
     console.print(
         f"import swarm_logistics_env: {package:.2f} s, {package / needed:.2f} times pettingzoo, "
         f"pymunk and numba ({needed:.2f} s)\n"
-        f"second process, warm cache: first step after {first_step:.2f} s of wall time\n"
-        f"memory: {'unknown' if memory is None else f'{memory:,.0f} bytes'} a robot at N = 10,000"
+        f"second process, warm cache: first step after {first_step:.2f} s of wall time"
     )
     for what, seconds in compiling.items():
         console.print(f"{what}: {seconds:.1f} s of the processor")
@@ -85,10 +75,8 @@ def main() -> None:
         save(
             given.out,
             as_json(
-                [*found, *others],
-                peers_that_do_not_run=missing,
+                found,
                 seconds=start_up,
-                bytes_per_robot=memory,
                 instructions=counts,
             ),
         )

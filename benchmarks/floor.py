@@ -1,15 +1,13 @@
-"""The floors: the fastest loops over pymunk that move the same bodies; no sensing, no logistics.
+"""The floor: the fastest loop over pymunk that replays an episode; no sensing, no logistics.
 
-Same robots, walls and items, same substeps, slop 0.001, memory that is used again.
-
-* `ForceFloor`: before each substep the velocities are read in one batch and the clipped forces of
-  the drives written in another, all by address from one compiled call; 16 iterations.
-* `JointFloor`: pivot joints to kinematic bodies, driven from Python with one batch write and one
-  batch read per control step; 4 iterations.
+Same robots, walls and items, same substeps, slop 0.001, memory that is used again. Before each
+substep the velocities are read in one batch and the clipped forces of the drives written in
+another, all by address from one compiled call; 16 iterations.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,17 +16,57 @@ from numpy.typing import NDArray
 from pymunk import batch
 from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no public name
 
-from benchmarks.recording import Recording
+from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.warehouse.packing import call_at, store_at
 
 
-def space_of(recording: Recording, iterations: int) -> pymunk.Space:
+@dataclass(frozen=True)
+class Recording:
+    """Swarm D-T from seed 0: what it commanded and how fast that made the robots want to go."""
+
+    scenario: Scenario
+    commands: NDArray[np.float64]  # (T, N, 4)
+    wanted_velocity: NDArray[np.float64]  # (T, N, 2) [m/s], world frame
+    start: NDArray[np.float64]  # (N, 2) [m]
+    items: NDArray[np.float64]  # (I, 2) [m]
+
+
+def record(scenario: Scenario, n_steps: int) -> Recording:
+    """Play Swarm D-T for `n_steps` control steps."""
+    world, policy = Warehouse(scenario), policies.load("swarm-dt")
+    observations = world.reset(seed=0)
+    start(policy, scenario, seed=0)
+    starts, items = world.state.robot_position.copy(), world.state.item_position.copy()
+    commands = np.zeros((n_steps, scenario.n_robots, 4))
+    wanted = np.zeros((n_steps, scenario.n_robots, 2))
+    for step in range(n_steps):
+        commands[step] = policy.act(observations)
+        before = world.state.robot_heading.copy()
+        observations = world.step(commands[step])
+        wanted[step] = _wanted(commands[step], before, world)
+    return Recording(scenario, commands, wanted, starts, items)
+
+
+def _wanted(
+    commands: NDArray[np.float64], before: NDArray[np.float64], world: Warehouse
+) -> NDArray[np.float64]:
+    """Return the wanted velocities (N, 2) [m/s]; who turns drives along its mean direction."""
+    turned = np.remainder(world.state.robot_heading - before + np.pi, 2.0 * np.pi) - np.pi
+    middle = before + 0.5 * turned
+    forward, left = commands[:, 0], commands[:, 1]
+    speed = world.scenario.max_speed / np.maximum(np.hypot(forward, left), 1.0)
+    along = forward * np.cos(middle) - left * np.sin(middle)
+    across = forward * np.sin(middle) + left * np.cos(middle)
+    return np.asarray(speed[:, None] * np.stack([along, across], axis=1))
+
+
+def space_of(recording: Recording) -> pymunk.Space:
     """Return a space with the walls and items of a recording."""
     scenario = recording.scenario
     space = pymunk.Space()
-    space.iterations, space.collision_slop = iterations, 0.001
+    space.iterations, space.collision_slop = 16, 0.001
     width, height = scenario.warehouse_width, scenario.warehouse_height
     corners = [(-0.5, -0.5), (width + 0.5, -0.5), (width + 0.5, height + 0.5)]
     corners.append((-0.5, height + 0.5))
@@ -83,7 +121,7 @@ class ForceFloor:
         n = scenario.n_robots
         fields = batch.BodyFields
         self._wanted = np.ascontiguousarray(recording.wanted_velocity)
-        self._space = space_of(recording, iterations=16)
+        self._space = space_of(recording)
         robots_in(self._space, scenario, recording.start)
         self._state = _Batch(n + 1, 4, fields.POSITION | fields.VELOCITY)
         self._velocity = _Batch(n + 1, 2, fields.VELOCITY)
@@ -145,47 +183,3 @@ def _function(name: str) -> int:
 
 def _address(thing: Any) -> int:
     return int(ffi.cast("intptr_t", thing))
-
-
-class JointFloor:
-    """A space that replays the wanted velocities of a recording, driven by joints.
-
-    Attributes:
-        state: (2 N + 1, 4) x, y [m] and velocity [m/s] of every body.
-    """
-
-    def __init__(self, recording: Recording) -> None:
-        scenario = recording.scenario
-        n = scenario.n_robots
-        self._wanted = np.ascontiguousarray(recording.wanted_velocity)
-        self._substeps, self._period = scenario.n_substeps, scenario.physics_period
-        self._space = space = space_of(recording, iterations=4)
-        robots = robots_in(space, scenario, recording.start)
-        controls = [pymunk.Body(body_type=pymunk.Body.KINEMATIC) for _ in robots]
-        space.add(*controls)
-        for robot, control in zip(robots, controls, strict=True):
-            joint = pymunk.PivotJoint(robot, control, (0.0, 0.0), (0.0, 0.0))
-            joint.max_bias = 0.0
-            joint.max_force = scenario.robot_mass * scenario.max_acceleration
-            space.add(joint)
-        # The static body is read too, and pymunk wants one number to spare.
-        self._read, self._written = np.zeros((2 * n + 1) * 4 + 1), np.zeros((2 * n + 1) * 2 + 1)
-        self.state = self._read[:-1].reshape(-1, 4)
-        self._velocity = self._written[:-1].reshape(-1, 2)
-        self._reader, self._writer = batch.Buffer(), batch.Buffer()
-        self._reader.set_float_buf(self._read)
-        self._writer.set_float_buf(self._written)
-        self._n = n
-
-    def step(self, index: int) -> None:
-        """Take control step `index` of the recording."""
-        n, space = self._n, self._space
-        self._velocity[:n] = self.state[:n, 2:4]
-        self._velocity[n : 2 * n] = self._wanted[index]
-        batch.set_space_bodies(space, batch.BodyFields.VELOCITY, self._writer)
-        for _ in range(self._substeps):
-            space.step(self._period)
-        self._reader.clear()
-        batch.get_space_bodies(
-            space, batch.BodyFields.POSITION | batch.BodyFields.VELOCITY, self._reader
-        )

@@ -42,7 +42,7 @@ for index in range(int(sys.argv[2])):
 """
 _RECORD = """
 import pickle, sys
-from benchmarks.recording import record
+from benchmarks.floor import record
 from swarm_logistics_env import Scenario
 with open(sys.argv[1], "wb") as file:
     pickle.dump(record(Scenario(restock=True), int(sys.argv[2])), file)

@@ -8,21 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.floor import ForceFloor, JointFloor
-from benchmarks.recording import Recording, record
-from benchmarks.timing import Contestant
-from swarm_logistics_env import Scenario, Warehouse, policies
+from benchmarks.floor import ForceFloor, Recording, record
+from benchmarks.results import Contestant
+from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.policies.policy import start
 
-FLOOR, JOINTS, ARRAYS = "force floor", "joint floor", "env.step_arrays"
+FLOOR, ARRAYS = "force floor", "env.step_arrays"
 _STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
 _WORLDS, _STEPS_OF_WORLDS = 8, 1000
 SENSES = "all sensors, logistics, timers"
 
 
 def paths(recording: Recording) -> Iterator[Contestant]:
-    """Yield the floors and the ways to step one world, on the same commands."""
+    """Yield the floor and the ways to step one world, on the same commands."""
     n, steps = recording.scenario.n_robots, len(recording.commands)
     actions = [
         {f"robot_{row}": command for row, command in enumerate(commands)}
@@ -31,9 +29,6 @@ def paths(recording: Recording) -> Iterator[Contestant]:
 
     def floor() -> float:
         return _timed(ForceFloor(recording).step, range(steps))
-
-    def joints() -> float:
-        return _timed(JointFloor(recording).step, range(steps))
 
     def world() -> float:
         made = Warehouse(recording.scenario)
@@ -52,28 +47,11 @@ def paths(recording: Recording) -> Iterator[Contestant]:
 
     for name, includes, run, base in (
         (FLOOR, "bodies alone, no sensing", floor, None),
-        (JOINTS, "the same driven by pivot joints, from Python", joints, FLOOR),
         ("Warehouse.step", SENSES, world, FLOOR),
         (ARRAYS, f"{SENSES}, rewards, ends", arrays, FLOOR),
         ("env.step", "the same, as PettingZoo's dicts", dicts, ARRAYS),
     ):
         yield Contestant(name, includes, run, n * steps, steps, base)
-
-
-def policy(recording: Recording) -> Contestant:
-    """Return Swarm D-T alone, on the observations of an episode."""
-    scenario, steps = recording.scenario, len(recording.commands)
-    world, chosen = Warehouse(scenario), policies.load("swarm-dt")
-    observations = [world.reset(seed=0)]
-    observations += [world.step(commands) for commands in recording.commands[:-1]]
-
-    def run() -> float:
-        start(chosen, scenario, seed=0)
-        return _timed(chosen.act, observations)
-
-    return Contestant(
-        "policy swarm-dt", "its commands alone", run, scenario.n_robots * steps, steps, ARRAYS
-    )
 
 
 def many_robots(n_robots: int) -> Iterator[Contestant]:

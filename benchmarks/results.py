@@ -1,11 +1,14 @@
-"""What was measured, as a table, as JSON and as a plot."""
+"""Contestants that are run in turns, and what their runs took, as a table and as JSON."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+import statistics
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -14,7 +17,61 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.timing import Contestant
+
+@dataclass
+class Contestant:
+    """Something that is run again and again.
+
+    Attributes:
+        name: as the table has it.
+        includes: what one of its steps includes.
+        run: takes its steps once; returns the seconds they took, or None if this times the run.
+        agent_steps: how many steps of one agent a run takes.
+        control_steps: how many steps of everything a run takes.
+        base: the contestant whose cost its own is divided by, or None.
+        uses_wall: timed by the clock, not by processor time, as several threads must be.
+        seconds: of each run so far.
+    """
+
+    name: str
+    includes: str
+    run: Callable[[], float | None]
+    agent_steps: int
+    control_steps: int
+    base: str | None = None
+    uses_wall: bool = False
+    seconds: list[float] = field(default_factory=list)
+
+    def take_turn(self) -> None:
+        """Run once and note what it took."""
+        # Processor time: on a machine that does other things too, the clock counts them.
+        clock = time.perf_counter if self.uses_wall else time.process_time
+        began = clock()
+        took = self.run()
+        self.seconds.append(clock() - began if took is None else took)
+
+    @property
+    def microseconds(self) -> float:
+        """Median cost of a control step [us]."""
+        return statistics.median(self.seconds) / self.control_steps * 1e6
+
+    @property
+    def rate(self) -> float:
+        """Median agent-steps per second."""
+        return self.agent_steps / statistics.median(self.seconds)
+
+    def ratio_to(self, base: Contestant) -> float:
+        """Return the median, over turns, of its cost per agent-step as a multiple of `base`'s."""
+        here = [seconds / self.agent_steps for seconds in self.seconds]
+        there = [seconds / base.agent_steps for seconds in base.seconds]
+        return statistics.median(mine / other for mine, other in zip(here, there))
+
+
+def in_turns(contestants: Sequence[Contestant], repeats: int) -> None:
+    """Run everybody once per repeat, so that whatever slows the machine slows all of them."""
+    for _ in range(repeats):
+        for contestant in contestants:
+            contestant.take_turn()
 
 
 def machine() -> dict[str, Any]:
@@ -29,13 +86,8 @@ def machine() -> dict[str, Any]:
     }
 
 
-def show(
-    console: Console,
-    contestants: Sequence[Contestant],
-    missing: Mapping[str, str],
-    title: str,
-) -> None:
-    """Print one row per contestant, and one per peer that does not run."""
+def show(console: Console, contestants: Sequence[Contestant], title: str) -> None:
+    """Print one row per contestant."""
     table = Table(title=title)
     for column in ("", "agent-steps per s", "us per step", "cost", "a step includes"):
         left = column in ("", "a step includes")
@@ -48,8 +100,6 @@ def show(
             _cost(contestant, contestants),
             contestant.includes,
         )
-    for name, reason in missing.items():
-        table.add_row(name, "-", "-", "-", f"does not run: {reason}")
     console.print(table)
 
 
@@ -76,31 +126,9 @@ def as_json(contestants: Sequence[Contestant], **more: Any) -> dict[str, Any]:
 
 
 def save(folder: Path, found: Mapping[str, Any]) -> None:
-    """Write benchmark.json and benchmark.png."""
+    """Write benchmark.json."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "benchmark.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    _plot(folder / "benchmark.png", found)
-
-
-def _plot(path: Path, found: Mapping[str, Any]) -> None:
-    from matplotlib.figure import Figure
-
-    rows = sorted(found["contestants"], key=lambda row: row["agent_steps_per_second"])
-    figure = Figure(figsize=(8.0, 0.32 * len(rows) + 1.2), layout="constrained")
-    axes = figure.subplots()
-    peers = {"RWARE", "MPE2", "VMAS"}
-    colours = ["0.7" if row["name"].split()[0] in peers else "tab:blue" for row in rows]
-    bars = axes.barh(
-        [row["name"] for row in rows],
-        [row["agent_steps_per_second"] for row in rows],
-        color=colours,
-    )
-    axes.bar_label(bars, fmt="{:,.0f}", padding=3, fontsize=8)
-    axes.set_xscale("log")
-    axes.margins(x=0.15)
-    axes.set_xlabel("agent-steps per second, one core unless threads are named")
-    axes.set_title(found["machine"]["processor"], fontsize=9)
-    figure.savefig(path, dpi=150)
 
 
 def _ratio(contestant: Contestant, contestants: Sequence[Contestant]) -> float | None:

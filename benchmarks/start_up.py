@@ -1,4 +1,4 @@
-"""What a process pays before its first step, and what a robot takes of memory."""
+"""What a process pays before its first step."""
 
 from __future__ import annotations
 
@@ -40,28 +40,6 @@ decide(policy, rows, world.state)
 print(time.process_time() - t)
 """
 _RUN = "from swarm_logistics_env.cli import app; app()"
-_MEMORY = """
-import sys, numpy as np
-from pathlib import Path
-from swarm_logistics_env import Scenario, Warehouse
-
-def resident():
-    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
-
-def step(n, times):
-    side = 10.0 * (n / 25) ** 0.5
-    world = Warehouse(Scenario(n_robots=n, n_items=round(2.4 * n), warehouse_width=side,
-        warehouse_height=side, delivery_width=side / 5))
-    world.reset(0)
-    for _ in range(times):
-        world.step(np.zeros((n, 4)))
-    return world
-
-small = step(25, 5)
-before = resident()
-large = step(10_000, 20)
-print((resident() - before) / 10_000)
-"""
 
 
 def import_seconds(repeats: int) -> tuple[float, float]:
@@ -103,11 +81,6 @@ def _processor_seconds(arguments: tuple[str, ...], cache: str) -> float:
     )  # fmt: skip
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
-def bytes_per_robot() -> float | None:
-    """Return what a robot takes in a world of 10,000, its log of 20 steps included [bytes]."""
-    return _number(_MEMORY) if Path("/proc/self/statm").exists() else None
 
 
 def _number(script: str, *arguments: str, cache: str = "") -> float:

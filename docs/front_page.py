@@ -12,12 +12,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from tables import block_of, rewritten
+
 DOCS = Path(__file__).parent
 README, RESULTS = DOCS.parent / "README.md", DOCS / "results.md"
 MEDIA = DOCS / "media"
 
-BLOCK = "<!-- tables: {name} -->"
-END = "<!-- end of tables -->"
 _REFERENCE = "swarm-dt"  # the paper's controller
 _LEARNED = "ppo-"
 _NUMBER = r"-?(?:[\d.,]+|∞)"
@@ -34,32 +34,6 @@ class Value(NamedTuple):
 
 
 Rows = Mapping[str, Mapping[str, Value]]  # by the row's label and the column's heading
-
-
-def block_of(text: str, name: str) -> str:
-    """Return what stands between the markers of a block.
-
-    Raises:
-        SystemExit: the page has no such block.
-    """
-    _, found, rest = text.partition(BLOCK.format(name=name))
-    block, ended, _ = rest.partition(END)
-    if not (found and ended):
-        raise SystemExit(f"the page has no {BLOCK.format(name=name)} followed by {END}")
-    return block.strip()
-
-
-def rewritten(text: str, blocks: Mapping[str, str]) -> str:
-    """Return a page with other text between the markers of each block.
-
-    Raises:
-        SystemExit: a block has no pair of markers.
-    """
-    for name, block in blocks.items():
-        block_of(text, name)  # it is there
-        before, start, rest = text.partition(BLOCK.format(name=name))
-        text = f"{before}{start}\n\n{block}\n\n{END}{rest.partition(END)[2]}"
-    return text
 
 
 def rows_of(block: str) -> Rows:
@@ -117,7 +91,7 @@ def _learned(rows: Rows) -> Iterator[str]:
 
 
 def _faults(rows: Rows) -> Iterator[str]:
-    """Yield the greatest difference that a failure mode makes, and one the other way round."""
+    """Yield the greatest difference that a failure mode makes."""
     r = {mode: row for mode in _MODES if (row := rows.get(f"R, {mode}, m = 2"))}
     worst = {mode: min(row, key=lambda name: row[name].value) for mode, row in r.items()}
     best = {mode: max(row, key=lambda name: row[name].low) for mode, row in r.items()}
@@ -130,14 +104,6 @@ def _faults(rows: Rows) -> Iterator[str]:
         f"less (robustness R = {r[mode][lost].text}), while `{kept}` {bears} "
         f"({r[mode][kept].text})."
     )
-    for other, row in r.items():
-        if row[kept].high < 0.0 < row[lost].low:
-            yield (
-                f"**Under another fault it is the other way round**: with {other} "
-                f"({_MODES[other]}), R of `{kept}` is {row[kept].text}, of `{lost}` "
-                f"{row[lost].text}."
-            )
-            return
 
 
 _SHARE = 2 / 25  # of the robots that fail: R = (P_F - P_o) / P_o + m/N
@@ -192,8 +158,8 @@ def draw(rows: Rows, path: Path) -> None:
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams |= {"svg.hashsalt": "front page", "font.size": 9.0, "axes.linewidth": 0.6}
-        canvas = Figure(figsize=(9.2, 2.7), layout="constrained")
-        panels = canvas.subplots(1, len(_PANELS), sharey=True)
+        figure = Figure(figsize=(9.2, 2.7), layout="constrained")
+        panels = figure.subplots(1, len(_PANELS), sharey=True)
         for axes in panels[3:]:  # the modes on one scale
             axes.sharex(panels[2])
         for axes, (label, title) in zip(panels, _PANELS.items(), strict=True):
@@ -213,93 +179,27 @@ def draw(rows: Rows, path: Path) -> None:
             axes.set_axisbelow(True)
         panels[0].set_yticks(list(places), names)
         panels[0].set_xlim(left=0.0)
-        canvas.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
-
-
-_PACKAGES = {
-    "env.step_arrays": "this package, arrays",
-    "env.step": "this package, dicts",
-    "RWARE": "RWARE",
-    "MPE2 simple_spread": "MPE2 simple_spread",
-    "VMAS navigation, 1 world": "VMAS navigation, 1 world",
-    "VMAS navigation, 256 worlds": "VMAS navigation, 256 worlds",
-}
-
-
-def draw_speed(costs: str, path: Path) -> None:
-    """Draw agent-steps a second of this package and of others, from the table of costs."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    rates = {
-        line.split("|")[1].partition(":")[0].strip(): float(line.split("|")[2].replace(",", ""))
-        for line in costs.splitlines()[2:]
-        if line.startswith("| ")
-    }
-    shown = {label: rates[name] for name, label in _PACKAGES.items() if name in rates}
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams |= {"svg.hashsalt": "front page", "font.size": 9.0, "axes.linewidth": 0.6}
-        canvas = Figure(figsize=(7.2, 2.1), layout="constrained")
-        axes = canvas.subplots()
-        colours = ["#0072b2" if "this" in label else "#9aa0a8" for label in shown]
-        bars = axes.barh(list(shown), list(shown.values()), color=colours, height=0.65)
-        axes.bar_label(bars, [f"{rate:,.0f}" for rate in shown.values()], padding=4)
-        axes.set_xscale("log")
-        axes.set_xlim(1e3, 5e6)
-        axes.invert_yaxis()
-        axes.spines[["top", "right", "left"]].set_visible(False)
-        axes.tick_params(axis="y", length=0)
-        axes.set_xlabel("agent-steps a second, logarithmic")
-        canvas.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
 
 
 # -- links --------------------------------------------------------------------------------------
 
-_PAGES = {
-    "quick start": "docs/quickstart.md",
-    "a recorded run": "docs/media/run.html",
-    "the environment": "docs/environment.md",
-    "results": "docs/results.md",
-    "questions of the field": "docs/questions.md",
-    "indicators": "docs/indicators.md",
-    "faults": "docs/faults.md",
-    "studies": "docs/studies.md",
-    "trials of robots": "docs/trials.md",
-    "any swarm": "docs/tasks.md",
-    "training": "docs/training.md",
-    "extending": "docs/extending.md",
-    "other libraries": "docs/ecosystem.md",
-    "comparison": "docs/comparison.md",
-    "promises": "docs/promises.md",
-    "CONTRIBUTING": "CONTRIBUTING.md",
-    "CHANGELOG": "CHANGELOG.md",
-    "CITATION": "CITATION.cff",
-}
+NOTE = (
+    "Pictures and links are those of the repository. A package index does not show them; the "
+    "pages lie in `docs/` of the source distribution.\n\n"
+)
 
 
-def pictures_and_links(address: str | None) -> dict[str, str]:
-    """Return the blocks with the film, the picture and the links of the README.
+def with_address(text: str, address: str | None) -> str:
+    """Return the README whose pictures and links lead to a repository, "https://.."; None: as is.
 
-    Args:
-        address: of the repository, "https://.."; None: it has none, so that links are relative,
-            and the README says where they do not lead.
+    A package index shows nothing else; relative links stand below a note that says so.
     """
-    raw, blob = (f"{address}/raw/main/", f"{address}/blob/main/") if address else ("", "")
-    note = (
-        "Pictures and links are those of the repository. A package index does not show them; the "
-        "pages lie in `docs/` of the source distribution.\n\n"
-    )
-    film = "Two runs of one seed. Left: 25 robots. Right: five of them, marked 4, cannot deliver."
-    stock = "25 robots with ppo-delivery after 300 s: most items lie along the delivery area"
-    picture = "A row a policy: P, S and R in four failure modes, each with its 95 % interval"
-    links = "\n".join(f"[{name}]: {blob}{path}" for name, path in _PAGES.items())
-    return {
-        "film": f'<img align="right" width="390" src="{raw}docs/media/fm4.gif" alt="{film}">',
-        "stock": f'<img align="right" width="280" src="{raw}docs/media/stock.png" alt="{stock}">',
-        "picture": f"![{picture}]({raw}docs/media/policies.svg)",
-        "links": links if address else f"{note}{links}",
-    }
+    if address is None:
+        return text
+    text = re.sub(r'(src="|!\[[^]]*\]\()(?=docs/)', rf"\g<1>{address}/raw/main/", text)
+    links = rf"\g<1>{address}/blob/main/"
+    return re.sub(r"^(\[[^]]+\]: )(?!https://)", links, text.replace(NOTE, ""), flags=re.MULTILINE)
 
 
 def address_of_the_repository() -> str | None:
@@ -309,22 +209,18 @@ def address_of_the_repository() -> str | None:
     return address and address.rstrip("/")
 
 
-def blocks() -> dict[str, str]:
-    """Return every block of the README."""
-    page = RESULTS.read_text(encoding="utf-8")
-    return {
-        "findings": findings(page),
-        "speed": speed(page),
-        **pictures_and_links(address_of_the_repository()),
-    }
+def written() -> str:
+    """Return the README as the tables have it."""
+    page, readme = RESULTS.read_text(encoding="utf-8"), README.read_text(encoding="utf-8")
+    blocks = {"findings": findings(page), "speed": speed(page)}
+    return with_address(rewritten(readme, blocks), address_of_the_repository())
 
 
 def main() -> None:
-    """Write the README's blocks and the picture."""
-    README.write_text(rewritten(README.read_text(encoding="utf-8"), blocks()), encoding="utf-8")
+    """Write the README and its pictures."""
+    README.write_text(written(), encoding="utf-8")
     page = RESULTS.read_text(encoding="utf-8")
     draw(rows_of(block_of(page, "policies")), MEDIA / "policies.svg")
-    draw_speed(block_of(page, "costs"), MEDIA / "speed.svg")
 
 
 if __name__ == "__main__":

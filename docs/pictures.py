@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import film_colours
-from swarm_logistics_env.studies import Study
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.messages import recorded_page
 from verification.browser import Browser
@@ -71,25 +69,6 @@ def save(picture: NDArray[np.uint8], name: str) -> None:
     exact.save(MEDIA / name, optimize=True)
 
 
-def figures() -> None:
-    """Keep a figure of a study's report."""
-    study = Study(
-        seeds=10,
-        scenario={"duration": 300.0},
-        faults=[{"modes": ["FM1", "FM2", "FM4"], "robots": [1, 2, 3]}],
-    )
-    study.run(processes=2)
-    with tempfile.TemporaryDirectory() as folder:
-        written = {path.name: path for path in _files(study, Path(folder))}
-        (path,) = (written[file] for file in written if file.startswith("FT-R"))
-        shutil.copy(path, MEDIA / "faults.svg")
-
-
-def _files(study: Study, folder: Path) -> list[Path]:
-    study.report(folder)
-    return sorted(folder.rglob("*.svg"))
-
-
 if __name__ == "__main__":
     MEDIA.mkdir(exist_ok=True)
     save(scene(30.0), "warehouse.png")
@@ -97,4 +76,3 @@ if __name__ == "__main__":
     learned = scene(300.0, scenario=Scenario(restock=True), name="ppo-delivery", show_beams_of=None)
     save(learned, "stock.png")
     browser_view("watch.png")
-    figures()

@@ -10,12 +10,13 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import question_tables as tables
-from play_tables import OUT, ROOT, play, rewritten
+from play_tables import OUT, ROOT, play
+from tables import rewritten
 
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
@@ -45,6 +46,16 @@ def policies_compared(found: StudyResults) -> Answer:
     return blocks, figure.draw, figure.height
 
 
+def point(series: str, known: Sequence[str], category: str, of: Any) -> dict[str, Any]:
+    """Return a point of a figure, from a row with an interval."""
+    value = getattr(of, "value", float("nan"))
+    return {
+        "series": series, "style": known.index(series), "category": category, "value": value,
+        "low": of.low, "high": of.high, "decided": True, "saturated": False,
+        "published": float("nan"),
+    }  # fmt: skip
+
+
 def larger_swarms(found: StudyResults) -> Answer:
     """Answer with P and R against N."""
     blocks = {
@@ -55,21 +66,12 @@ def larger_swarms(found: StudyResults) -> Answer:
     rows = [test for test in rows_of(found.indicators) if test.indicator == "R"]
     policies = list(dict.fromkeys(test.policy for test in rows))
     points = pd.DataFrame(
-        [
-            {
-                "mode": test.factor,
-                "series": test.policy,
-                "style": policies.index(test.policy),
-                "category": f"{test.n_robots}, m = {test.after:g}",
-                "value": test.value,
-                "low": test.low,
-                "high": test.high,
-                "decided": test.verdict_holm in ("supported", "refuted"),
-                "saturated": False,
-                "published": float("nan"),
-            }
-            for test in rows
-        ]
+        {
+            "mode": test.factor,
+            **point(test.policy, policies, f"{test.n_robots}, m = {test.after:g}", test),
+            "decided": test.verdict_holm in ("supported", "refuted"),
+        }
+        for test in rows
     )
     panels = [
         Panel(mode, "robustness R", own, (0.0,), "")
@@ -123,21 +125,18 @@ def mixed_swarms(found: StudyResults) -> Answer:
     panels = []
     for policies in tables.replacements(found):
         points = pd.DataFrame(
-            [
-                {
-                    "series": str(cell.arm.setting),
-                    "style": faults.index(str(cell.arm.setting)),
-                    "category": f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
-                    "value": cell.mean,
-                    "low": cell.low,
-                    "high": cell.high,
-                    "decided": True,
-                    "saturated": cell.saturated,
-                    "published": float("nan"),
-                }
-                for cell in rows
-                if cell.policy in policies
-            ]
+            {
+                **point(
+                    str(cell.arm.setting),
+                    faults,
+                    f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
+                    cell,
+                ),
+                "value": cell.mean,
+                "saturated": cell.saturated,
+            }
+            for cell in rows
+            if cell.policy in policies
         )
         title = f"from {policies[0]} to {policies[-1]}"
         share = f"share of {policies[-1]}"

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from record_tables import table
+from tables import table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import wording

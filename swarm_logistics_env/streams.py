@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
 
-_MASK = (1 << 64) - 1
-
 
 def key(seed: int, purpose: str, *entity: int) -> int:
     """Return the 64-bit key of a stream.
@@ -48,7 +46,7 @@ def row_keys(seed: int, purpose: str, n_rows: int) -> NDArray[np.uint64]:
     Row i's key does not depend on `n_rows`.
     """
     rows = np.arange(1, n_rows + 1, dtype=np.uint64)
-    return _mixed(rows * np.uint64(0x9E3779B97F4A7C15) + np.uint64(key(seed, purpose) & _MASK))
+    return _mixed(rows * np.uint64(0x9E3779B97F4A7C15) + np.uint64(key(seed, purpose)))
 
 
 def _mixed(value: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -26,7 +26,6 @@ if not (Path(__file__).parents[1] / "swarm_logistics_env").is_dir():
         "test_imports.py",
         "test_packaging.py",
         "verification/test_mutants.py",
-        "verification/test_ignores.py",
     ]
 
 

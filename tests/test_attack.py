@@ -1,11 +1,14 @@
 """The search for the worst fault: against brute force, against chance, and killed."""
 
+import itertools
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from swarm_logistics_env import Fault, Scenario, policies, run_episode
+from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.attack import STORE, Attack, attack, random_search, search
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.studies.engines import serial
@@ -18,39 +21,38 @@ SCENARIO = Scenario(
     delivery_width=1.5,
     n_items=8,
     restock=True,
-    duration=60.0,
+    duration=30.0,
 )
 
 
-def test_the_search_comes_nearer_to_the_brute_force_worst_than_chance() -> None:
+def test_the_search_comes_nearer_to_the_worst_fault_than_chance() -> None:
+    # Costs by mode, by role and onset within it, and luck; verification/search_regret.py plays.
+    modes, roles, onsets = ("FM1", "FM2", "FM3", "FM4", "dead"), ("carrier", "searching"), (10, 30)
+    kinds = list(itertools.product(modes, roles, onsets, (None, 15.0)))
     faults = [
-        Fault(mode, 2, onset=onset, duration=lasts, role=role)
-        for mode in ("FM1", "FM2", "FM3", "FM4", "dead")
-        for role in ("carrier", "searching")
-        for onset in (10.0, 30.0)
-        for lasts in (None, 15.0)
+        Fault(mode, 2, onset=at, duration=lasts, role=role) for mode, role, at, lasts in kinds
     ]
-    policy, seeds = policies.load("swarm-dt"), range(16)
-    sound = np.array([run_episode(SCENARIO, policy, seed).delivered for seed in seeds])
-    failed = np.array(
-        [[run_episode(SCENARIO, policy, s, [fault]).delivered for s in seeds] for fault in faults]
-    )
-    change = (failed - sound) / sound.mean()
-    fresh = change[:, 8:].mean(axis=1)  # the search sees the first eight seeds alone
 
-    def regret(way: object, seed: int) -> float:
-        shuffled = np.random.default_rng(seed).permutation(8)
+    def regret(way: Callable[..., Any], seed: int) -> float:
+        rng = np.random.default_rng(seed)
+        parts = [dict.fromkeys({kind[: n + 1] for kind in kinds}, 0.0) for n in range(3)]
+        for part in parts:
+            part.update({kind: rng.normal() for kind in sorted(part)})
+        mean = np.array(
+            [sum(part[kind[: n + 1]] for n, part in enumerate(parts)) for kind in kinds]
+        )
 
         def play(pairs: list[tuple[int, int]]) -> list[float]:
-            return [float(change[place, shuffled[number % 8]]) for place, number in pairs]
+            return [float(mean[place] + rng.normal(0.0, 2.0)) for place, _ in pairs]
 
-        worst, trials = way(faults, play, 60, seed)  # type: ignore[operator]
+        worst, trials = way(faults, play, 60, seed)
         assert len(trials.tried) == 60
-        return float(fresh[worst] - fresh.min())
+        return float(mean[worst] - mean.min())
 
-    by_search = np.mean([regret(search, seed) for seed in range(20)])
-    by_chance = np.mean([regret(random_search, seed) for seed in range(20)])
-    assert by_search < by_chance
+    by_search, by_chance = (
+        np.mean([regret(way, seed) for seed in range(30)]) for way in (search, random_search)
+    )
+    assert by_search < 0.7 * by_chance
 
 
 def test_a_search_that_was_stopped_goes_on_and_ends_alike(tmp_path: Path) -> None:

@@ -2,73 +2,78 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
 import sys
-import textwrap
+from typing import Any
 
 import numpy as np
 
-from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies, swarm_logistics_v0
+from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 
-# 5,000 steps at N = 25: every step's state and observations go into the hash.
-SCRIPT = textwrap.dedent(
-    """
-    import hashlib, sys
-    import numpy as np
-    from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+STEPS = 1500
 
-    def begin(scenario, seed, faults=()):
-        world, policy = Warehouse(scenario), policies.load("swarm-dt")
-        policy.configure(scenario)
-        policy.reset(scenario.n_robots, seed)
-        return world, policy, [world.reset(seed, faults)]
 
-    def advance(world, policy, rows):
-        rows[0] = world.step(policy.act(rows[0]))
+def wrapped(seed: int) -> Any:
+    """Return an environment with faults, robots that leave and a parameter that changes."""
+    env = swarm_logistics_v0.parallel_env(duration=STEPS / 10, restock=True, radio_loss=0.1)
+    onsets: dict[str, Any] = {
+        "onset": lambda rng: rng.uniform(10.0, 100.0, size=3),
+        "duration": 40.0,
+    }
+    wrapper: Any = FaultInjection(env, "motor_slow", robots=2, **onsets)
+    wrapper = SwarmSize(wrapper, [16, 20], leave=[(2, 60.0), (3, 90.0)])
+    wrapper = ParameterChange(wrapper, "delivery_width", [1.0, 3.0], at=[50.0, 100.0])
+    return FaultInjection(wrapper, "FM1", robots=3, onset=60.0)
 
-    def note(digest, world, rows):
-        state = world.state
-        for array in (
-            rows[0], state.robot_position, state.robot_velocity, state.robot_heading,
+
+def trajectory(beside: bool) -> str:
+    """Play 1,500 steps; every step's state and all that it returns go into the hash."""
+    env, policy = wrapped(0), policies.load("swarm-dt")
+    rows = env.reset_arrays(0)
+    policy.reset(len(rows), 0)
+    other = Warehouse(Scenario(n_robots=9, n_items=30, n_obstacles=3, relay="gossip"))
+    others, state = other.reset(1), env.warehouse.state
+    digest = hashlib.blake2b(rows.tobytes())
+    while env.agents:
+        rows, *outcome = env.step_arrays(policy.act(rows))
+        for part in (
+            rows, *outcome, state.robot_position, state.robot_velocity, state.robot_heading,
             state.robot_item, state.robot_memory, state.robot_timer, state.robot_told,
             state.robot_contact, state.item_position, state.item_status, state.item_carrier,
-        ):
-            digest.update(np.ascontiguousarray(array).tobytes())
-        digest.update(repr((state.requested, state.delivery_times, state.delivered_by)).encode())
-
-    scenario = Scenario(restock=True)
-    digest = hashlib.blake2b()
-    main = begin(scenario, 0, [Fault("motor_slow", 2, onset=100.0, duration=50.0)])
-    other = None
-    if sys.argv[1] == "interleaved":
-        other = begin(Scenario(n_robots=9, n_items=30, n_obstacles=3, relay="gossip"), 1)
-    for step in range(5000):
-        advance(*main)
-        note(digest, main[0], main[2])
-        if other:
-            advance(*other)
-            if step % 1000 == 999:
-                other[2][0] = other[0].reset(step)
-    print(digest.hexdigest(), main[0].state.delivered, main[0].state.step)
-    """
-)
+        ):  # fmt: skip
+            digest.update(np.ascontiguousarray(part).tobytes())
+        told = (env.agents, state.failure_modes, state.requested, state.delivery_times)
+        digest.update(repr((*told, state.delivered_by)).encode())
+        if beside:
+            others = other.step(0.5 * others[:, :4])
+            if state.step % 500 == 499:
+                others = other.reset(state.step)
+    return f"{digest.hexdigest()} {state.delivered} {state.step} {len(env.failed_robots)}"
 
 
-def trajectory(hash_seed: str, how: str) -> str:
-    environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
-    command = [sys.executable, "-c", SCRIPT, how]
+def elsewhere(hash_seed: str, beside: bool) -> str:
+    """Return the trajectory that another process plays."""
+    script = f"from tests.test_determinism import trajectory; print(trajectory({beside}))"
+    environment = {
+        **os.environ,
+        "PYTHONHASHSEED": hash_seed,
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }
+    command = [sys.executable, "-c", script]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    return done.stdout
+    return done.stdout.strip()
 
 
 def test_a_trajectory_is_the_same_in_three_processes_and_beside_another_world() -> None:
-    first = trajectory("0", "alone")
-    _, delivered, steps = first.split()
-    assert int(steps) == 5000
-    assert int(delivered) > 10
-    assert trajectory("1", "alone") == first
-    assert trajectory("20240229", "interleaved") == first
+    first = trajectory(False)
+    _, delivered, steps, failed = first.split()
+    assert (int(steps), int(failed)) == (STEPS, 3)
+    assert int(delivered) > 2
+    assert elsewhere("1", False) == first
+    assert elsewhere("20240229", True) == first
 
 
 def test_worlds_of_a_kind_that_step_side_by_side_do_not_touch_each_other() -> None:
@@ -79,7 +84,7 @@ def test_worlds_of_a_kind_that_step_side_by_side_do_not_touch_each_other() -> No
     for world, policy in zip(worlds, steered):
         policy.reset(12, 0)
         rows.append(world.reset(0, [Fault("FM1", 2)]))
-    for _ in range(100):
+    for _ in range(60):
         for number, (world, policy) in enumerate(zip(worlds, steered)):
             rows[number] = world.step(policy.act(rows[number]))
         np.testing.assert_array_equal(rows[0], rows[1])

@@ -17,16 +17,15 @@ from swarm_logistics_env.cli import app
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 BLOCKS = runpy.run_path(str(DOCS / "blocks.py"))
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md"))}
 
 
-@pytest.mark.parametrize("script", sorted(path.name for path in DOCS.glob("generate*.py")))
-def test_generated_page_is_current(script: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_generated_tables_are_current(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(DOCS)  # as for a script there
-    generator = runpy.run_path(str(DOCS / script))
-    assert PAGES[generator["PAGE"].name] == generator["page"](), (
-        f"stale: run `python docs/{script}`"
-    )
+    generator = runpy.run_path(str(DOCS / "generate.py"))
+    for page in generator["PAGES"]:
+        assert PAGES[f"{page}.md"] == generator["written"](page), "run `python docs/generate.py`"
 
 
 @pytest.mark.parametrize("page", BLOCKS["pages"](), ids=lambda page: page.name)
@@ -40,21 +39,25 @@ def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
     assert comparable(said) == comparable(text), f"stale: run `python docs/blocks.py {page}`"
 
 
-def test_every_block_has_a_language_that_is_checked() -> None:
-    for name, text in PAGES.items():
-        for block in BLOCKS["blocks"](text):
-            assert block.language in BLOCKS["LANGUAGES"], f"{name}: ```{block.language}"
-
-
 def test_changed_output_is_noticed() -> None:
     page = "```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n"
     assert BLOCKS["recorded"](page) == page.replace("3", "2")
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
-def test_commands_that_are_not_run_are_commands(name: str) -> None:
-    for arguments in BLOCKS["commands"](PAGES[name]):
+def test_what_a_page_names_exists(name: str) -> None:
+    text = PAGES[name]
+    for block in BLOCKS["blocks"](text):
+        assert block.language in BLOCKS["LANGUAGES"], f"```{block.language}"
+    for arguments in BLOCKS["commands"](text):
         parse(arguments)
+    for target in re.findall(r"(?:^|`)make ([\w-]+)", text, flags=re.MULTILINE):
+        assert re.search(rf"^[\w -]*\b{target}\b[\w -]*:(?!=)", MAKEFILE, flags=re.MULTILINE)
+    prose = re.sub(r"^```\w.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
+    targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)|^```{figure} (\S+)", prose, flags=re.MULTILINE)
+    for link, picture in targets:
+        assert "://" in link or (DOCS / (link or picture)).exists(), link or picture
+    assert "{figure} media/" in "\n".join(text.splitlines()[:20])
 
 
 def parse(arguments: list[str]) -> None:
@@ -94,47 +97,6 @@ def test_an_interval_that_is_typed_is_seen() -> None:
     assert typed_by_hand(f"{block}R = .007 [-.001, .015]") == {"[-.001, .015]"}
     assert typed_by_hand("81.3 [72.3,\n90.3]") == {"[72.3,\n90.3]"}
     assert typed_by_hand("0.175 ± 0.026") == {"5 ± 0"}
-
-
-def test_targets_of_make_exist() -> None:
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    heads = re.findall(r"^([\w -]+):(?!=)", makefile, flags=re.MULTILINE)
-    known = {target for head in heads for target in head.split()}
-    for text in PAGES.values():
-        for target in re.findall(r"(?:^|`)make ([\w-]+)", text, flags=re.MULTILINE):
-            assert target in known
-
-
-@pytest.mark.parametrize("name", sorted(PAGES))
-def test_links_and_pictures_exist(name: str) -> None:
-    text = re.sub(r"^```\w.*?^```$", "", PAGES[name], flags=re.DOTALL | re.MULTILINE)
-    targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)|^```{figure} (\S+)", text, flags=re.MULTILINE)
-    for link, picture in targets:
-        if "://" not in link:
-            assert (DOCS / (link or picture)).exists(), f"{name}: {link or picture}"
-
-
-@pytest.mark.parametrize("name", sorted(PAGES))
-def test_a_page_begins_with_a_picture(name: str) -> None:
-    assert "{figure} media/" in "\n".join(PAGES[name].splitlines()[:20])
-
-
-def test_diagrams_are_those_of_the_script() -> None:
-    for name, drawing in runpy.run_path(str(DOCS / "diagrams.py"))["drawings"]().items():
-        assert (DOCS / "media" / name).read_text("utf-8") == drawing, (
-            "run `python docs/diagrams.py`"
-        )
-
-
-def test_the_caption_of_the_front_page_tells_what_the_picture_shows() -> None:
-    drawn = (DOCS / "pictures.py").read_text(encoding="utf-8")
-    assert 'save(scene(30.0), "warehouse.png")' in drawn
-    assert "n_robots=16" in drawn
-    assert "show_beams_of: int | None = 3" in drawn
-    assert "trails=True" in drawn
-    caption = PAGES["index.md"].partition("media/warehouse.png")[2].partition("```")[0]
-    for words in ("Sixteen robots", "thirty seconds", "crosshairs", "orange beams", "grey lines"):
-        assert words in caption
 
 
 @pytest.mark.filterwarnings("ignore")  # the libraries that build the site warn about each other

@@ -108,11 +108,6 @@ def test_study_file_can_be_planned(study: Path) -> None:
     assert list(Study.from_file(study).plan().runs())
 
 
-def test_examples_are_short() -> None:
-    for example in EXAMPLES.glob("*.py"):
-        assert len(example.read_text("utf-8").splitlines()) < 100, example.name
-
-
 def test_the_search_for_constants_ends_with_a_change() -> None:
     scenario = Scenario(n_robots=10, duration=100.0, restock=True)
     change = main("tune_swarm_dt", rounds=2, seeds=2, confirm=2, scenario=scenario)

@@ -33,11 +33,6 @@ def test_bounds_follow_the_scenario() -> None:
     assert (unflatten(low, scenario)["velocity"] == -1.5).all()
 
 
-def test_a_row_is_as_long_in_any_swarm() -> None:
-    for n_robots in (1, 5, 60):
-        assert Warehouse(Scenario(n_robots=n_robots)).reset(0).shape == (n_robots, N_COLUMNS)
-
-
 def test_unflatten_gives_views_of_rows_and_of_tables() -> None:
     scenario = Scenario(n_robots=4)
     table = Warehouse(scenario).reset(0)

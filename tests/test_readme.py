@@ -13,7 +13,15 @@ from swarm_logistics_env import Scenario, run_episode
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+END = "<!-- end of tables -->"
 BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The script `docs/front_page.py`."""
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    return importlib.import_module("front_page")
 
 
 def run(block: str) -> dict[str, Any]:
@@ -22,40 +30,25 @@ def run(block: str) -> dict[str, Any]:
     return names
 
 
-def test_the_environment_in_ten_lines_runs_as_written() -> None:
-    block = next(block for block in BLOCKS if "parallel_env" in block)
-    names = run(block.replace("n_robots=25", "n_robots=25, duration=2.0"))
+def test_every_block_of_code_runs_as_written(capsys: pytest.CaptureFixture[str]) -> None:
+    first, environment, policy = BLOCKS
+    run(first.replace("restock=True", "restock=True, duration=150.0"))
+    lines = capsys.readouterr().out.splitlines()
+    delivered = [int(line.split(": ")[1].split()[0]) for line in lines]
+    assert len({line.split(":")[0] for line in lines}) == 3
+    assert len(delivered) == 6
+    assert min(delivered[1:3]) > 2 * delivered[0]
+    names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
     assert all(names["truncations"].values())
-
-
-def test_the_first_lines_show_what_the_findings_say(capsys: pytest.CaptureFixture[str]) -> None:
-    run(BLOCKS[0])
-    lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 6
-    delivered = [int(line.split(": ")[1].split()[0]) for line in lines]
-    by_name = {line.split(":")[0] for line in lines}
-    assert len(by_name) == 3
-    assert min(delivered[1:3]) > 2 * delivered[0]
-
-
-def test_the_policy_of_ones_own_runs_as_written() -> None:
-    names = run(next(block for block in BLOCKS if "class Still" in block))
-    assert run_episode(Scenario(duration=5.0), names["Still"](), seed=0).delivered == 0
-
-
-def test_every_block_of_code_is_run_here() -> None:
-    assert len(BLOCKS) == 3
+    still = run(policy)["Still"]()
+    assert run_episode(Scenario(duration=5.0), still, seed=0).delivered == 0
 
 
 def test_what_it_says_of_results_is_what_the_page_of_results_says(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    script: Any, tmp_path: Path
 ) -> None:
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    script = importlib.import_module("front_page")
-    assert script.rewritten(README, script.blocks()) == README, (
-        "stale: run `python docs/front_page.py`"
-    )
+    assert script.written() == README, "stale: run `python docs/front_page.py`"
     # Every number with an interval there stands in a table of that page.
     results = script.RESULTS.read_text(encoding="utf-8")
     told = re.findall(r"-?[\d.]+ \[-?[\d.]+, -?[\d.]+\]", script.findings(results))
@@ -66,9 +59,7 @@ def test_what_it_says_of_results_is_what_the_page_of_results_says(
     assert (tmp_path / "anew.svg").stat().st_size > 10_000
 
 
-def test_a_finding_is_a_rule_not_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    script = importlib.import_module("front_page")
+def test_a_finding_is_a_rule_not_a_sentence(script: Any) -> None:
     rows = [
         "|  | `swarm-dt` | `a` | `ppo-b` |", "| --- | --- | --- | --- |",
         "| P, N = 25 | 10.0 [9.0, 11.0] | 80.0 [79.0, 81.0] | 25.0 [24.0, 26.0] |",
@@ -78,26 +69,23 @@ def test_a_finding_is_a_rule_not_a_sentence(monkeypatch: pytest.MonkeyPatch) -> 
     ]  # fmt: skip
     page = (
         "<!-- tables: paper -->\nOf 9 claims (of it), adjusted after Holm: 9 supported.\n"
-        f"{script.END}\n<!-- tables: policies -->\n" + "\n".join(rows) + "\n\n30 seeds from 7 on.\n"
-        f"{script.END}\n"
+        f"{END}\n<!-- tables: policies -->\n" + "\n".join(rows) + "\n\n30 seeds from 7 on.\n"
+        f"{END}\n"
     )
     said = script.findings(page)
     assert "delivers 2.5 times as much**: 25 robots with `ppo-b` bring 25.0 [24.0, 26.0]" in said
     # R = (P_F - P_o) / P_o + m/N, with m/N = 0.08.
     assert "in mode FM1 (tells a false timer) `swarm-dt` delivers 58 % less" in said
     assert "while `ppo-b` withstands it (0.05 [0.01, 0.07])" in said
-    assert "with FM2 (lifts nothing), R of `ppo-b` is -0.2 [-0.3, -0.1], of `swarm-dt`" in said
     assert "`ppo-b` scales best (S = 0.5 [0.4, 0.6]), and `a` delivers less" in said
     assert "over 30 seeds" in said
 
 
 @pytest.mark.parametrize("address", [None, "https://forge.example/swarm"])
 def test_links_lead_to_files_or_the_page_says_where_they_do_not(
-    address: str | None, monkeypatch: pytest.MonkeyPatch
+    address: str | None, script: Any
 ) -> None:
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    script = importlib.import_module("front_page")
-    page = script.rewritten(README, script.pictures_and_links(address))
+    page = script.with_address(README, address)
     targets = re.findall(r'^\[[^]]+\]: (\S+)|src="([^"]+)"|\]\(([^)]+)\)', page, flags=re.MULTILINE)
     found = {target for group in targets for target in group if target}
     assert {"docs/media/fm4.gif", "docs/training.md"} <= {t.removeprefix(f"{address}/raw/main/")
@@ -107,13 +95,9 @@ def test_links_lead_to_files_or_the_page_says_where_they_do_not(
     assert bool(relative) == ("A package index does not show them" in page) == (address is None)
 
 
-def test_no_line_of_code_is_wider_than_the_page() -> None:
+def test_its_lines_fit_and_what_it_names_exists() -> None:
     for block in re.findall(r"```\w*\n(.*?)```", README, flags=re.DOTALL):
         assert max(map(len, block.splitlines())) <= 104
-    assert not [line for line in README.splitlines() if line.startswith("|")]
-
-
-def test_every_command_and_target_that_it_names_exists() -> None:
-    makefile = (Path(__file__).parents[1] / "Makefile").read_text(encoding="utf-8")
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for target in set(re.findall(r"^make (\w+)|`make (\w+)", README, flags=re.MULTILINE)):
         assert f"{target[0] or target[1]}:" in makefile

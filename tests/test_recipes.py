@@ -56,27 +56,6 @@ for wrap in (lambda env: env, HalfSpeed):
 assert abs(speeds[1] / speeds[0] - 0.5) < 0.05, speeds
 """
 
-
-RESTS = """
-import numpy as np
-from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.policies import Policy
-
-
-class Still(Policy):
-    def reset(self, n_robots, seed):
-        self.n_robots = n_robots
-
-    def act(self, observations):
-        return np.zeros((self.n_robots, 4))
-
-
-scenario = Scenario(n_robots=3, n_items=4, duration=3.0)
-rested = run_episode(scenario.replace(rest=3.0), policies.load("swarm-dt"), seed=0)
-assert rested.digest == run_episode(scenario, Still(), seed=0).digest
-assert rested.digest != run_episode(scenario, policies.load("swarm-dt"), seed=0).digest
-"""
-
 INTERPRETED = """
 import numpy as np
 from verification.interpreted import interpret_kernels
@@ -151,7 +130,7 @@ DOCS = """
 import sys
 sys.path.append(sys.argv[1])
 import generate
-print(generate.page())
+print(generate.written("environment"))
 """
 
 
@@ -263,22 +242,6 @@ def test_a_failure_mode(copy: Copy) -> None:
 
 
 def test_a_scenario_parameter(copy: Copy) -> None:
-    field = '    rest: NonNegativeFloat = Field(0.0, description="at first nobody moves [s]; off")'
-    copy.insert("scenario.py", "    item_radius: ", field)
-    copy.insert(
-        "episode.py",
-        "        try:\n            self._observations = self.world.step",
-        "        if self.world.state.time < self.world.scenario.rest:\n            commands *= 0.0",
-    )
-    copy.run("-c", RESTS)
-    assert "| rest | 2 (default 0) | at first nobody moves [s]; off |" in copy.run(
-        "-c", "from swarm_logistics_env import Scenario; print(Scenario(rest=2.0).sheet())"
-    )
-    assert "| `rest` | `0.0` | at first nobody moves [s]; off |" in copy.page()
-    assert copy.changed == files_of("A scenario parameter", READER="episode")
-
-
-def test_a_scenario_parameter_that_a_kernel_reads(copy: Copy) -> None:
     field = (
         '    odometry_scale: PositiveFloat = Field(1.0, description="factor of velocities; off")'
     )
@@ -290,6 +253,7 @@ def test_a_scenario_parameter_that_a_kernel_reads(copy: Copy) -> None:
         "    forward *= parameters.odometry_scale\n    left *= parameters.odometry_scale",
     )
     copy.interpret(SCALED)
+    assert "| `odometry_scale` | `1.0` | factor of velocities; off |" in copy.page()
     files = files_of("A scenario parameter", READER="warehouse/sensing")
     assert copy.changed == files | {"warehouse/structs.py"}
     assert "`warehouse/structs.py`" in PAGE

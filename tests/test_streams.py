@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -62,15 +60,3 @@ def test_numbers_of_a_kernel_stream_are_uniform_and_independent() -> None:
     across = np.corrcoef(numbers[:-1].ravel(), numbers[1:].ravel())[0, 1]
     assert abs(along) < 5 / np.sqrt(n)
     assert abs(across) < 5 / np.sqrt(n)
-
-
-def test_streams_are_the_same_in_another_process() -> None:
-    code = (
-        "from swarm_logistics_env.streams import generator, row_keys\n"
-        "print(generator(5, 'a', 2).integers(2**62), row_keys(5, 'a', 3)[-1])"
-    )
-    told = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout.split()
-    expected = [generator(5, "a", 2).integers(2**62), row_keys(5, "a", 3)[-1]]
-    assert told == [str(number) for number in expected]

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from swarm_logistics_env import spi
-from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import rows_of
-from swarm_logistics_env.studies.runs import Run
-from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
 ROOT = Path(__file__).parents[1]
@@ -98,52 +91,6 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     assert sum(played) > 20
 
 
-def test_the_blocks_quote_what_was_played(tables: Any, small: Path, tmp_path: Path) -> None:
-    tables.main()
-    paper, policies = (text for _, text in BLOCK.findall(small.read_text()))
-    first, second = (study.findings() for study in tables.paper_studies(tmp_path / "out"))
-    sizes = next(line for line in paper.splitlines() if line.startswith("| N = 5, 10 (60 items)"))
-    assert "| 9, 18 |" in sizes.replace("**", "")
-    for mean in first.performance["mean"][:2]:
-        assert f"{wording.fixed(mean, wording.digits_of(mean))} [" in sizes
-    counted = [c for part in (first, second) for c in rows_of(part.performance) if c.counted]
-    inside = sum(c.low <= c.published <= c.high for c in counted)
-    assert f"{inside} of {len(counted)} lie inside the 95 % interval of our mean" in paper
-    logs = [abs(np.log(c.mean / c.published)) for c in counted]
-    assert f"is {np.mean(logs):.3f} over the {len(counted)} published values" in paper
-
-    main, skewed = (study.findings() for study in tables.policy_studies(tmp_path / "out"))
-    unbroken = {c.policy: c.by_seed for c in rows_of(main.performance) if c.factor == "none"}
-    change = spi.relative_change(unbroken["homing"], unbroken["ppo-delivery"])
-    assert f"`ppo-delivery` {abs(100 * change.value):.1f} %" in policies
-    assert policies.rstrip().endswith("less." if change.value < 0 else "more.")
-    assert "Compared with the script `homing`" in policies
-    # FM4 of swarm-dt comes from the study with more seeds, of the others from the first.
-    row = next(line for line in policies.splitlines() if line.startswith("| R, FM4, m = 2"))
-    values = {j.policy: j for j in rows_of(main.indicators) if j.indicator == "R"}
-    (more,) = [j for j in rows_of(skewed.indicators) if j.indicator == "R"]
-    assert row.split("|")[2].strip().startswith(f"{more.value:.3f}")
-    assert row.split("|")[3].strip().startswith(f"{values['homing'].value:.3f}")
-
-
-def test_costs_are_written_from_the_last_benchmark(tables: Any) -> None:
-    rows = [
-        {"name": "floor", "includes": "bodies", "agent_steps_per_second": 1234567.0,
-         "microseconds_per_step": 33.4, "base": None, "cost_to_base": None},
-        {"name": "step", "includes": "all", "agent_steps_per_second": 600000.0,
-         "microseconds_per_step": 53.0, "base": "floor", "cost_to_base": 1.588},
-    ]  # fmt: skip
-    machine = {"processor": "A", "cores": 2, "python": "3.11.7"}
-    text = tables.costs_block({"contestants": rows, "machine": machine, "bytes_per_robot": 6212.0})
-    assert "| step: all | 600,000 | 53 | 1.59 x floor |" in text
-    assert "6.2 kB" in text
-
-
-def test_a_page_without_markers_is_refused(tables: Any) -> None:
-    with pytest.raises(SystemExit, match="tables: paper"):
-        tables.rewritten("<!-- tables: paper -->", {"paper": "x"})
-
-
 def test_its_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> None:
     studies = (*tables.paper_studies(Path("a")), *tables.policy_studies(Path("a")))
     for study in studies:
@@ -160,28 +107,3 @@ def test_no_table_is_typed_by_hand(page: str) -> None:
     assert not [line for line in rest.splitlines() if line.startswith("|")]
     # Nor is a value with its interval: "9.2 [8.3, 10.1]".
     assert not re.findall(r"\d \[-?\d", rest)
-
-
-def test_the_seeds_that_claims_take_stand_beside_the_fixed_plan(tables: Any) -> None:
-    def made_up(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
-        """Counts around 40, and around 10 under FM4."""
-        for run in runs:
-            mean = 10.0 if any(fault.mode == "FM4" for fault in run.condition.faults) else 40.0
-            count = np.random.default_rng(int(run.key[:8], 16)).poisson(mean)
-            yield run, Outcome(run.key, np.arange(float(count)), digest=run.key)
-
-    script = importlib.import_module("play_until_clear")
-    asked: dict[str, Any] = {
-        "seeds": 30,
-        "reference": "paper",
-        "faults": [{"modes": ["FM2", "FM4"], "robots": [1]}],
-    }
-    both = (Study(until_clear=True, **asked), Study(**asked))
-    played = [study.run(made_up).played for study in both]
-    text = script.spent(*(study.findings() for study in both))
-    assert "| robust, FM4 | m = 1 | 20 | refuted | the same |" in text
-    assert "| robust, FM2 | m = 1 | 30 (open) | inconclusive | the same |" in text
-    assert f"{played[0]:,} runs instead of the fixed plan's {played[1]:,}. 2 of 4" in text
-    assert played == [4 * 30 - 10, 4 * 30]
-    page = script.STUDIES.read_text(encoding="utf-8")
-    assert script.rewritten(page, {"spent": "x"}).count("| ---") < page.count("| ---")

@@ -25,11 +25,6 @@ WORKFLOWS: dict[str, Any] = {
     path.name: yaml.safe_load(path.read_text(encoding="utf-8"))
     for path in sorted(HOST.glob("workflows/*.yml"))
 }
-JOBS = [
-    pytest.param(job, id=f"{name}:{title}")
-    for name, workflow in WORKFLOWS.items()
-    for title, job in workflow["jobs"].items()
-]
 
 
 def versions_in(job: dict[str, Any]) -> list[dict[str, str]]:
@@ -66,18 +61,6 @@ def test_every_target_that_a_workflow_calls_exists() -> None:
     assert wanted | {"test-lowest", "test-newest"} <= called()
 
 
-@pytest.mark.parametrize("job", JOBS)
-def test_a_job_does_its_work_by_make_within_a_time(job: dict[str, Any]) -> None:
-    assert job["timeout-minutes"] <= 330
-    for step in job["steps"]:
-        assert ("uses" in step) != ("run" in step), step
-        if "uses" in step:
-            assert re.fullmatch(r"[\w-]+/[\w-]+@[\w./]+", step["uses"]), step
-    made = [line for line in lines_of(job) if line.startswith("make ")]
-    publishes = any("pypi-publish" in step.get("uses", "") for step in job["steps"])
-    assert made or publishes
-
-
 def test_the_gate_runs_on_every_python_that_the_package_names() -> None:
     named = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
     assert WORKFLOWS["test.yml"]["jobs"]["gate"]["strategy"]["matrix"]["python"] == named
@@ -102,30 +85,6 @@ def test_a_release_is_published_without_a_password_and_with_attestations() -> No
     assert "secrets." not in everything
 
 
-def test_issue_forms_ask_for_something() -> None:
-    forms = [path for path in HOST.glob("ISSUE_TEMPLATE/*.yml") if path.name != "config.yml"]
-    assert len(forms) == 3
-    for path in forms:
-        form = yaml.safe_load(path.read_text(encoding="utf-8"))
-        assert {"name", "description", "body"} <= form.keys()
-        names = [part["id"] for part in form["body"]]
-        assert len(set(names)) == len(names)
-        assert any(part.get("validations", {}).get("required") for part in form["body"])
-        assert all(part["attributes"]["label"] for part in form["body"])
-
-
-def test_links_of_the_readme_exist() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    links = re.findall(r"\]\(([^)]+)\)|^\[[^\]]+\]: (\S+)$", readme, flags=re.MULTILINE)
-    targets = [inline or defined for inline, defined in links]
-    assert targets
-    for target in targets:
-        assert target.startswith(("https://", "#")) or (ROOT / target).exists(), target
-    defined = {name.lower() for name in re.findall(r"^\[([^\]]+)\]: ", readme, re.MULTILINE)}
-    used = {name.lower() for name in re.findall(r"\[([^\]]+)\](?!:)", readme)}
-    assert defined - used == set()
-
-
 def test_a_release_has_links_with_the_repositorys_address_before_it_is_built() -> None:
     lines = lines_of(WORKFLOWS["release.yml"]["jobs"]["build"])
     made = re.findall(r"make ([\w-]+)", "\n".join(lines))
@@ -138,12 +97,6 @@ def test_a_release_has_links_with_the_repositorys_address_before_it_is_built() -
     changed = re.sub(told[1].replace("$$", "$"), rf"\g<0>\n{line}", project, flags=re.MULTILINE)
     urls = tomllib.loads(changed)["project"]["urls"]
     assert urls == {**PROJECT["urls"], "Repository": "https://forge.example/swarm"}
-
-
-def test_the_project_and_the_citation_name_the_same_paper() -> None:
-    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    [paper] = cited["references"]
-    assert paper["url"] == PROJECT["urls"]["Paper"]
 
 
 def test_version_and_date_are_those_of_the_changelog() -> None:

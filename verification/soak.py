@@ -9,22 +9,24 @@ Ends with 1 at the first broken promise, naming the world that shows it.
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import resource
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import Scenario, Warehouse, policies
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.policies.policy import decide, start
-from verification.invariants import BrokenPromiseError, Watch
-from verification.jams import SIZES, TARGETS, overlaps
-from verification.scenarios import drawn_change, drawn_faults, some_scenario
+from swarm_logistics_env.scenario import LONGEST_STRIDE
+from swarm_logistics_env.warehouse import FAILURE_MODES
+from verification.invariants import JAM, SUSTAINED, BrokenPromiseError, Watch
 
 Steer = Callable[[Warehouse, NDArray[np.float32]], NDArray[np.float64]]
 
@@ -54,6 +56,97 @@ class Tally:
             f"{self.steps} steps of {self.worlds} worlds, {self.delivered} items delivered, "
             f"greatest overlap {1000 * self.deepest:.1f} mm, {self.no_room} without room"
         )
+
+
+# Lengths are drawn around the robot's own, so that things meet; the rest within what may be built.
+CHANGEABLE = ("delivery_width", "max_speed", "view_range", "radio_range", "pickup_range", "relay",
+              "timer_limit", "drive", "ranger_noise", "sensor_dropout", "radio_loss",
+              "restock")  # fmt: skip
+
+
+def some_scenario(source: random.Random) -> Scenario:
+    """Return a scenario, drawn again until one can be.
+
+    A robot sinks into nothing only where drives are of a robot's strength.
+    """
+    while True:
+        try:
+            return Scenario(**_fields(source))
+        except ScenarioError:
+            continue
+
+
+def _fields(source: random.Random) -> dict[str, Any]:
+    def number(low: float, high: float) -> float:
+        return float(low * (high / low) ** source.random())
+
+    def rarely(value: Any, otherwise: Any) -> Any:
+        return value if source.random() < 0.25 else otherwise
+
+    radius = number(0.05, 0.3)
+    width = number(1.0, 12.0)
+    physics_period = source.choice([0.01, 0.02, 0.005])
+    fields: dict[str, Any] = {
+        "robot_radius": radius,
+        "item_radius": number(0.03, 0.3),
+        "warehouse_width": width,
+        "warehouse_height": number(0.8, 12.0),
+        "delivery_width": width * source.uniform(0.05, 0.6),
+        "n_robots": int(number(1, 40)),
+        "n_items": int(number(1, 60)),
+        "duration": 1e6,
+        "restock": source.random() < 0.5,
+        "n_obstacles": rarely(source.randint(1, 6), 0),
+        "obstacle_radius": number(0.05, 0.6),
+        "robot_mass": number(0.1, 50.0),
+        "max_speed": min(number(0.2, 4.0), LONGEST_STRIDE * radius / physics_period),
+        "max_acceleration": number(0.5, 40.0),
+        "max_turn_rate": number(0.5, 20.0),
+        "ranger_range": number(0.2, 6.0),
+        "view_range": number(0.1, 4.0),
+        "radio_range": number(0.2, 8.0),
+        "pickup_range": number(0.05, 1.0),
+        "drive": rarely("differential", "holonomic"),
+        "speed_mix": rarely((1.0, 0.5, 0.2), (1.0,)),
+        "sensing_mix": rarely((1.0, 0.3), (1.0,)),
+        "memory_size": source.randint(0, 4),
+        "timer_limit": number(0.5, 20.0),
+        "relay": rarely("gossip", "none"),
+        "ranger_noise": rarely(number(0.01, 1.0), 0.0),
+        "position_noise": rarely(number(0.01, 1.0), 0.0),
+        "sensor_dropout": rarely(source.random(), 0.0),
+        "radio_loss": rarely(source.random(), 0.0),
+        "heading_drift": rarely(number(0.01, 1.0), 0.02),
+        "message_size": rarely(source.randint(1, 4), 0),
+        "control_period": physics_period * source.randint(1, 5),
+        "physics_period": physics_period,
+    }
+    return fields
+
+
+def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> list[Fault]:
+    """Return up to three faults that begin, and some of which end, within `seconds`."""
+    faults = []
+    for _ in range(source.choice([0, 0, 1, 2, 3])):
+        mode = source.choice(sorted(FAILURE_MODES))
+        onset = source.choice([0.0, source.uniform(0.0, seconds)])
+        passes = mode != "removed" and source.random() < 0.5
+        duration = source.uniform(0.1, seconds) if passes else None
+        robots = source.randint(1, scenario.n_robots)
+        breaks = (source.uniform(0.05, 2.0), source.uniform(0.05, 2.0))
+        is_steady = mode == "removed" or source.random() < 0.7
+        intermittent = None if is_steady else breaks
+        faults.append(Fault(mode, robots, onset, duration, intermittent=intermittent))
+    return faults
+
+
+def drawn_change(source: random.Random, scenario: Scenario) -> dict[str, Any]:
+    """Return one or two fields for `Warehouse.change`; what cannot be is refused there."""
+    fields = _fields(source)
+    fields["delivery_width"] = scenario.warehouse_width * source.uniform(0.05, 0.6)
+    fields["max_speed"] = scenario.max_speed * source.uniform(0.3, 1.0)
+    chosen = source.sample(CHANGEABLE, source.randint(1, 2))
+    return {name: fields[name] for name in chosen}
 
 
 def play(source: random.Random, steps: int, tally: Tally) -> None:
@@ -91,14 +184,80 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
     tally.deepest = max(tally.deepest, watch.deepest)
 
 
-def broken_jam() -> str | None:
-    """Press swarms to one point, to a wall and into a corner; returns what overlaps too much."""
-    for n_robots in SIZES:
-        for target in TARGETS:
-            problem = overlaps(n_robots, target, seed=0).problem(Scenario())
-            if problem:
-                return f"{n_robots} robots driven to a {target}: {problem}"
-    return None
+# Swarms driven to one point, to a wall and into a corner: how deep bodies overlap.
+SIZES = (25, 150)
+SECONDS = 15.0
+# The point that all robots drive to [m]; along an axis that is None each stays where it is.
+TARGETS: dict[str, tuple[float, float | None]] = {
+    "point": (5.0, 5.0),
+    "wall": (10.0, None),
+    "corner": (0.0, 0.0),
+}
+MEDIAN = 0.002  # [m], the most that the deepest overlap of a step may be, half of the time
+
+
+@dataclass(frozen=True)
+class Overlaps:
+    """Overlaps of a jam [m].
+
+    Attributes:
+        median: the median over all steps of the deepest overlap.
+        lasting: the deepest overlap that lasted longer than `JAM` seconds without a break.
+        robots, walls: the deepest overlap of two robots, and of a robot with a wall.
+    """
+
+    median: float
+    lasting: float
+    robots: float
+    walls: float
+
+    def problem(self, scenario: Scenario) -> str | None:
+        """Return what is beyond its bound, or None.
+
+        The peak may be what is closed in one substep at top speed.
+        """
+        closing = scenario.max_speed * scenario.physics_period
+        bounds = {"median": MEDIAN, "lasting": SUSTAINED, "robots": 2 * closing, "walls": closing}
+        for name, bound in bounds.items():
+            value = getattr(self, name)
+            if not value <= bound + 1e-6:
+                return f"{name} overlap {1000 * value:.1f} mm: should be {1000 * bound:g} at most"
+        return None
+
+
+def overlaps(n_robots: int, target: str, seed: int) -> Overlaps:
+    """Drive `n_robots` to a target of `TARGETS` at top speed and measure."""
+    world = Warehouse(Scenario(n_robots=n_robots, n_items=1))
+    world.reset(seed)
+    depths: list[float] = []
+    robots = walls = lasting = 0.0
+    since = np.zeros((n_robots, n_robots + 4))
+    for _ in range(math.ceil(SECONDS / world.scenario.control_period)):
+        world.step(_straight_to(world, *TARGETS[target]))
+        depth = _depths(world)
+        depths.append(float(depth.max()))
+        robots = max(robots, float(depth[:, :n_robots].max()))
+        walls = max(walls, float(depth[:, n_robots:].max()))
+        since = np.where(depth > SUSTAINED, since + world.scenario.control_period, 0.0)
+        lasting = max(lasting, float(depth[since > JAM].max(initial=0.0)))
+    return Overlaps(float(np.median(depths)), lasting, robots, walls)
+
+
+def _straight_to(world: Warehouse, x: float, y: float | None) -> NDArray[np.float64]:
+    at = world.state.robot_position
+    angle = np.arctan2((at[:, 1] if y is None else y) - at[:, 1], x - at[:, 0])
+    angle -= world.state.robot_heading
+    zeros = np.zeros_like(angle)
+    return np.column_stack([np.cos(angle), np.sin(angle), zeros, zeros])
+
+
+def _depths(world: Warehouse) -> NDArray[np.float64]:
+    """Return how far every robot (row) overlaps every other and the four walls [m], (N, N + 4)."""
+    at, scenario = world.state.robot_position, world.scenario
+    gaps = np.linalg.norm(at[:, None] - at[None], axis=2) - 2.0 * scenario.robot_radius
+    np.fill_diagonal(gaps, np.inf)
+    far = np.array([scenario.warehouse_width, scenario.warehouse_height])
+    return -np.hstack([gaps, np.hstack([at, far - at]) - scenario.robot_radius])
 
 
 def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
@@ -147,11 +306,6 @@ def main() -> int:
     parser.add_argument("--worlds", type=int, default=sys.maxsize, help="at most so many")
     parser.add_argument("--steps", type=int, default=400, help="of each world")
     asked = parser.parse_args()
-    if asked.first == 0:
-        problem = broken_jam()
-        if problem:
-            print(problem)
-            return 1
     until = time.monotonic() + 60.0 * asked.minutes
     said, tally = time.monotonic(), Tally()
     for number in range(asked.first, asked.first + asked.worlds):

@@ -2,13 +2,13 @@
 
 It prints the errors of studies that run until they are clear, of a family of twelve of them, and of
 equivalence at the edge of its margin, with the power at the planned seeds; then the same where some
-runs stall, with the errors that only the runs seen would make, and what plans from pilots hold.
+runs stall, with the errors that only the runs seen would make.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,6 @@ P_O, P_F = 39.0, 34.0  # true means [items]
 FAMILY = 12
 EDGE = 0.1
 STALL_SHARES = (0.0, 0.03, 0.05, 0.1)
-PILOTS, PILOT_SEEDS = 40, 20
 _CHUNK = 300  # studies whose resamples fit into memory at once
 
 Floats = NDArray[Any]
@@ -165,14 +164,14 @@ def _t_statistic(p_o: Floats, p_new: Floats, threshold: float) -> Floats:
 
 
 def planned_seeds(model: str) -> int:
-    """Return the seeds planned for a power of 80 % at no change, from a pilot of 4,000."""
+    """Return the seeds planned for a power of 80 % at no change, from a pilot of 1,000."""
     draw, mean_o, _ = _ALL[model]
-    pilot = draw(np.random.default_rng(0), (4_000,), mean_o)
+    pilot = draw(np.random.default_rng(0), (1_000,), mean_o)
     return spi.seeds_for_equivalence(spi.equivalence(*pilot)) or 0
 
 
 def planned_power(
-    model: str, distance: float, pilot_seeds: int, pilots: int = PILOTS
+    model: str, distance: float, pilot_seeds: int, pilots: int
 ) -> tuple[float, float]:
     """Return the seeds that pilots plan for a verdict on the change, and the power of these.
 
@@ -196,81 +195,71 @@ def planned_power(
     return float(np.median(planned)), float(np.mean(found))
 
 
-def until_clear_table(studies: int = STUDIES) -> str:
-    """Return the errors of studies that run until they are clear, as Markdown."""
-    heading = "| counts | most seeds | wrong | above, below | in a family of 12 |"
-    lines = [heading, "| --- " * 5 + "|"]
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table."""
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
 
+
+def until_clear_rows(studies: int = STUDIES) -> Iterator[Sequence[str]]:
+    """Yield the errors of studies that run until they are clear, alone and in a family."""
     for model in MODELS:
         for most in (60, 200):
             looks = looks_up_to(most)
             one = wrong_verdicts(model, looks, studies)
             each = wrong_verdicts(model, looks, FAMILY * studies, 0.05 / FAMILY).share
-            family = 1 - (1 - each) ** FAMILY
             sides = f"{one.above:.3f}, {one.below:.3f}"
-            lines.append(f"| {model} | {most} | {one.share:.3f} | {sides} | {family:.3f} |")
-    return "\n".join(lines)
+            yield model, str(most), f"{one.share:.3f}", sides, f"{1 - (1 - each) ** FAMILY:.3f}"
 
 
-def equivalence_table(studies: int = STUDIES) -> str:
-    """Return the errors and the power of equivalence at a margin of 0.1, as Markdown."""
-    heading = "wrong at a change of -0.1 and 0.1, 30 seeds"
-    lines = [f"| counts | {heading} | planned seeds | their power |", "| --- " * 4 + "|"]
+def equivalence_rows(studies: int = STUDIES) -> Iterator[Sequence[str]]:
+    """Yield the errors and the power of equivalence at a margin of 0.1."""
     for model in ("poisson", "overdispersed"):
         wrong = (share_equivalent(model, 30, change, studies) for change in (-EDGE, EDGE))
         seeds = planned_seeds(model)
-        told = ", ".join(f"{share:.3f}" for share in wrong)
         power = share_equivalent(model, seeds, 0.0, studies)
-        lines.append(f"| {model} | {told} | {seeds} | {power:.2f} |")
-    return "\n".join(lines)
+        yield model, ", ".join(f"{share:.3f}" for share in wrong), str(seeds), f"{power:.2f}"
 
 
-def stall_table(studies: int = STALL_STUDIES) -> str:
-    """Return the errors at the true value where some runs stall, as Markdown.
+def stall_rows(studies: int = STALL_STUDIES) -> Iterator[Sequence[str]]:
+    """Yield the errors at the true value where some runs stall, until clear as well.
 
     In brackets those that the runs seen alone would make. What is called wrong above the truth, and
     equivalent though P falls by a tenth, is the harm that stalls do.
     """
-    lines = [
-        "| runs | seeds | wrong above | wrong below | wrongly equivalent |",
-        "| --- " * 5 + "|",
-    ]
+    fixed: list[Sequence[int]] = [[n] for n in (10, 20, 30, 50, 100)]
     for model in STALLS:
-        for n in (10, 20, 30, 50, 100):
-            one, seen = (
-                wrong_verdicts(model, [n], studies, only_seen=only) for only in (False, True)
+        for looks in (*fixed, looks_up_to(60), looks_up_to(200)):
+            one, seen = (wrong_verdicts(model, looks, studies, only_seen=o) for o in (False, True))
+            equal = ""
+            if len(looks) == 1:
+                both = (
+                    share_equivalent(model, looks[0], -EDGE, studies, only_seen=only)
+                    for only in (False, True)
+                )
+                equal = "{:.3f} ({:.3f})".format(*both)
+            above, below = (
+                f"{getattr(one, side):.3f} ({getattr(seen, side):.3f})"
+                for side in ("above", "below")
             )
-            equal, equal_seen = (
-                share_equivalent(model, n, -EDGE, studies, only_seen=only) for only in (False, True)
-            )
-            lines.append(
-                f"| {model} | {n} | {one.above:.3f} ({seen.above:.3f}) | {one.below:.3f} "
-                f"({seen.below:.3f}) | {equal:.3f} ({equal_seen:.3f}) |"
-            )
-        for most in (60, 200):
-            one, seen = (
-                wrong_verdicts(model, looks_up_to(most), studies, only_seen=only)
-                for only in (False, True)
-            )
-            lines.append(
-                f"| {model} | until clear, {most} | {one.above:.3f} ({seen.above:.3f}) | "
-                f"{one.below:.3f} ({seen.below:.3f}) | |"
-            )
-    return "\n".join(lines)
+            seeds = str(looks[0]) if equal else f"until clear, {looks[-1]}"
+            yield model, seeds, above, below, equal
 
 
-def planned_table(pilots: int = PILOTS) -> str:
-    """Return the power of the seeds that pilots plan for 80 %, as Markdown."""
-    lines = ["| runs | pilot | planned seeds | their power |", "| --- " * 4 + "|"]
-    for model, distance in {**dict.fromkeys(MODELS, -0.1), **dict.fromkeys(STALLS, 0.1)}.items():
-        for pilot_seeds in (10, 20, 100):
-            seeds, power = planned_power(model, distance, pilot_seeds, pilots)
-            lines.append(f"| {model} | {pilot_seeds} | {seeds:.0f} | {power:.2f} |")
-    return "\n".join(lines)
-
+TABLES: Mapping[str, tuple[Sequence[str], Callable[[], Iterable[Sequence[str]]]]] = {
+    f"Until clear, {STUDIES:,} studies": (
+        ("counts", "most seeds", "wrong", "above, below", f"in a family of {FAMILY}"),
+        until_clear_rows,
+    ),
+    f"Equivalence, {STUDIES:,} studies": (
+        ("counts", "wrong at -0.1 and 0.1, 30 seeds", "planned seeds", "their power"),
+        equivalence_rows,
+    ),
+    f"Where runs stall, {STALL_STUDIES:,} studies": (
+        ("runs", "seeds", "wrong above", "wrong below", "wrongly equivalent"),
+        stall_rows,
+    ),
+}
 
 if __name__ == "__main__":
-    print(f"Until clear, {STUDIES:,} studies:\n\n{until_clear_table()}\n")
-    print(f"Equivalence, {STUDIES:,} studies:\n\n{equivalence_table()}\n")
-    print(f"Where runs stall, {STALL_STUDIES:,} studies:\n\n{stall_table()}\n")
-    print(f"Planned for 80 %, {PILOTS} pilots of each size:\n\n{planned_table()}")
+    for title, (heading, told) in TABLES.items():
+        print(f"{title}:\n\n{markdown(heading, told())}\n")

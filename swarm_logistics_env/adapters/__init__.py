@@ -14,12 +14,9 @@ __all__ = ["CentralEnv", "SwarmVecEnv", "SwarmVecNormalize"]
 
 def __getattr__(name: str) -> type[SwarmVecEnv | SwarmVecNormalize]:
     # These load stable-baselines3 and torch, so they are imported when somebody asks for them.
-    if name == "SwarmVecEnv":
-        from .sb3 import SwarmVecEnv
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from . import sb3
 
-        return SwarmVecEnv
-    if name == "SwarmVecNormalize":
-        from .sb3 import SwarmVecNormalize
-
-        return SwarmVecNormalize
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found: type[SwarmVecEnv | SwarmVecNormalize] = getattr(sb3, name)
+    return found

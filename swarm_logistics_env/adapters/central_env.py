@@ -120,13 +120,11 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture or show it; see `SwarmLogisticsEnv.render`."""
-        picture: NDArray[np.uint8] | None = self.env.render()
-        return picture
+        return self.env.render()
 
     def state(self) -> NDArray[np.float32]:
         """Return the whole warehouse as one vector, see `SwarmLogisticsEnv.state`."""
-        state: NDArray[np.float32] = self.env.state()
-        return state
+        return self.env.state()
 
     def close(self) -> None:
         """Release what rendering holds; harmless when called twice."""
@@ -137,6 +135,6 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _info(self) -> dict[str, Any]:
         failed = np.zeros(self._rows.n_rows, np.int8)
-        modes = self.env.warehouse.state.failure_modes
-        failed[: len(modes)] = [bool(names) for names in modes]
+        state = self.env.warehouse.state
+        failed[: state.n_robots] = state.failed
         return {"failed": failed, **self.env.episode_info}

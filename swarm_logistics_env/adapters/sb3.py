@@ -280,9 +280,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             **env.episode_info,
         }
         abouts: Infos = [about] * (rows.stop - rows.start)
-        for robot, modes in enumerate(state.failure_modes):
-            if modes:
-                abouts[robot] = {**about, "failed": 1}
+        for robot in np.flatnonzero(state.failed).tolist():
+            abouts[robot] = {**about, "failed": 1}
         for row in np.flatnonzero(~self._worlds.present[rows]).tolist():
             abouts[row] = {**abouts[row], "padding": True}
         self._abouts[rows] = abouts

@@ -122,11 +122,9 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         # Robots do not sense who failed; infos are for those who train or evaluate them.
         sound = {"failed": 0, **self.episode_info}
         infos = {agent: sound.copy() for agent in agents}
-        modes = self.warehouse.state.failure_modes
-        if any(modes):
-            for agent in agent_names([row for row, names in enumerate(modes) if names]):
-                if agent in infos:
-                    infos[agent]["failed"] = 1
+        for agent in agent_names(np.flatnonzero(self.warehouse.state.failed).tolist()):
+            if agent in infos:
+                infos[agent]["failed"] = 1
         return infos
 
 

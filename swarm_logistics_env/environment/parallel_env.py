@@ -20,6 +20,7 @@ from .requests import (
     OPTIONS,
     as_array,
     check_somebody_is_there,
+    checked_count,
     checked_faults,
     checked_options,
     checked_seed,
@@ -94,12 +95,7 @@ class SwarmLogisticsEnv(DictView):
     ) -> None:
         self.scenario = _scenario_of(scenario, fields)
         self.faults = checked_faults("faults", faults)
-        is_count = isinstance(max_cycles, int | np.integer) and max_cycles >= 1
-        if max_cycles is not None and not is_count:
-            raise SetupError(
-                f"max_cycles = {max_cycles!r}: should be None or a whole number of at least 1"
-            )
-        self.max_cycles = max_cycles
+        self.max_cycles = None if max_cycles is None else checked_count("max_cycles", max_cycles)
         modes = self.metadata["render_modes"]
         if render_mode is not None and render_mode not in modes:
             raise SetupError(f"render_mode = {render_mode!r}: should be None or one of {modes}")

@@ -77,7 +77,7 @@ class Before:
         self.requested = world.state.requested
         self.carrier, self.carrier_x = NOBODY, 0.0
         if follows_carrier:
-            self.carrier = carrier_of_requested(world)
+            self.carrier = world.state.carrier
             if self.carrier != NOBODY:
                 self.carrier_x = float(world.state.robot_position[self.carrier, 0])
         if follows_items:
@@ -103,7 +103,7 @@ def own_delivery(world: Warehouse, before: Before) -> Earned:
 
 def lift_requested(world: Warehouse, before: Before) -> Earned:
     """1 to the robot that took up the requested item, -1 to the one that let go of it."""
-    carrier = carrier_of_requested(world)
+    carrier = world.state.carrier
     # Deliveries tell that the request changed; the item's number does not, as the same item may be
     # asked for again with `restock`.
     if world.state.delivered != before.delivered or carrier == before.carrier:
@@ -121,7 +121,7 @@ def approach(world: Warehouse, before: Before) -> Earned:
 
     Privileged: no robot can sense it, so it may shape a reward but not an observation.
     """
-    carrier = carrier_of_requested(world)
+    carrier = world.state.carrier
     if carrier == NOBODY or carrier != before.carrier or before.requested != world.state.requested:
         return None
     paid = np.zeros(world.state.n_robots)
@@ -162,7 +162,7 @@ def carried_way(world: Warehouse, before: Before) -> Earned:
     Privileged: as `approach`.
     """
     edge = world.scenario.storage_width
-    carrier = carrier_of_requested(world)
+    carrier = world.state.carrier
     x = 0.0 if carrier == NOBODY else float(world.state.robot_position[carrier, 0])
     return _change_of_potential(world, before, min(before.carrier_x, edge), min(x, edge))
 
@@ -173,7 +173,7 @@ def _change_of_potential(world: Warehouse, before: Before, earlier: float, later
     Whatever is paid so changes no optimum (Ng et al. 1999): from one state to the same again it
     adds up to nothing, and what was paid for a lift is taken back by the delivery.
     """
-    carrier = carrier_of_requested(world)
+    carrier = world.state.carrier
     if carrier == before.carrier == NOBODY:
         return None
     paid = np.zeros(world.state.n_robots)
@@ -194,7 +194,7 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
 
     Privileged: such a robot only finds out inside the delivery area, as nothing happens there.
     """
-    carrier = carrier_of_requested(world)
+    carrier = world.state.carrier
     if carrier == NOBODY or world.state.delivers[carrier]:
         return None
     paid = np.zeros(world.state.n_robots)
@@ -258,9 +258,3 @@ def finite_number(name: str, value: float) -> float:
     if not isinstance(value, int | float | np.number) or not np.isfinite(value):
         raise SetupError(f"{name} = {value!r}: should be a finite number")
     return float(value)
-
-
-def carrier_of_requested(world: Warehouse) -> int:
-    """Return the robot that carries the requested item, or NOBODY."""
-    requested = world.state.requested
-    return NOBODY if requested == NOBODY else int(world.state.item_carrier[requested])

@@ -89,13 +89,7 @@ class MotionFrame:
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on."""
-        known.remember(observations, self._period, self.memory)
-        inputs = np.empty((len(observations), len(INPUTS)), np.float32)
-        read_rows(
-            observations, self.memory, self.keys, self._random_headings(), inputs, self.turned
-        )
-        if not self._listens:
-            inputs[:, LEAD] = 0.0
+        inputs = self._inputs(observations, self.memory, slice(None), self.turned)
         self.counts += 1
         self._rows = observations
         return inputs
@@ -104,17 +98,19 @@ class MotionFrame:
         self, observations: NDArray[np.float32], rows: NDArray[np.int64]
     ) -> NDArray[np.float32]:
         """Return the inputs that observations of these rows would make, without going on."""
-        memory = self.memory[rows]
+        return self._inputs(observations, self.memory[rows], rows, np.empty(len(rows)))
+
+    def _inputs(
+        self,
+        observations: NDArray[np.float32],
+        memory: NDArray[np.float64],
+        rows: slice | NDArray[np.int64],
+        turned: NDArray[np.float64],
+    ) -> NDArray[np.float32]:
         known.remember(observations, self._period, memory)
-        inputs = np.empty((len(rows), len(INPUTS)), np.float32)
-        read_rows(
-            observations,
-            memory,
-            self.keys[rows],
-            self._random_headings()[rows],
-            inputs,
-            np.empty(len(rows)),
-        )
+        inputs = np.empty((len(observations), len(INPUTS)), np.float32)
+        headings = (self.counts[rows] * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+        read_rows(observations, memory, self.keys[rows], headings, inputs, turned)
         if not self._listens:
             inputs[:, LEAD] = 0.0
         return inputs
@@ -138,9 +134,6 @@ class MotionFrame:
         cos, sin = np.cos(self.turned), np.sin(self.turned)
         x, y = commands[:, 0], commands[:, 1]
         return np.stack([cos * x + sin * y, cos * y - sin * x, commands[:, 3]], axis=1)
-
-    def _random_headings(self) -> NDArray[np.int64]:
-        return (self.counts * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
 
 
 @kernel

@@ -32,12 +32,9 @@ TRAIL: RGB = (150, 150, 150)
 
 # All of them by name, for films and for the page in the browser.
 COLOURS: dict[str, RGB] = {
-    "INK": INK, "SURROUNDINGS": SURROUNDINGS, "FLOOR": FLOOR, "FLOOR_LINE": FLOOR_LINE,
-    "DELIVERY_AREA": DELIVERY_AREA, "DELIVERY_HATCH": DELIVERY_HATCH,
-    "DELIVERY_WORD": DELIVERY_WORD, "OBSTACLE": OBSTACLE, "SEARCHING": SEARCHING,
-    "SHUFFLING": SHUFFLING, "DELIVERING": DELIVERING, "TIMER": TIMER, "REQUESTED": REQUESTED,
-    "LINK": LINK, "BEAM": BEAM, "ITEM": ITEM, "ITEM_EDGE": ITEM_EDGE, "TRAIL": TRAIL,
-}  # fmt: skip
+    name: colour for name, colour in dict(globals()).items() if isinstance(colour, tuple)
+}
+ACTIVITIES = {"searching": SEARCHING, "shuffling": SHUFFLING, "delivering": DELIVERING}
 
 # The same for a page on a dark screen: what lies behind is dark, what moves keeps its hue.
 DARK_COLOURS: dict[str, RGB] = {

@@ -14,7 +14,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
 from .caption import Caption
-from .readings import N_BEAMS, Projection, Trails, followed, ranges
+from .readings import N_BEAMS, Projection, Trails, activity, followed, ranges
 from .sprites import Point, draw_line, new_canvas, stamp, words
 
 # What decides the picture's layout.
@@ -72,9 +72,12 @@ class Picture:
         if self.trails is not None:
             self.trails.note(state)
             draw_trails(canvas, projection, self.trails)
-        self._draw_obstacles(state)
+        obstacle = sprites.obstacle(self._obstacle_radius)
+        stamp(canvas, ((obstacle, at) for at in projection.points(state.obstacle_position)))
         self._draw_halos(state, scenario, robots)
-        self._draw_stored_items(state, items)
+        item = sprites.item(self._item_half, False)
+        stored = np.flatnonzero(state.item_status == STORED).tolist()
+        stamp(canvas, ((item, items[number]) for number in stored))
         draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self._all_links)
         watched = self._show_beams_of
         if watched is not None and watched < state.n_robots and state.robot_present[watched]:
@@ -108,11 +111,6 @@ class Picture:
         self._obstacle_radius = max(3.0, projection.length(scenario.obstacle_radius))
         self._shape = _shape(scenario)
 
-    def _draw_obstacles(self, state: WarehouseState) -> None:
-        sprite = sprites.obstacle(self._obstacle_radius)
-        obstacles = self.projection.points(state.obstacle_position)
-        stamp(self._canvas, ((sprite, at) for at in obstacles))
-
     def _draw_halos(self, state: WarehouseState, scenario: Scenario, robots: list[Point]) -> None:
         age = state.robot_timer / scenario.timer_limit
         glowing = np.flatnonzero(state.robot_present & (age < 1.0)).tolist()
@@ -124,18 +122,13 @@ class Picture:
             ),
         )
 
-    def _draw_stored_items(self, state: WarehouseState, items: list[Point]) -> None:
-        sprite = sprites.item(self._item_half, False)
-        stored = np.flatnonzero(state.item_status == STORED).tolist()
-        stamp(self._canvas, ((sprite, items[item]) for item in stored))
-
     def _draw_robots(self, state: WarehouseState, robots: list[Point]) -> None:
         radius, stamps = self._robot_radius, []
         load = sprites.item(max(1.5, 0.45 * radius), False)
         faulty, headings = state.failed.tolist(), state.robot_heading.tolist()
         carried = state.robot_item.tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            colour = _state_colour(carried[robot], state.requested)
+            colour = palette.ACTIVITIES[activity(state, robot)]
             step = sprites.heading_step(headings[robot])
             body = sprites.robot(radius, colour, step, faulty[robot])
             stamps.append((body, robots[robot]))
@@ -147,7 +140,7 @@ class Picture:
         if state.requested == NOBODY:
             return
         at = items[state.requested]
-        is_carried = state.item_carrier[state.requested] != NOBODY
+        is_carried = state.carrier != NOBODY
         half = 0.5 * self._robot_radius if is_carried else 1.4 * self._item_half
         stamp(
             self._canvas,
@@ -166,12 +159,6 @@ class Picture:
             x, y = robots[robot]
             place = sprite.get_rect(center=(round(x + away), round(y - away)))
             self._canvas.blit(sprite, place.clamp(area))
-
-
-def _state_colour(carried: int, requested: int) -> palette.RGB:
-    if carried == NOBODY:
-        return palette.SEARCHING
-    return palette.DELIVERING if carried == requested else palette.SHUFFLING
 
 
 def background(
@@ -249,9 +236,7 @@ def draw_links(
         radius: the radius of a robot [px].
         all_links: whether to draw thin arrows from all other robots as well.
     """
-    carrier = NOBODY
-    if state.requested != NOBODY:
-        carrier = int(state.item_carrier[state.requested])
+    carrier = state.carrier
     if all_links:
         for robot in range(state.n_robots):
             leader = followed(state, scenario, robot)

@@ -100,6 +100,14 @@ def ranges(state: WarehouseState, scenario: Scenario, robot: int) -> NDArray[np.
     return scans
 
 
+def activity(state: WarehouseState, robot: int) -> str:
+    """Return what a robot does, a key of `palette.ACTIVITIES`."""
+    item = int(state.robot_item[robot])
+    if item == NOBODY:
+        return "searching"
+    return "delivering" if item == state.requested else "shuffling"
+
+
 def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     """Return the neighbour whose timer is the lowest that `robot` hears, or NOBODY.
 

@@ -6,8 +6,15 @@ from typing import TYPE_CHECKING
 
 from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
-from .fault_budget import FaultBudget, fault_budget
-from .indicators import adaptability, fault_tolerance, relative_change, robustness, scalability
+from .indicators import (
+    FaultBudget,
+    adaptability,
+    fault_budget,
+    fault_tolerance,
+    relative_change,
+    robustness,
+    scalability,
+)
 from .inputs import IndicatorError
 from .multiplicity import adjust, adjusted_p_values, holm
 from .power import (

@@ -140,26 +140,6 @@ def fieller_limits(
     s_rd = (residual * den_centred).sum(axis=-1) / scale
     s_dd = np.square(den_centred).sum(axis=-1) / scale
 
-    return limits_from_moments(value, mean_den, s_rr, s_rd, s_dd, (t_low, t_high))
-
-
-def limits_from_moments(
-    value: Numbers,
-    mean_den: Numbers,
-    s_rr: Numbers,
-    s_rd: Numbers,
-    s_dd: Numbers,
-    critical: tuple[Numbers, Numbers],
-) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
-    """Limits around a ratio of means `value`, and where they are unbounded.
-
-    Args:
-        value, mean_den: the ratio and the mean of its denominator, shape (...).
-        s_rr, s_rd, s_dd: squared standard errors and their covariance, of the mean residual
-            num - value den and of `mean_den`.
-        critical: of the lower and of the upper limit, positive; inf for no limit.
-    """
-
     def limit(t: Numbers, side: int) -> tuple[Numbers, NDArray[np.bool_]]:
         finite = np.where(np.isfinite(t), t, 0.0)
         a = mean_den**2 - finite**2 * s_dd
@@ -168,7 +148,7 @@ def limits_from_moments(
         shift = (-(finite**2) * s_rd + side * root) / np.where(unbounded, 1.0, a)
         return value + shift, unbounded
 
-    low, low_unbounded = limit(critical[0], -1)
-    high, high_unbounded = limit(critical[1], 1)
+    low, low_unbounded = limit(t_low, -1)
+    high, high_unbounded = limit(t_high, 1)
     unbounded = low_unbounded | high_unbounded
     return np.where(unbounded, -np.inf, low), np.where(unbounded, np.inf, high), unbounded

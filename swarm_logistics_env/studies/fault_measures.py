@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi import FaultBudget
 from swarm_logistics_env.spi import estimate as words
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.fault_budget import FaultBudget
 from swarm_logistics_env.spi.resilience import SurvivalCurve
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome

@@ -63,7 +63,7 @@ class Outcome:
     anchoring_seconds: NonNegativeFloat | None = 0.0
     digest: str | None = None
     error: str | None = None
-    wall_seconds: NonNegativeFloat = 0.0
+    wall_seconds: float = 0.0  # a clock may be set back
     untimed: NonNegativeFloat | None = None
 
     @property

@@ -1,14 +1,11 @@
-"""What a training tells: a live table while it runs; then a table, a summary and a picture."""
+"""What a training tells: a live table while it runs; then a table and a picture."""
 
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isnan
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
@@ -18,7 +15,7 @@ from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
 
-CURVE, SUMMARY, PICTURE = "curve.csv", "summary.json", "curve.png"
+CURVE, PICTURE = "curve.csv", "curve.png"
 BEST = "best.safetensors"  # the policy as it was at the best evaluation
 MILLION = 1e6
 
@@ -32,15 +29,14 @@ class TrainingLog:
             of the processor for collecting and updating alone, and what was measured.
         references: name of a scripted policy -> what it measures on the same seeds.
         seconds: trained before this session (wall clock).
-        collecting, updating: processor time of both so far [s].
+        cpu_seconds: processor time of collecting and updating so far [s].
         versions: that it learned with last.
     """
 
     curve: list[dict[str, float]] = field(default_factory=list)
     references: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
-    collecting: float = 0.0
-    updating: float = 0.0
+    cpu_seconds: float = 0.0
     versions: dict[str, str] | None = None
 
     @property
@@ -53,12 +49,7 @@ class TrainingLog:
         return {n: v for n, v in row.items() if n not in ("agent_steps", "seconds", "cpu_seconds")}
 
     def write(self, directory: Path) -> None:
-        """Write curve.csv and summary.json, each whole or not at all.
-
-        The summary holds the best evaluation, what the scripted policies reach on the same seeds,
-        the first evaluation that passed each of them (None: none did), and agent-steps per second
-        of the processor for collecting and updating.
-        """
+        """Write curve.csv, whole or not at all."""
         with (
             becoming(directory / CURVE, TrainingError) as part,
             part.open("w", encoding="utf-8", newline="") as file,
@@ -66,25 +57,6 @@ class TrainingLog:
             writer = csv.DictWriter(file, self.curve[0])
             writer.writeheader()
             writer.writerows(self.curve)
-        done = self.curve[-1]["agent_steps"]
-        summary: dict[str, Any] = {
-            "best": _told(self.best),
-            "references": {name: _told(measured) for name, measured in self.references.items()},
-            "passed": {
-                name: next((_told(row) for row in self.curve if row["P"] > measured["P"]), None)
-                for name, measured in self.references.items()
-            },
-            "agent_steps_per_cpu_second": {
-                name: round(done / seconds) if seconds else None
-                for name, seconds in (
-                    ("collecting", self.collecting),
-                    ("updating", self.updating),
-                    ("both", self.collecting + self.updating),
-                )
-            },
-        }
-        with becoming(directory / SUMMARY, TrainingError) as part:
-            part.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
 
     def draw(self, picture: Path, title: str, seeds: int) -> None:
         """Draw P over agent-steps as a PNG, with a line for each scripted policy."""
@@ -105,11 +77,6 @@ class TrainingLog:
         axes.set_ylim(bottom=0.0)
         axes.spines[["top", "right"]].set_visible(False)
         canvas.savefig(picture, dpi=150)
-
-
-def _told(measured: dict[str, float]) -> dict[str, float | None]:
-    """Return the measures with None for nan, which JSON does not know."""
-    return {name: None if isnan(value) else value for name, value in measured.items()}
 
 
 Measured = Mapping[str, float]

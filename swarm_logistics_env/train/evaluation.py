@@ -126,12 +126,6 @@ class Evaluated(NamedTuple):
             return float("nan")
         return spi.robustness(self.p_o, self.p_f[mode], n=self.n_robots, m=self.faults[mode]).value
 
-    def fault_tolerance(self, mode: str) -> float:
-        """Return FT, by the same robots "removed"; nan where nothing was delivered without."""
-        if not self.p_o.any():
-            return float("nan")
-        return spi.fault_tolerance(self.p_o, self.p_f[mode], self.p_f["removed"]).value
-
     def means(self) -> dict[str, float]:
         """Return the mean P, and for each mode the mean P_F and R: "P", "P_FM1", "R_FM1"."""
         means = {"P": float(self.p_o.mean())}

@@ -53,7 +53,7 @@ def train(
 
     What is in `out` afterwards: the policy file NAME.safetensors, as it was at the end, and
     best.safetensors, as it was when it measured the highest P; training.json, how it was made;
-    curve.csv, curve.png and summary.json, what was measured on the way (see `curve`); tensorboard/;
+    curve.csv and curve.png, what was measured on the way (see `curve`); tensorboard/;
     scores/, the study behind the card; and the checkpoint, from which the same call goes on after a
     crash. The result is the same, bit by bit, as without one (on a CPU).
 
@@ -178,11 +178,8 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self._table.reach(self.num_timesteps)
         return True
 
-    def _on_rollout_end(self) -> None:
-        self._log.collecting += self._cpu_seconds()
-
     def _on_rollout_start(self) -> None:
-        self._log.updating += self._cpu_seconds()
+        self._log.cpu_seconds += self._cpu_seconds()
         is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
         policy = self.model.policy
         is_all_free = is_free and not self._training.learn_inputs
@@ -208,7 +205,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def end(self) -> None:
         """Evaluate and save the policy at the end of the training."""
-        self._log.updating += self._cpu_seconds()
+        self._log.cpu_seconds += self._cpu_seconds()
         if self._log.curve[-1]["agent_steps"] < self.num_timesteps:
             self._evaluate()
         self._save()
@@ -234,7 +231,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         row = {
             "agent_steps": self.num_timesteps,
             "seconds": round(self._before + time.monotonic() - self._start, 1),
-            "cpu_seconds": round(log.collecting + log.updating, 1),
+            "cpu_seconds": round(log.cpu_seconds, 1),
         }
         log.curve.append({**row, **means})
         for name, value in means.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,6 @@ from .failure_modes import FAILURE_MODES, LOST_AS_A_WHOLE, failure_mode
 from .state import WarehouseState
 from .structs import NOBODY
 
-if TYPE_CHECKING:
-    from .state import WarehouseState
-
 ROLES = {
     "carrier": "carries the requested item",
     "neighbour": "the carrier sees it with its cameras",
@@ -48,7 +45,7 @@ def roles_of(state: WarehouseState) -> NDArray[np.str_]:
     roles = np.full(state.n_robots, "searching", dtype="<U9")
     roles[state.robot_item != NOBODY] = "shuffling"
     roles[state.robot_in_delivery] = "in_area"
-    carrier = _carrier(state)
+    carrier = state.carrier
     if carrier != NOBODY:
         to_carrier = state.robot_position - state.robot_position[carrier]
         is_near = np.hypot(*to_carrier.T) <= state.view_range[carrier]
@@ -71,11 +68,6 @@ def robots_in_role(state: WarehouseState, role: str, count: int) -> NDArray[np.i
     is_other = roles_of(state) != role
     order = np.lexsort((distance, is_other, ~state.robot_present))
     return np.sort(order[:count]).astype(np.int64)
-
-
-def _carrier(state: WarehouseState) -> int:
-    asked = state.requested
-    return int(state.item_carrier[asked]) if asked != NOBODY else NOBODY
 
 
 GRACE = 5e-7  # [s]; times are sums of control periods

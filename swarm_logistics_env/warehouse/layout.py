@@ -36,12 +36,14 @@ def place_robots(scenario: Scenario, seed: int, obstacles: Numbers) -> tuple[Num
     """Return start centres [m] (N, 2), clear of each other, and headings [rad] (N,)."""
     n = scenario.n_robots
     centres = _strewn(scenario, seed, "robots", n, scenario.robot_radius, obstacles)
-    return centres, (_first_draws(row_keys(seed, "headings", n)) * 2.0 - 1.0) * np.pi
+    draws = np.array([uniform(key, 0) for key in row_keys(seed, "headings", n)])
+    return centres, (draws * 2.0 - 1.0) * np.pi
 
 
 def heading_drifts(scenario: Scenario, seed: int) -> Numbers:
     """Return at which rate each robot's body turns unasked [rad/s], shape (N,)."""
-    return scenario.heading_drift * _normal_draws(row_keys(seed, "drift", scenario.n_robots))
+    keys = row_keys(seed, "drift", scenario.n_robots)
+    return scenario.heading_drift * np.array([gaussian(key, 0) for key in keys])
 
 
 @kernel
@@ -166,19 +168,3 @@ def is_clear(x: float, y: float, centres: Numbers, spacing: float) -> bool:
         if dx * dx + dy * dy < spacing * spacing:
             return False
     return True
-
-
-@kernel
-def _first_draws(keys: Keys) -> Numbers:
-    draws = np.empty(keys.shape[0])
-    for row in range(keys.shape[0]):
-        draws[row] = uniform(keys[row], 0)
-    return draws
-
-
-@kernel
-def _normal_draws(keys: Keys) -> Numbers:
-    draws = np.empty(keys.shape[0])
-    for row in range(keys.shape[0]):
-        draws[row] = gaussian(keys[row], 0)
-    return draws

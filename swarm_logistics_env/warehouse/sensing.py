@@ -95,7 +95,6 @@ def touches_items(world: World, n_found: int) -> bool:
 
 
 _N_RANGES = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
-_ITEM_WIDTH, _NEIGHBOUR_WIDTH = len(row.ITEM_FEATURES), len(row.NEIGHBOUR_FEATURES)
 # Things with a place: items, neighbours, and the teller of the lowest timer.
 _N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
 # A robot draws in a step: an error for every beam, whether each is dropped, then errors of places.
@@ -145,9 +144,9 @@ def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sens
     far = max(parameters.view_range, parameters.radio_range)
     for thing in range(_N_THINGS):
         if thing < row.N_ITEMS_IN_VIEW:
-            column, limit = row.ITEMS + _ITEM_WIDTH * thing, parameters.view_range
+            column, limit = row.ITEMS + row.ITEM_WIDTH * thing, parameters.view_range
         else:
-            column = row.NEIGHBOURS + _NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
+            column = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
             limit = far
         if out[column] > 0.5:
             for axis in range(2):
@@ -185,12 +184,6 @@ def add_bias(beams: Sensed, bias: float, reach: float) -> None:
             beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
 
 
-_N_BEAMS = row.N_BEAMS
-_ROBOTS, _WALLS, _ITEMS, _LOWEST = (
-    row.RANGE_ROBOTS, row.RANGE_WALLS, row.RANGE_ITEMS, row.LOWEST_TIMER,
-)  # fmt: skip
-
-
 @kernel
 def sense(world: World, rows: Sensed) -> int:
     """Fill the observation rows (N, D), who touches what, and what was heard.
@@ -209,10 +202,10 @@ def sense(world: World, rows: Sensed) -> int:
             robots.position[me, 0], robots.position[me, 1], math.cos(heading), math.sin(heading)
         )
         reach = world.able.ranger_range[me]
-        scans = rows[me, : 3 * _N_BEAMS]
+        scans = rows[me, :_N_RANGES]
         scans[:] = reach if reach > 0.0 else world.parameters.ranger_range
         if reach > 0.0:
-            scan = rows[me, _WALLS : _WALLS + _N_BEAMS]
+            scan = rows[me, row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
             scan_solids(pose, reach, world, scan)
         n_anchored += int(sense_robots(me, pose, world, rows[me]))
         sense_items(me, pose, world, rows[me])
@@ -236,17 +229,17 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     touches, is_anchored = touches_robots(me, world, n_found)
     robots.contact[me] |= touches
     if ranger_range > 0.0:
-        scan = out[_ROBOTS : _ROBOTS + _N_BEAMS]
+        scan = out[row.RANGE_ROBOTS : row.RANGE_ROBOTS + row.N_BEAMS]
         scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     listen(me, world, n_found)
     lowest, timer = lowest_timer_heard(world, n_found)
     if lowest != NOBODY:
         robots.heard[me] = timer
         forward, left = in_frame(pose, robots.position[lowest, 0], robots.position[lowest, 1])
-        out[_LOWEST] = 1.0
-        out[_LOWEST + 1] = forward
-        out[_LOWEST + 2] = left
-        out[_LOWEST + 3] = timer
+        out[row.LOWEST_TIMER] = 1.0
+        out[row.LOWEST_TIMER + 1] = forward
+        out[row.LOWEST_TIMER + 2] = left
+        out[row.LOWEST_TIMER + 3] = timer
     n_chosen = choose_neighbours(me, world, n_found)
     tell_of_neighbours(pose, world, n_chosen, out)
     return is_anchored
@@ -262,7 +255,7 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     reach = max(ranger_range + radius, view_range, touch)
     n_found = look_around(grid, pose.x, pose.y, reach, NOBODY, nearby)
     if ranger_range > 0.0:
-        scan = out[_ITEMS : _ITEMS + _N_BEAMS]
+        scan = out[row.RANGE_ITEMS : row.RANGE_ITEMS + row.N_BEAMS]
         scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     if world.robots.item[me] != NOBODY:
         world.robots.contact[me] |= touches_items(world, n_found)

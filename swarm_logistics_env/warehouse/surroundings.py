@@ -264,12 +264,6 @@ def lowest_timer_heard(world: World, n_found: int) -> tuple[int, float]:
     return lowest, lowest_timer
 
 
-_ITEM_WIDTH = len(row.ITEM_FEATURES)
-_NEIGHBOUR_WIDTH = len(row.NEIGHBOUR_FEATURES)
-_N_ITEMS, _N_NEIGHBOURS = row.N_ITEMS_IN_VIEW, row.N_NEIGHBOURS
-_ITEMS, _NEIGHBOURS, _MESSAGES = row.ITEMS, row.NEIGHBOURS, row.MESSAGES
-
-
 @inlined_kernel
 def rank_nearest(nearby: Nearby, count: int, wanted: int) -> int:
     """List in `nearby.nearest` the `wanted` nearest of `count` chosen things, nearest first.
@@ -310,11 +304,11 @@ def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> N
             is_seen = not is_missed(robots.sensor_key[me], item, step, ITEM_SEEN, dropout)
         nearby.chosen[n_seen], nearby.chosen_square[n_seen] = item, square
         n_seen += int(is_seen)
-    for place in range(rank_nearest(nearby, n_seen, _N_ITEMS)):
+    for place in range(rank_nearest(nearby, n_seen, row.N_ITEMS_IN_VIEW)):
         item = nearby.chosen[nearby.nearest[place]]
         position = world.items.position
         forward, left = in_frame(pose, position[item, 0], position[item, 1])
-        column = _ITEMS + place * _ITEM_WIDTH
+        column = row.ITEMS + place * row.ITEM_WIDTH
         out[column] = 1.0
         out[column + 1] = forward
         out[column + 2] = left
@@ -344,12 +338,12 @@ def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> 
     """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
     robots, parameters = world.robots, world.parameters
     nearby, width = world.nearby, world.robots.message.shape[1]
-    for place in range(rank_nearest(nearby, n_chosen, _N_NEIGHBOURS)):
+    for place in range(rank_nearest(nearby, n_chosen, row.N_NEIGHBOURS)):
         index = nearby.nearest[place]
         other, is_heard = nearby.chosen[index], nearby.chosen_heard[index]
         forward, left = in_frame(pose, robots.position[other, 0], robots.position[other, 1])
         tells = is_heard and not math.isnan(robots.told[other])
-        column = _NEIGHBOURS + place * _NEIGHBOUR_WIDTH
+        column = row.NEIGHBOURS + place * row.NEIGHBOUR_WIDTH
         out[column] = 1.0
         out[column + 1] = forward
         out[column + 2] = left
@@ -357,4 +351,4 @@ def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> 
         out[column + 4] = robots.told[other] if tells else parameters.timer_limit
         if is_heard and width > 0:
             for part in range(width):
-                out[_MESSAGES + place * width + part] = robots.message[other, part]
+                out[row.MESSAGES + place * width + part] = robots.message[other, part]

@@ -25,16 +25,16 @@ from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import CommandError, ScenarioError
+from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 
 from . import stepping
 from .logistics import refused_command
 from .packing import pointer_at, unpacked_at
 from .structs import NOBODY, Numbers, Sensed, World
-from .warehouse import Warehouse
+from .warehouse import Warehouse, not_finite
 
-_BYTES = 8
+_WORD = 8  # bytes
 _IN_ORDER = "seq_cst"  # all threads see all changes in one order
 
 
@@ -43,7 +43,7 @@ def _generated(function: Callable[..., Any]) -> Callable[..., int]:
 
 
 def _there(builder: Any, address: Any) -> Any:
-    return builder.inttoptr(address, ir.IntType(8 * _BYTES).as_pointer())
+    return builder.inttoptr(address, ir.IntType(8 * _WORD).as_pointer())
 
 
 @_generated
@@ -51,7 +51,7 @@ def load(typing_context: Any, address: types.Type) -> Any:
     """Return the integer of 64 bits at `address`."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.load_atomic(_there(builder, values[0]), _IN_ORDER, _BYTES)
+        return builder.load_atomic(_there(builder, values[0]), _IN_ORDER, _WORD)
 
     return types.int64(types.int64), generate
 
@@ -85,7 +85,6 @@ def replace(typing_context: Any, address: types.Type, old: types.Type, new: type
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
 
-_WORD = 8  # bytes
 # Words of the queue. Jobs are taken and given in turn, counted without end, so that a helper who
 # comes late finds nothing to take rather than something that is not ready.
 TAKEN, GIVEN, ASLEEP, IS_CLOSED, N_JOBS, ROWS, ROW_COLUMNS, FIRST_JOB = range(8)
@@ -169,10 +168,7 @@ class WorldThreadPool:
             refused = submit(self._address, commands, rows)
             if refused != NOBODY:
                 place = n_worlds
-                row, column = divmod(refused, commands.shape[1])
-                raise CommandError(
-                    f"commands[{row}, {column}] = {commands[row, column]}: should be finite"
-                )
+                raise not_finite(commands, refused)
             for _ in range(take_sleepers(self._address)):
                 self._wake.put(None)
             while place < n_worlds:

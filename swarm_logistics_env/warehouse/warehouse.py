@@ -134,11 +134,7 @@ class Warehouse:
             return
         outcome, state = self._world.outcome, self.state
         if outcome.refused[0] != NOBODY:
-            given = self._world.commands.now
-            robot, column = divmod(outcome.refused.item(), given.shape[1])
-            raise CommandError(
-                f"commands[{robot}, {column}] = {given[robot, column]}: should be finite"
-            )
+            raise not_finite(self._world.commands.now, outcome.refused.item())
         self._rows, n_delivered = rows, outcome.n_delivered.item()
         state.delivery_times += [state.time] * n_delivered
         state.delivered_by += self._world.claims.delivered_by[:n_delivered].tolist()
@@ -383,6 +379,12 @@ class Warehouse:
         self._words[:] = words
         self._address: int = self._words.ctypes.data
         self._physics.begin(self._words)
+
+
+def not_finite(commands: NDArray[np.float64], place: int) -> CommandError:
+    """Return the error about the command at that place, row by row."""
+    row, column = divmod(place, commands.shape[1])
+    return CommandError(f"commands[{row}, {column}] = {commands[row, column]}: should be finite")
 
 
 def _scenario(given: Scenario | None, otherwise: Scenario) -> Scenario:

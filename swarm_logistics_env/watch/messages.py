@@ -18,10 +18,10 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import columns
 from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.readings import followed, ranges
+from swarm_logistics_env.rendering.readings import activity, followed, ranges
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
-from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.warehouse.state import NOBODY, STORED
 from swarm_logistics_env.watch.session import SPEEDS, Session
 
 _SHAPE = (
@@ -163,11 +163,11 @@ def _arena(play: Play) -> dict[str, Any]:
         poses += [*positions[robot], round(1000 * float(state.robot_heading[robot]))]
         age = int(_TIMER_STEPS * ages[robot]) if ages[robot] < 1.0 else None
         mark = palette.mark(state.failure_modes[robot])
-        robots.append([_activity(state, robot), age, mark, followed(state, scenario, robot)])
+        robots.append([activity(state, robot), age, mark, followed(state, scenario, robot)])
     requested = None
     if state.requested != NOBODY:
         place = _millimetres(state.item_position[state.requested][np.newaxis])[0]
-        requested = [*place, int(state.item_carrier[state.requested])]
+        requested = [*place, state.carrier]
     stored = state.item_status == STORED
     if requested:
         stored[state.requested] = False
@@ -180,13 +180,6 @@ def _arena(play: Play) -> dict[str, Any]:
     }
 
 
-def _activity(state: WarehouseState, robot: int) -> str:
-    item = int(state.robot_item[robot])
-    if item == NOBODY:
-        return "searching"
-    return "delivering" if item == state.requested else "shuffling"
-
-
 def _selected(session: Session) -> dict[str, Any] | None:
     robot = session.selected
     if robot is None:
@@ -194,7 +187,7 @@ def _selected(session: Session) -> dict[str, Any] | None:
     state, scenario = session.run.world.state, session.scenario
     return {
         "robot": robot,
-        "activity": _activity(state, robot),
+        "activity": activity(state, robot),
         "modes": list(state.failure_modes[robot]),
         "beams": [round(float(r), 3) for r in np.min(ranges(state, scenario, robot), axis=0)],
         "reach": round(float(state.ranger_range[robot]), 3),

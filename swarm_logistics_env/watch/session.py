@@ -16,7 +16,7 @@ from swarm_logistics_env.errors import (
     suggest,
 )
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.rendering.readings import Curve, Event
+from swarm_logistics_env.rendering.readings import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
@@ -93,15 +93,6 @@ class Session:
         if self.against is None:
             return self.policy, f"{self.policy} without faults"
         return self.policy, self.against
-
-    @property
-    def curves(self) -> tuple[Curve, Curve]:
-        """Deliveries of the two runs."""
-        run, beside = self.run.world.state, self.beside.world.state
-        return (
-            Curve(self.names[0], run.delivery_times, run.time, 0),
-            Curve(self.names[1], beside.delivery_times, beside.time, 1),
-        )
 
     # Time
 

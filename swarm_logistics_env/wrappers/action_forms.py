@@ -91,8 +91,8 @@ class MotionFrame(Wrapper):
                 f"outputs of shape {given.shape}: should be {wanted} finite numbers, "
                 f"{', '.join(OUTPUTS)}"
             )
-        observations, *rest = self.env.step_arrays(self._frame.command(given))
-        return (self._read(observations), *rest)
+        outcome = self.env.step_arrays(self._frame.command(given))
+        return (self._read(outcome[0]), *outcome[1:])
 
     def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         inputs = self._frame.read(observations)

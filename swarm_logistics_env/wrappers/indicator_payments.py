@@ -5,7 +5,6 @@ performances that they are relative to: given, or measured during a training.
 from __future__ import annotations
 
 import dataclasses
-import operator
 from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from swarm_logistics_env.environment.requests import checked_count
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS
@@ -86,12 +86,7 @@ class RunningMeans:
     def __init__(
         self, window: int = 50, *, least: float = 1.0, initial: float | None = None
     ) -> None:
-        try:
-            self.window = operator.index(window)
-        except TypeError:
-            self.window = 0
-        if self.window < 1:
-            raise SetupError(f"window = {window!r}: should be a number of episodes, at least 1")
+        self.window = checked_count("window", window)
         self.least = least
         self.initial = least if initial is None else initial
         for name in ("least", "initial"):

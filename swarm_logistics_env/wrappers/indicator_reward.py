@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.rewards import carrier_of_requested, finite_number
+from swarm_logistics_env.environment.rewards import finite_number
 from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.warehouse.state import NOBODY
 
@@ -212,7 +212,7 @@ class IndicatorReward(Wrapper):
             self._take_condition()
         if self._paid is not self._due or deliverers:
             self._pay(rewards, deliverers, state.robot_present | terminations)
-        if self.credit == "carriers" and (carrier := carrier_of_requested(world)) != NOBODY:
+        if self.credit == "carriers" and (carrier := state.carrier) != NOBODY:
             self._carriers.add(carrier)
         self._delivered = state.delivered
         self._is_over = not self.env.agents

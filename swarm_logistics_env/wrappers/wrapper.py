@@ -173,6 +173,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     """
 
     is_outermost = False
+    env: SwarmLogisticsEnv | Wrapper
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper) -> None:
         if not hasattr(env, "reset_arrays"):
@@ -196,17 +197,14 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
 
     def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
         """Return the scenario of the episode that such a reset would begin; it begins nothing."""
-        scenario: Scenario = self.env.scenario_of(seed, self.plan(seed, dict(options)))
-        return scenario
+        return self.env.scenario_of(seed, self.plan(seed, dict(options)))
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
         """Begin the episode that `plan` describes and return the first observations (N, D)."""
         seed = self.env.next_seed if seed is None else checked_seed(seed)
-        observations: NDArray[np.float32] = self.env.reset_arrays(
-            seed, self.plan(seed, checked_options(options))
-        )
+        observations = self.env.reset_arrays(seed, self.plan(seed, checked_options(options)))
         self.begun(seed)
         return observations
 
@@ -231,14 +229,12 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
 
         A subclass adds entries by returning `{**self.env.episode_info, "key": number}`.
         """
-        info: dict[str, float] = self.env.episode_info
-        return info
+        return self.env.episode_info
 
     @property
     def max_cycles(self) -> int | None:
         """The number of steps after which an episode is truncated, or None."""
-        cycles: int | None = self.env.max_cycles
-        return cycles
+        return self.env.max_cycles
 
     @max_cycles.setter
     def max_cycles(self, cycles: int | None) -> None:

@@ -24,23 +24,16 @@ class OnGPU:
         raise TypeError("can't convert cuda:0 device type tensor to numpy.")
 
 
-def bfloat16() -> Any:
+def tensor(**arguments: Any) -> Any:
     torch = pytest.importorskip("torch")
-    return torch.zeros(4, dtype=torch.bfloat16)
+    kind = {"dtype": torch.bfloat16} if arguments.pop("half", False) else {}
+    return torch.zeros(4, **kind, **arguments)
 
 
-def meta() -> Any:
-    return pytest.importorskip("torch").zeros(4, device="meta")
-
-
-def with_gradient() -> Any:
-    return pytest.importorskip("torch").zeros(4, requires_grad=True)
-
-
-UNREADABLE = [
-    (bfloat16, "type Tensor, dtype torch.bfloat16, device cpu"),
-    (meta, "type Tensor, dtype torch.float32, device meta"),
-    (with_gradient, "type Tensor, dtype torch.float32, device cpu, requires_grad True"),
+UNREADABLE: list[tuple[Callable[[], Any], str]] = [
+    (lambda: tensor(half=True), "type Tensor, dtype torch.bfloat16, device cpu"),
+    (lambda: tensor(device="meta"), "type Tensor, dtype torch.float32, device meta"),
+    (lambda: tensor(requires_grad=True), "type Tensor, .*, device cpu, requires_grad True"),
     (OnGPU, "type OnGPU, dtype torch.float32, device cuda:0"),
 ]
 LOOPS: dict[str, Callable[[Callable[[], Any]], Any]] = {

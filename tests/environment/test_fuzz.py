@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario
@@ -18,6 +18,7 @@ from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmS
 
 SMALL = Scenario(n_robots=3, n_items=4, warehouse_width=4.0, warehouse_height=3.0, duration=1.0)
 STEPS = 3
+FEWER = settings(max_examples=settings().max_examples // 2)
 
 pytestmark = pytest.mark.filterwarnings("ignore:reset option:UserWarning")
 
@@ -116,6 +117,7 @@ def check(env: Any, observations: dict[str, Any]) -> None:
     assert env.state_space.contains(env.state())
 
 
+@FEWER
 @given(spoiled)
 def test_any_scenario_runs_or_is_refused(given_fields: dict[str, Any]) -> None:
     try:
@@ -151,6 +153,7 @@ def test_any_reset_runs_or_is_refused(arguments: dict[str, Any]) -> None:
         play(env, seed=0)  # and is as good as new
 
 
+@FEWER
 @given(st.data())
 def test_any_command_is_taken_or_refused(data: st.DataObject) -> None:
     env = SwarmLogisticsEnv(SMALL, faults=data.draw(st.lists(faults, max_size=2).filter(possible)))
@@ -175,27 +178,6 @@ def test_any_command_is_taken_or_refused(data: st.DataObject) -> None:
             assert_says_why(error)
             assert env.warehouse.state.step == step
         check(env, observations)
-
-
-@given(
-    st.sampled_from(["array", "junk"]).flatmap(
-        lambda kind: (
-            junk
-            if kind == "junk"
-            else st.lists(commands, max_size=4).map(lambda rows: np.array(rows))
-        )
-    )
-)
-def test_any_array_of_commands_is_taken_or_refused(given_commands: Any) -> None:
-    env = SwarmLogisticsEnv(SMALL)
-    env.reset_arrays(seed=0)
-    try:
-        rows, rewards, *_ = env.step_arrays(given_commands)
-    except SwarmLogisticsError as error:
-        assert_says_why(error)
-    else:
-        assert np.isfinite(rows).all()
-        assert np.isfinite(rewards).all()
 
 
 @given(

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
-import warnings
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,12 +11,11 @@ from gymnasium.utils.env_checker import data_equivalence
 from numpy.typing import NDArray
 from pettingzoo import AECEnv, ParallelEnv
 
-from swarm_logistics_env import Fault, Scenario, Warehouse, swarm_logistics_v0
+from swarm_logistics_env import Fault, Scenario, swarm_logistics_v0
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import (
     ArgumentError,
     CommandError,
-    FaultError,
     ScenarioError,
     SetupError,
 )
@@ -33,10 +29,6 @@ def still(env: SwarmLogisticsEnv) -> dict[str, NDArray[np.float32]]:
     return {agent: np.zeros(4, np.float32) for agent in env.agents}
 
 
-def sampled(env: SwarmLogisticsEnv) -> dict[str, NDArray[Any]]:
-    return {agent: env.action_space(agent).sample() for agent in env.agents}
-
-
 def east(env: SwarmLogisticsEnv) -> dict[str, NDArray[np.float64]]:
     """Return commands that hold on and drive to the delivery area."""
     heading = env.warehouse.state.robot_heading
@@ -45,48 +37,6 @@ def east(env: SwarmLogisticsEnv) -> dict[str, NDArray[np.float64]]:
         for row, agent in enumerate(env.possible_agents)
         if agent in env.agents
     }
-
-
-# -- what PettingZoo asks -----------------------------------------------------------------------
-
-
-@pytest.fixture
-def conformance() -> ModuleType:
-    """PettingZoo's own tests."""
-    with warnings.catch_warnings():
-        # They load environments of PettingZoo's in a way that it deprecates.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        return importlib.import_module("pettingzoo.test")
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"n_robots": 3, "n_items": 5},
-        {"n_robots": 4, "n_items": 3, "faults": (Fault("removed", 2, onset=1.0),)},
-        {"n_robots": 1, "n_items": 1, "duration": 0.1},
-    ],
-)
-def test_pettingzoos_test_of_a_parallel_environment_passes(
-    conformance: ModuleType, fields: dict[str, Any]
-) -> None:
-    with warnings.catch_warnings():
-        # It passes an option of its own, which we ignore and say so.
-        warnings.filterwarnings("ignore", "reset option 'options' is ignored")
-        conformance.parallel_api_test(parallel_env(**fields), num_cycles=300)
-
-
-def test_pettingzoos_test_of_an_aec_environment_passes(
-    conformance: ModuleType, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "reset option 'options' is ignored")
-        conformance.api_test(swarm_logistics_v0.env(n_robots=3, n_items=5), num_cycles=300)
-    assert "Passed API test" in capsys.readouterr().out
-
-
-def test_pettingzoos_test_of_seeds_passes(conformance: ModuleType) -> None:
-    conformance.parallel_seed_test(lambda: parallel_env(n_robots=3))
 
 
 def test_the_three_constructors_give_what_their_names_say() -> None:
@@ -98,55 +48,13 @@ def test_the_three_constructors_give_what_their_names_say() -> None:
         assert aec.agents == ["robot_0", "robot_1"]
 
 
-def test_a_script_of_random_actions_runs() -> None:
-    env = swarm_logistics_v0.parallel_env(n_robots=5, duration=3.0)
-    observations, _ = env.reset(seed=0)
-    steps = 0
-    while env.agents:
-        observations, _rewards, *_ = env.step(sampled(env))
-        steps += 1
-        assert all(env.observation_space(agent).contains(o) for agent, o in observations.items())
-    assert steps == 30
-    env.close()
-    env.close()
-
-
-# -- one code path ------------------------------------------------------------------------------
-
-
-def test_the_dict_view_shows_what_the_arrays_hold() -> None:
-    scenario = Scenario(n_robots=5, n_items=8, warehouse_width=5, warehouse_height=4)
-    faults = (Fault("removed", (2,), onset=0.5),)
-    weights = {"delivery": 1.0, "contact": -1.0, "lift_requested": 0.5}
-    dicts, arrays = (SwarmLogisticsEnv(scenario, faults=faults, rewards=weights) for _ in range(2))
-    world = Warehouse(scenario)
-    observations, _ = dicts.reset(seed=4)
-    rows, plain = arrays.reset_arrays(seed=4), world.reset(4, faults)
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        np.testing.assert_array_equal(rows, plain)
-        for agent, row in observations.items():
-            np.testing.assert_array_equal(row, rows[int(agent.removeprefix("robot_"))])
-        commands = rng.uniform(-1.0, 1.0, (5, 4))
-        actions = {agent: commands[int(agent[-1])] for agent in dicts.agents}
-        observations, rewards, terminated, truncated, _ = dicts.step(actions)
-        rows, paid, ended, cut = arrays.step_arrays(commands)
-        plain = world.step(commands)
-        for agent in actions:
-            number = int(agent[-1])
-            assert rewards[agent] == paid[number]
-            assert terminated[agent] == ended[number]
-            assert truncated[agent] == cut[number]
-
-
-def test_actions_may_be_given_in_any_order() -> None:
-    first, second = parallel_env(n_robots=4), parallel_env(n_robots=4)
+def test_actions_may_be_given_in_any_order_and_beyond_their_bounds() -> None:
+    first, second = parallel_env(n_robots=2), parallel_env(n_robots=2)
     for env in (first, second):
         env.reset(seed=1)
-        env.action_space("robot_0").seed(0)
-    actions = sampled(first)
-    reversed_actions = dict(reversed(list(actions.items())))
-    assert data_equivalence(first.step(actions)[0], second.step(reversed_actions)[0])
+    far = {"robot_1": np.array([0.1, 0.2, 0.3, 0.4]), "robot_0": np.array([7.0, 0.0, -3.0, 9.0])}
+    cut = {"robot_0": np.array([1.0, 0.0, -1.0, 1.0]), "robot_1": far["robot_1"]}
+    assert data_equivalence(first.step(far), second.step(cut))
 
 
 # -- wrong input --------------------------------------------------------------------------------
@@ -156,14 +64,14 @@ def test_actions_may_be_given_in_any_order() -> None:
     ("change", "complaint"),
     [
         ({"robot_1": None}, "no command for 'robot_1': should be one for every agent"),
-        (
-            {"robot_7": np.zeros(4)},
-            "command for 'robot_7', who is not there: should be among 2 possible agents, robot_0",
-        ),
+        ({"robot_7": np.zeros(4)}, "'robot_7', who is not there: should be among 2 possible"),
         ({"robot_0": np.zeros(3)}, r"command of 'robot_0' of shape \(3,\): should be \(4,\)"),
         ({"robot_0": np.zeros((1, 4))}, r"of shape \(1, 4\): should be \(4,\)"),
         ({"robot_0": 1.0}, r"of shape \(\): should be \(4,\)"),
         ({"robot_0": ["a"] * 4}, "commands should be numbers"),
+        ({"robot_0": np.zeros(4, complex)}, "should be numbers"),
+        ({"robot_0": [None] * 4}, "should be numbers"),
+        ({"robot_0": [[1.0, 2.0], [3.0]]}, r"\(type list\) cannot be read: should be numbers"),
         ({"robot_1": [0, np.nan, 0, 0]}, r"\[1, 1\] = nan: should be finite"),
         ({"robot_1": [0, 0, 0, np.inf]}, r"\[1, 3\] = inf: should be finite"),
     ],
@@ -191,15 +99,6 @@ def test_what_is_no_dict_of_commands_is_refused(actions: Any) -> None:
     assert env.warehouse.state.step == 0
 
 
-def test_commands_beyond_their_bounds_are_cut() -> None:
-    env, cut = parallel_env(n_robots=1), parallel_env(n_robots=1)
-    env.reset(seed=0)
-    cut.reset(seed=0)
-    far = env.step({"robot_0": np.array([7.0, 0.0, -3.0, 9.0])})[0]
-    near = cut.step({"robot_0": np.array([1.0, 0.0, -1.0, 1.0])})[0]
-    assert data_equivalence(far, near)
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "complaint"),
     [
@@ -210,25 +109,17 @@ def test_commands_beyond_their_bounds_are_cut() -> None:
         ({"faults": Fault("FM1")}, SetupError, "faults = .*: should be a list of faults"),
         ({"scenario": 25}, SetupError, "scenario = 25: should be a Scenario"),
         ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
-        (
-            {"reward": {}},
-            ScenarioError,
-            "unexpected keyword argument 'reward'; did you mean 'rewards'",
-        ),
+        ({"reward": {}}, ScenarioError, "unexpected .* argument 'reward'; did you mean 'rewards'"),
         ({"num_agents": 3}, TypeError, "keyword argument 'num_agents'; did you mean 'n_robots'"),
         ({"width": 3.0}, TypeError, "argument 'width'; did you mean 'warehouse_width'"),
         ({"frameskip": 4}, ArgumentError, "got an unexpected keyword argument 'frameskip'"),
         ({"max_robots": 24}, SetupError, "max_robots = 24: should be None or .* n_robots = 25"),
         ({"max_robots": "40"}, SetupError, "max_robots = '40': should be None or a whole number"),
         ({"max_robots": 9000}, ScenarioError, "n_robots = 9000 of radius .* do not fit"),
-        ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be None or a whole number"),
+        ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be a whole number"),
         ({"max_cycles": "9"}, SetupError, "max_cycles = '9': should be"),
         ({"max_cycles": 9.5}, SetupError, "max_cycles = 9.5: should be"),
-        (
-            {"rewards": ["delivery"]},
-            SetupError,
-            r"rewards = \['delivery'\]: should be None or a dict",
-        ),
+        ({"rewards": ["delivery"]}, SetupError, r"rewards = \[.*\]: should be None or a dict"),
     ],
 )
 def test_wrong_arguments_are_refused(
@@ -236,12 +127,6 @@ def test_wrong_arguments_are_refused(
 ) -> None:
     with pytest.raises(error, match=complaint):
         parallel_env(**arguments)
-
-
-def test_fields_replace_those_of_the_scenario() -> None:
-    env = parallel_env(scenario=Scenario(n_items=7, n_robots=3), n_robots=4)
-    assert (env.scenario.n_items, env.scenario.n_robots) == (7, 4)
-    assert env.possible_agents == [f"robot_{number}" for number in range(4)]
 
 
 # -- reset --------------------------------------------------------------------------------------
@@ -304,6 +189,9 @@ def test_spaces_and_possible_agents_stay_as_they_were_made() -> None:
         with pytest.raises(SetupError, match=complaint):
             env.reset(seed=1, options={"scenario": scenario})
         assert env.warehouse.state is before
+    for scenario in ({"n_robot": 3}, {"delivery_width": 10.0}):
+        with pytest.raises(ScenarioError):
+            env.reset(seed=1, options={"scenario": scenario})
     for n_robots in (1, 4):
         env.reset(seed=1, options={"scenario": {"n_robots": n_robots, "n_items": 2}})
         assert len(env.agents) == n_robots
@@ -323,28 +211,24 @@ def test_a_reset_that_leaves_nobody_is_refused(n_robots: int) -> None:
     assert len(env.reset(seed=0)[0]) == 1
 
 
-def test_a_step_before_the_reset_is_refused() -> None:
-    env = parallel_env(n_robots=2)
-    for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
-        with pytest.raises(SetupError, match="step before reset: call reset"):
-            step()
-
-
 ENDS: dict[str, dict[str, Any]] = {
-    "time": {"max_cycles": 2},
+    "time": {"n_robots": 2, "max_cycles": 2},
     "everything delivered": {"scenario": REACHABLE},
-    "nobody left": {"faults": [Fault("removed", (0, 1), onset=0.1)]},
+    "nobody left": {"n_robots": 2, "faults": [Fault("removed", (0, 1), onset=0.1)]},
 }
 
 
 @pytest.mark.parametrize("end", ENDS)
 def test_a_step_after_the_end_is_refused_and_moves_nothing(end: str) -> None:
-    env = parallel_env(
-        **{"n_robots": 2, **ENDS[end]} if end != "everything delivered" else ENDS[end]
-    )
+    env = parallel_env(**ENDS[end])
+    for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
+        with pytest.raises(SetupError, match="step before reset: call reset"):
+            step()
     env.reset(seed=0)
     while env.agents:
-        env.step(east(env))
+        _, _, terminated, truncated, _ = env.step(east(env))
+    assert set(terminated.values()) == {end != "time"}
+    assert set(truncated.values()) == {end == "time"}
     before, time = env.state(), env.warehouse.state.time
     for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
         with pytest.raises(SetupError, match=r"step after the end of the episode: call reset"):
@@ -363,27 +247,16 @@ def test_unknown_options_are_ignored_with_a_warning() -> None:
     assert len(observations) == 2
 
 
-@pytest.mark.parametrize(
-    ("options", "error"),
-    [
-        ({"scenario": {"n_robot": 3}}, ScenarioError),
-        ({"scenario": {"delivery_width": 10.0}}, ScenarioError),
-        ({"faults": [Fault("FM1", 3)]}, FaultError),
-    ],
-)
-def test_options_that_cannot_be_are_refused(
-    options: dict[str, Any], error: type[Exception]
-) -> None:
-    with pytest.raises(error):
-        parallel_env(n_robots=2).reset(seed=0, options=options)
-
-
 # -- who leaves, and how it ends ----------------------------------------------------------------
 
 
 def test_a_removed_robot_terminates_once_and_leaves() -> None:
-    env = parallel_env(n_robots=3, faults=[Fault("removed", (1,), onset=0.2)])
-    env.reset(seed=0)
+    faults = [Fault("removed", (1,), onset=0.2), Fault("removed", (3,))]
+    env = parallel_env(scenario=Scenario(n_robots=9, n_items=7), n_robots=4, faults=faults)
+    assert (env.scenario.n_items, env.scenario.n_robots) == (7, 4)
+    observations, _ = env.reset(seed=0)
+    assert list(observations) == ["robot_0", "robot_1", "robot_2"]
+    assert env.possible_agents == [*observations, "robot_3"]
     _, _, terminated, truncated, _ = env.step(still(env))
     assert not any(terminated.values())
     assert env.agents == ["robot_0", "robot_1", "robot_2"]
@@ -399,47 +272,21 @@ def test_a_removed_robot_terminates_once_and_leaves() -> None:
     assert list(observations) == ["robot_0", "robot_2"]
 
 
-def test_who_is_removed_from_the_start_is_not_there_but_possible() -> None:
-    env = parallel_env(n_robots=3, faults=[Fault("removed", (0,))])
-    observations, _ = env.reset(seed=0)
-    assert list(observations) == env.agents == ["robot_1", "robot_2"]
-    assert env.possible_agents == ["robot_0", "robot_1", "robot_2"]
-
-
-def test_when_all_are_removed_the_episode_is_over() -> None:
-    env = parallel_env(n_robots=2, faults=[Fault("removed", 2, onset=0.1)])
-    env.reset(seed=0)
-    _, _, terminated, truncated, _ = env.step(still(env))
-    assert all(terminated.values())
-    assert not any(truncated.values())
-    assert env.agents == []
-
-
-def test_everybody_terminates_when_everything_is_delivered() -> None:
-    env = parallel_env(REACHABLE)
+@pytest.mark.parametrize("restock", [False, True])
+def test_everybody_terminates_when_everything_is_delivered(restock: bool) -> None:
+    env = parallel_env(REACHABLE, restock=restock, duration=20.0)
     env.reset(seed=0)
     total = 0.0
-    for _ in range(200):
+    while True:
         _, rewards, terminated, truncated, infos = env.step(east(env))
         total += rewards["robot_0"]
         if not env.agents:
             break
         assert not any(terminated.values())
-    assert all(terminated.values())
-    assert not any(truncated.values())
-    assert total == 1.0
-    assert infos["robot_1"]["delivered"] == 1
-
-
-def test_with_restock_nobody_terminates() -> None:
-    env = parallel_env(REACHABLE, restock=True, duration=10.0)
-    env.reset(seed=0)
-    total = 0.0
-    while env.agents:
-        _, rewards, terminated, _, _ = env.step(east(env))
-        total += rewards["robot_0"]
-        assert not any(terminated.values())
-    assert total >= 2.0
+    assert set(terminated.values()) == {not restock}
+    assert set(truncated.values()) == {restock}
+    assert total == infos["robot_1"]["delivered"]
+    assert total > 1.0 if restock else total == 1.0
 
 
 @pytest.mark.parametrize(
@@ -452,6 +299,7 @@ def test_everybody_is_truncated_when_the_time_is_up(arguments: dict[str, Any], s
         env.reset(seed=0)
         for step in range(1, steps + 1):
             _, _, terminated, truncated, _ = env.step(still(env))
+            assert env.warehouse.state.time == pytest.approx(0.1 * step)
             assert not any(terminated.values())
             assert set(truncated.values()) == {step == steps}
         assert env.agents == []
@@ -486,24 +334,6 @@ def test_an_absent_robot_earns_nothing() -> None:
             break
     assert paid[0] == 1.0
     assert terminated.tolist() == [True, False]
-
-
-@pytest.mark.parametrize(
-    ("command", "sentence"),
-    [
-        ([[1.0, 2.0], [3.0]], r"command.* \(type list\) cannot be read: should be numbers"),
-        (np.zeros(4, complex), "should be numbers"),
-        ([None] * 4, "should be numbers"),
-        (["left"] * 4, "should be numbers"),
-    ],
-)
-def test_a_command_that_is_no_row_of_real_numbers_is_refused(command: Any, sentence: str) -> None:
-    env = parallel_env(n_robots=1)
-    env.reset(seed=0)
-    with pytest.raises(CommandError, match=sentence):
-        env.step({"robot_0": command})
-    with pytest.raises(CommandError, match="should be"):
-        env.step_arrays([command])
 
 
 def test_the_state_of_a_robot_that_is_shoved_lies_in_its_space() -> None:

@@ -15,23 +15,18 @@ import swarm_logistics_env
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
-def test_gymnasium_makes_it_by_name_after_a_bare_import() -> None:
+@pytest.mark.parametrize(
+    ("imported", "name"),
+    [
+        ("gymnasium, swarm_logistics_env", "SwarmLogistics-v0"),
+        ("gymnasium", "swarm_logistics_env:SwarmLogistics-v0"),
+    ],
+)
+def test_gymnasium_makes_it_by_name_after_a_bare_import(imported: str, name: str) -> None:
     script = (
-        "import gymnasium, swarm_logistics_env, sys;"
+        f"import sys, {imported};"
         "assert 'swarm_logistics_env.environment.parallel_env' not in sys.modules;"
-        "print(gymnasium.make('SwarmLogistics-v0', n_robots=4).observation_space.shape[0])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == ["4"]
-
-
-def test_gymnasium_imports_the_package_that_the_name_begins_with() -> None:
-    script = (
-        "import gymnasium;"
-        "name = 'swarm_logistics_env:SwarmLogistics-v0';"
-        "print(gymnasium.make(name, n_robots=4).observation_space.shape[0])"
+        f"print(gymnasium.make({name!r}, n_robots=4).observation_space.shape[0])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms, carrier_of_requested
+from swarm_logistics_env.environment.rewards import REWARD_TERMS, RewardTerms
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
@@ -47,98 +47,66 @@ def started(world: Warehouse, **weights: float) -> RewardTerms:
     return terms
 
 
-def test_by_default_everybody_earns_one_per_delivery(world: Warehouse) -> None:
-    give(world, 1, 2)
-    terms = started(world)
-    assert terms.pay(world).tolist() == [0.0] * 4
-    deliver(world, 1, next_request=3)
-    assert terms.pay(world).tolist() == [1.0] * 4
-    assert terms.pay(world).tolist() == [0.0] * 4
+Act = tuple[Any, ...]  # a change of the world by hand, and what it pays
+NOTHING = [0.0] * 4
 
 
-def test_own_delivery_is_the_deliverers(world: Warehouse) -> None:
-    give(world, 1, 2)
-    give(world, 3, 4)
-    terms = started(world, own_delivery=2.0)
-    deliver(world, 1, next_request=4)
-    deliver(world, 3, next_request=0)
-    assert terms.pay(world).tolist() == [0.0, 2.0, 0.0, 2.0]
-    assert terms.pay(world).tolist() == [0.0] * 4
+def to(world: Warehouse, robot: int, x: float, y: float) -> None:
+    world.state.robot_position[robot] = [x, y]
 
 
-def test_lift_requested_pays_for_taking_up_and_fines_letting_go(world: Warehouse) -> None:
-    terms = started(world, lift_requested=1.0)
-    give(world, 0, 5)  # this item is not the requested one
-    assert terms.pay(world).tolist() == [0.0] * 4
-    give(world, 1, 2)
-    assert terms.pay(world).tolist() == [0.0, 1.0, 0.0, 0.0]
-    assert terms.pay(world).tolist() == [0.0] * 4
-    put_down(world, 1)
-    assert terms.pay(world).tolist() == [0.0, -1.0, 0.0, 0.0]
+def touch(world: Warehouse, *robots: int) -> None:
+    world.state.robot_contact[:] = np.isin(range(4), robots)
 
 
-def test_lift_requested_pays_one_and_fines_the_other_when_an_item_changes_hands(
-    world: Warehouse,
-) -> None:
-    give(world, 1, 2)
-    terms = started(world, lift_requested=1.0)
-    put_down(world, 1)
-    give(world, 3, 2)
-    assert terms.pay(world).tolist() == [0.0, -1.0, 0.0, 1.0]
+# Weights; what happens before the episode; and what each change after it pays.
+PAYS: dict[str, tuple[dict[str, float], list[Act], list[tuple[list[Act], list[float]]]]] = {
+    "everybody for each delivery by default": ({}, [(give, 1, 2)], [
+        ([], NOTHING), ([(deliver, 1, 3)], [1.0] * 4), ([], NOTHING)]),
+    "own_delivery the deliverers, of two in one step": (
+        {"own_delivery": 2.0}, [(give, 1, 2), (give, 3, 4)], [
+        ([(deliver, 1, 4), (deliver, 3, 0)], [0.0, 2.0, 0.0, 2.0]), ([], NOTHING)]),
+    "lift_requested for taking up, and fines letting go": ({"lift_requested": 1.0}, [], [
+        ([(give, 0, 5)], NOTHING), ([(give, 1, 2)], [0.0, 1.0, 0.0, 0.0]), ([], NOTHING),
+        ([(put_down, 1)], [0.0, -1.0, 0.0, 0.0])]),
+    "lift_requested both when an item changes hands": ({"lift_requested": 1.0}, [(give, 1, 2)], [
+        ([(put_down, 1), (give, 3, 2)], [0.0, -1.0, 0.0, 1.0])]),
+    "no fine for a delivery": ({"lift_requested": 1.0}, [(give, 1, 2)], [
+        ([(deliver, 1, 3)], NOTHING)]),
+    "nor when the same item is asked for again": ({"lift_requested": 1.0}, [(give, 1, 2)], [
+        ([(deliver, 1, 2)], NOTHING)]),
+    "approach the carrier's metres up to the area": (
+        {"approach": 10.0}, [(give, 1, 2), (to, 1, 3.0, 5.0), (to, 0, 1.0, 1.0)], [
+        ([(to, 1, 3.2, 1.0), (to, 0, 2.0, 1.0)], [0.0, 2.0, 0.0, 0.0]),
+        ([(to, 1, 2.9, 1.0)], [0.0, -3.0, 0.0, 0.0]),
+        ([(to, 1, STORAGE + 1.0, 1.0)], [0.0, 51.0, 0.0, 0.0]),
+        ([(to, 1, STORAGE + 0.2, 1.0)], NOTHING)]),
+    "no way inside of the area": (
+        {"carried_way": 1.0, "approach": 1.0, "discount": 1.0},
+        [(give, 1, 2), (to, 1, STORAGE + 0.2, 5.0)], [([(to, 1, STORAGE + 1.5, 5.0)], NOTHING)]),
+    "approach nothing for a change of item or carrier": ({"approach": 1.0}, [(give, 1, 2)], [
+        ([(put_down, 1), (give, 3, 2)], NOTHING), ([(give, 0, 5), (deliver, 3, 5)], NOTHING)]),
+    "carrying back at the delivery what it paid for the lift": (
+        {"carrying": 2.0, "discount": 0.9}, [], [
+        ([(give, 1, 2)], [0.0, 1.8, 0.0, 0.0]), ([], [0.0, -0.2, 0.0, 0.0]),
+        ([(give, 3, 4), (deliver, 1, 4)], [0.0, -2.0, 0.0, 1.8])]),
+    "contact its seconds": ({"contact": -1.0}, [], [([(touch, 0, 3)], [-0.1, 0.0, 0.0, -0.1])]),
+    "the weighed sum of terms": (
+        {"delivery": 0.5, "own_delivery": 2.0, "contact": -10.0}, [(give, 1, 2)], [
+        ([(touch, 0), (deliver, 1, 3)], [-0.5, 2.5, 0.5, 0.5])]),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("next_request", [3, 2])
-def test_a_delivery_is_no_letting_go_even_if_the_same_item_is_asked_for_again(
-    world: Warehouse, next_request: int
-) -> None:
-    give(world, 1, 2)
-    terms = started(world, lift_requested=1.0)
-    deliver(world, 1, next_request)
-    assert terms.pay(world).tolist() == [0.0] * 4
-
-
-def test_approach_pays_metres_towards_the_delivery_area(world: Warehouse) -> None:
-    give(world, 1, 2)
-    world.state.robot_position[1] = [3.0, 5.0]
-    terms = started(world, approach=10.0)
-    world.state.robot_position[1] = [3.2, 1.0]
-    world.state.robot_position[0] += 0.1  # who does not carry it earns nothing
-    assert terms.pay(world) == pytest.approx([0.0, 2.0, 0.0, 0.0])
-    world.state.robot_position[1] = [2.9, 1.0]
-    assert terms.pay(world) == pytest.approx([0.0, -3.0, 0.0, 0.0])
-    world.state.robot_position[1] = [STORAGE + 1.0, 1.0]  # deeper inside is no nearer
-    assert terms.pay(world) == pytest.approx([0.0, 51.0, 0.0, 0.0])
-    world.state.robot_position[1] = [STORAGE + 0.2, 1.0]
-    assert terms.pay(world) == pytest.approx([0.0] * 4)
-
-
-def test_the_way_inside_the_delivery_area_pays_nothing(world: Warehouse) -> None:
-    give(world, 1, 2)
-    world.state.robot_position[1] = [STORAGE + 0.2, 5.0]
-    terms = started(world, carried_way=1.0, approach=1.0, discount=1.0)
-    world.state.robot_position[1] = [STORAGE + 1.5, 5.0]
-    assert terms.pay(world).tolist() == [0.0] * 4
-
-
-def test_approach_pays_nothing_for_a_change_of_item_or_carrier(world: Warehouse) -> None:
-    give(world, 1, 2)
-    terms = started(world, approach=1.0)
-    put_down(world, 1)
-    give(world, 3, 2)
-    assert terms.pay(world).tolist() == [0.0] * 4
-    give(world, 0, 5)
-    deliver(world, 3, next_request=5)
-    assert terms.pay(world).tolist() == [0.0] * 4
-
-
-def test_carrying_takes_back_at_the_delivery_what_it_paid_for_the_lift(world: Warehouse) -> None:
-    terms = started(world, carrying=2.0, discount=0.9)
-    give(world, 1, 2)
-    assert terms.pay(world).tolist() == [0.0, 1.8, 0.0, 0.0]
-    assert terms.pay(world) == pytest.approx([0.0, -0.2, 0.0, 0.0])
-    give(world, 3, 4)  # nobody asked for it, until the delivery
-    deliver(world, 1, next_request=4)
-    assert terms.pay(world).tolist() == [0.0, -2.0, 0.0, 1.8]
+@pytest.mark.parametrize("case", PAYS)
+def test_it_pays(world: Warehouse, case: str) -> None:
+    weights, before, changes = PAYS[case]
+    for act, *arguments in before:
+        act(world, *arguments)
+    terms = started(world, **weights)
+    for acts, paid in changes:
+        for act, *arguments in acts:
+            act(world, *arguments)
+        assert terms.pay(world).tolist() == pytest.approx(paid)
 
 
 @pytest.mark.parametrize("term", ["carrying", "carried_way"])
@@ -151,56 +119,18 @@ def test_what_a_potential_pays_depends_on_where_an_episode_begins_and_ends_alone
     world.reset(0)
     terms = started(world, **{term: 1.0, "discount": discount})
     rng = np.random.default_rng(1)
-    total, n_steps, n_changes = np.zeros(8), 600, 0
+    total, n_steps, n_changes = np.zeros(8), 400, 0
     for step in range(n_steps):
-        carrier = carrier_of_requested(world)
+        carrier = world.state.carrier
         world.step(rng.uniform(-1.0, 1.0, (8, 4)))
         total += discount**step * terms.pay(world)
-        n_changes += carrier != carrier_of_requested(world)
+        n_changes += carrier != world.state.carrier
     last = np.zeros(8)
-    if (carrier := carrier_of_requested(world)) != NOBODY:
+    if (carrier := world.state.carrier) != NOBODY:
         x = world.state.robot_position[carrier, 0]
         last[carrier] = 1.0 if term == "carrying" else min(x, world.scenario.storage_width)
     assert n_changes >= 10
     assert total == pytest.approx(discount**n_steps * last, abs=1e-12)
-
-
-def test_approach_can_be_collected_in_circles_and_carried_way_cannot() -> None:
-    """A robot puts the item down, steps back, pulls it near by lifting it, and drives forward."""
-    world = Warehouse(
-        Scenario(n_robots=1, n_items=1, heading_drift=0.0, warehouse_width=5, warehouse_height=4)
-    )
-    world.reset(0)
-    state = world.state
-    paid = {
-        "approach": RewardTerms({"approach": 1.0}),
-        "carried_way": RewardTerms({"carried_way": 1.0, "discount": 1.0}),
-    }
-
-    def drive(x: float, y: float, gripper: float) -> None:
-        heading = state.robot_heading[0]
-        ahead = x * np.cos(heading) + y * np.sin(heading)
-        aside = y * np.cos(heading) - x * np.sin(heading)
-        world.step(np.array([[ahead, aside, 0.0, gripper]]))
-
-    for _ in range(200):
-        to_x, to_y = state.item_position[0] - state.robot_position[0]
-        drive(2.0 * to_x, 2.0 * to_y, -1.0)
-    drive(0.0, 0.0, 1.0)
-    assert carrier_of_requested(world) == 0
-    sums = dict.fromkeys(paid, 0.0)
-    for terms in paid.values():
-        terms.begin(world)
-    begun = state.robot_position[0, 0]
-    for _ in range(10):
-        for x, gripper in ((0.0, -1.0), (-1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, 0.0)):
-            drive(x, 0.0, gripper)
-            for name, terms in paid.items():
-                sums[name] += terms.pay(world)[0]
-    assert carrier_of_requested(world) == 0
-    assert sums["approach"] > 1.0
-    assert sums["carried_way"] == pytest.approx(state.robot_position[0, 0] - begun)
-    assert abs(sums["carried_way"]) < 0.1
 
 
 def test_stocking_pays_the_way_of_every_item_so_that_no_circle_earns() -> None:
@@ -211,7 +141,7 @@ def test_stocking_pays_the_way_of_every_item_so_that_no_circle_earns() -> None:
     terms, state, edge = started(world, stocking=1.0), world.state, world.scenario.storage_width
     rng = np.random.default_rng(1)
     begun, total, n_changes = state.item_position[:, 0].copy(), np.zeros(8), 0
-    for _ in range(600):
+    for _ in range(400):
         carriers = state.item_carrier.copy()
         world.step(rng.uniform(-1.0, 1.0, (8, 4)))
         total += terms.pay(world)
@@ -229,12 +159,6 @@ def test_stocking_pays_nothing_for_what_comes_back_after_its_delivery(world: War
     deliver(world, 1, next_request=3)
     world.state.item_position[2] = [0.5, 0.5]
     assert not np.any(terms.pay(world))
-
-
-def test_contact_pays_its_seconds(world: Warehouse) -> None:
-    terms = started(world, contact=-1.0)
-    world.state.robot_contact[:] = [True, False, False, True]
-    assert terms.pay(world) == pytest.approx([-0.1, 0.0, 0.0, -0.1])
 
 
 def test_a_robot_that_cannot_deliver_is_charged_while_it_holds_the_requested_item() -> None:
@@ -263,14 +187,6 @@ def test_a_robot_that_cannot_lift_is_charged_for_its_distance_from_the_end_wall(
     world.state.robot_position[:, 0] = world.scenario.warehouse_width - 3.0
     paid = started(world, in_the_way=-1.0).pay(world)
     assert paid == pytest.approx(np.where(faulty, -0.3, 0.0))
-
-
-def test_terms_are_weighed_and_added(world: Warehouse) -> None:
-    give(world, 1, 2)
-    terms = started(world, delivery=0.5, own_delivery=2.0, contact=-10.0)
-    world.state.robot_contact[:] = [True, False, False, False]
-    deliver(world, 1, next_request=3)
-    assert terms.pay(world) == pytest.approx([-0.5, 2.5, 0.5, 0.5])
 
 
 def test_without_terms_nobody_earns(world: Warehouse) -> None:
@@ -312,16 +228,3 @@ def test_unknown_terms_and_weights_that_are_no_numbers_are_refused(
 ) -> None:
     with pytest.raises(SetupError, match=complaint):
         RewardTerms(weights)
-
-
-def test_every_term_pays_finite_numbers_for_every_robot_in_a_running_world() -> None:
-    world = Warehouse(Scenario(n_robots=6, n_items=8, warehouse_width=3, warehouse_height=3))
-    world.reset(0, [Fault("removed", 2, onset=1.0)])
-    terms = RewardTerms({**dict.fromkeys(REWARD_TERMS, 1.0), "discount": 0.9})
-    terms.begin(world)
-    rng = np.random.default_rng(0)
-    for _ in range(60):
-        world.step(rng.uniform(-1.0, 1.0, (6, 4)))
-        paid = terms.pay(world)
-        assert paid.shape == (6,)
-        assert np.isfinite(paid).all()

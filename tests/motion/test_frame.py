@@ -63,18 +63,13 @@ def test_how_the_body_stands_does_not_matter() -> None:
     )
 
 
-def test_outputs_and_commands_are_each_others_inverse() -> None:
+def test_outputs_and_commands_are_each_others_inverse_within_their_limits() -> None:
     frame = frame_of(30)
     frame.read(nothing(30))
     outputs = np.random.default_rng(0).uniform(-0.7, 0.7, (30, 3))
     commands = frame.command(outputs)
     np.testing.assert_allclose(frame.outputs_for(commands), outputs, atol=1e-12)
     assert (commands[:, 2] == 0.0).all()
-
-
-def test_commands_keep_within_their_limits() -> None:
-    frame = frame_of(30)
-    frame.read(nothing(30))
     commands = frame.command(np.random.default_rng(0).normal(0, 9, (30, 3)))
     assert (np.hypot(commands[:, 0], commands[:, 1]) <= 1.0 + 1e-12).all()
     assert (np.abs(commands) <= 1.0 + 1e-12).all()
@@ -194,15 +189,6 @@ def test_that_does_not_listen_reads_the_same_but_no_timer() -> None:
     np.testing.assert_array_equal(deaf.peek(rows, np.array([0]))[:, LEAD], unheard[:, LEAD])
 
 
-def test_the_way_home_fades_in_ten_seconds() -> None:
-    frame = frame_of(1)
-    frame.memory[0, known.HOME_X] = 2.0
-    for _ in range(100):
-        frame.read(nothing())
-    assert frame.memory[0, known.HOME_X] == pytest.approx(2.0 * math.exp(-1.0))
-    assert frame.memory[0, known.HOME_Y] == 0.0
-
-
 def caged(*items: tuple[float, float, bool], carries: str = "requested") -> Rows:
     """What a robot senses that stands amid items at (x, y) [m], some of them requested."""
     rows = nothing()
@@ -241,15 +227,9 @@ def test_a_caged_robot_lets_go_and_carries_off_what_is_in_its_way() -> None:
     for _ in range(10):
         last = commands(caged(carries=""))
     assert last[3] == 1.0
-
-
-def test_a_robot_that_moves_is_not_caged() -> None:
-    frame = frame_of(1)
-    rows = caged()
-    rows[0, row.VELOCITY] = 1.0
-    for _ in range(200):
-        frame.read(rows)
-        assert frame.command(np.array([[1.0, 0.0, 1.0]]))[0, 3] == 1.0
+    moving = caged()  # who moves is not caged
+    moving[0, row.VELOCITY] = 1.0
+    assert all(commands(moving)[3] == 1.0 for _ in range(100))
 
 
 def test_a_robot_that_cannot_lift_reads_the_way_home_once_more_and_others_read_zeros() -> None:

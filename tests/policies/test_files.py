@@ -91,21 +91,21 @@ def test_a_tensor_of_another_shape_is_refused(
         write_policy(file, card, wrong)
 
 
-def test_tensors_of_another_type_or_not_finite_are_refused(
+def test_tensors_of_another_type_or_name_or_not_finite_are_refused(
     card: PolicyCard, tensors: Tensors, file: Path
 ) -> None:
     rewrite(file, card.to_json(), {**tensors, "deviations": np.zeros(3, np.float64)})
     refused(file, "its tensor deviations is float64")
     rewrite(file, card.to_json(), {**tensors, "deviations": np.full(3, np.nan, np.float32)})
     refused(file, "its tensor deviations is not finite")
-
-
-def test_missing_and_unknown_tensors_are_refused(
-    card: PolicyCard, tensors: Tensors, file: Path
-) -> None:
     others = {("other" if name == "deviations" else name): t for name, t in tensors.items()}
     rewrite(file, card.to_json(), others)
     refused(file, r"lack \['deviations'\] and have \['other'\]")
+    for about in (None, {"format": "pt"}):
+        save_file(tensors, file, about)
+        refused(file, "is safetensors without a card")
+    rewrite(file, card.to_json().replace('"format":1', '"format":2'), tensors)
+    refused(file, "PolicyCard.format = 2")
 
 
 def test_columns_that_are_not_read_any_more_are_refused(
@@ -115,9 +115,6 @@ def test_columns_that_are_not_read_any_more_are_refused(
     refused(file, "column 3 is 'wall_33': should be 'wall_3'")
     rewrite(file, card.to_json().replace(',"cannot_lift_inside"', ""), tensors)
     refused(file, "has 92 columns: should have 84 or 88 or 93")
-
-
-def test_a_number_of_inputs_that_no_network_had_is_refused(card: PolicyCard) -> None:
     with pytest.raises(PolicyError, match="85: should be one of 84, 88, 93"):
         card.network.replace(inputs=85)
 
@@ -140,18 +137,6 @@ def test_foreign_json_is_refused(tensors: Tensors, file: Path, text: str) -> Non
     refused(file, "the card in .* cannot be read")
 
 
-def test_safetensors_of_somebody_else_are_refused(tensors: Tensors, file: Path) -> None:
-    save_file(tensors, file)
-    refused(file, "is safetensors without a card")
-    save_file(tensors, file, {"format": "pt"})
-    refused(file, "is safetensors without a card")
-
-
-def test_an_unknown_format_is_refused(card: PolicyCard, tensors: Tensors, file: Path) -> None:
-    rewrite(file, card.to_json().replace('"format":1', '"format":2'), tensors)
-    refused(file, "PolicyCard.format = 2")
-
-
 def test_a_missing_file_and_one_of_another_kind_are_refused(tmp_path: Path) -> None:
     refused(tmp_path / "none.safetensors", "cannot read the policy file .*No such file")
     (tmp_path / "weights.pt").write_bytes(b"weights")
@@ -162,13 +147,6 @@ def test_a_model_of_stable_baselines3_asks_to_be_trusted(tmp_path: Path) -> None
     path = tmp_path / "model.zip"
     path.write_bytes(b"")
     refused(path, r"reading it executes the code in it.*trust_code=True.*--trust-code")
-
-
-def test_shipped_policies_are_small() -> None:
-    from swarm_logistics_env.policies.spec import WEIGHTS
-
-    sizes = {path.name: path.stat().st_size for path in WEIGHTS.glob("*.safetensors")}
-    assert all(size < 1_000_000 for size in sizes.values()), sizes
 
 
 def refused(path: Path, sentence: str) -> None:

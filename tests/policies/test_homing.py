@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env import Scenario, run_episode
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.policies import NAMES, load
+from swarm_logistics_env.policies import load
 from swarm_logistics_env.warehouse import Warehouse
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
@@ -40,7 +39,6 @@ def inside(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def test_it_is_shipped_and_delivers_more_than_swarm_dt() -> None:
-    assert "homing" in NAMES
     scenario = Scenario(duration=60.0, restock=True)
     delivered = {
         name: run_episode(scenario, load(name), seed=0).delivered for name in ("swarm-dt", "homing")
@@ -99,40 +97,3 @@ def test_it_never_commands_a_turn() -> None:
         assert (commands[:, 2] == 0.0).all()
         rows = world.step(commands)
     np.testing.assert_allclose(world.state.robot_heading, first)
-
-
-def test_a_command_follows_from_its_own_row_alone() -> None:
-    rng = np.random.default_rng(0)
-    world = Warehouse(Scenario(n_robots=10, warehouse_width=5, warehouse_height=4))
-    rows, whole, disturbed = world.reset(0), fresh(10), fresh(10)
-    for _ in range(30):
-        scrambled = rng.permutation(rows)
-        scrambled[4] = rows[4]
-        commands = whole.act(rows)
-        np.testing.assert_array_equal(disturbed.act(scrambled)[4], commands[4])
-        rows = world.step(commands)
-
-
-def test_a_robots_randomness_does_not_depend_on_who_else_is_there() -> None:
-    few, many = fresh(5, seed=3), fresh(25, seed=3)
-    for _ in range(10):
-        commands = many.act(rows_of(25))
-        np.testing.assert_array_equal(few.act(rows_of(5)), commands[:5])
-
-
-def test_reset_begins_anew_and_seeds_differ() -> None:
-    policy, rows = fresh(3, seed=1), rows_of(3)
-    first = [policy.act(rows) for _ in range(4)]
-    policy.reset(3, 1)
-    np.testing.assert_array_equal(first, [policy.act(rows) for _ in range(4)])
-    policy.reset(3, 2)
-    assert not np.array_equal(first[0], policy.act(rows))
-
-
-def test_rows_for_another_number_of_robots_are_refused() -> None:
-    with pytest.raises(PolicyError, match="observations of 4 robots: reset was told 3"):
-        fresh(3).act(rows_of(4))
-
-
-def test_its_identity_is_its_own() -> None:
-    assert policies.identity(load("homing")) != policies.identity(load("swarm-dt"))

@@ -7,7 +7,6 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
-from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import PolicyCard, identity
 from swarm_logistics_env.policies.learned import (
     FeedForward,
@@ -18,12 +17,6 @@ from swarm_logistics_env.policies.learned import (
 from swarm_logistics_env.streams import row_keys
 
 Tensors = dict[str, NDArray[np.float32]]
-
-
-def test_it_plays_swarms_of_any_size(card: PolicyCard, tensors: Tensors) -> None:
-    policy = LearnedPolicy(card, tensors)
-    for n_robots in (1, 12):
-        assert run_episode(Scenario(n_robots=n_robots, duration=2.0), policy, 0).ended_at == 2.0
 
 
 def test_a_robot_decides_alike_in_any_swarm(
@@ -86,15 +79,6 @@ def test_identity_follows_weights_and_network_alone(card: PolicyCard, tensors: T
     assert identity(LearnedPolicy(bolder, tensors)) != told
     moved = {**tensors, "layers.0.bias": tensors["layers.0.bias"] + np.float32(1e-3)}
     assert identity(LearnedPolicy(card, moved)) != told
-
-
-def test_rows_of_another_number_are_refused(
-    card: PolicyCard, tensors: Tensors, rows: NDArray[np.float32]
-) -> None:
-    policy = LearnedPolicy(card, tensors)
-    policy.reset(3, 0)
-    with pytest.raises(PolicyError, match="observations of 7 robots: reset was told 3"):
-        policy.act(rows)
 
 
 WIDTHS = (20, 16, 9, 4)

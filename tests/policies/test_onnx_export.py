@@ -55,9 +55,9 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
     network = trained.card.network.replace(exploration=0.0)
     policy = LearnedPolicy(trained.card.replace(network=network), trained.tensors)
     session = session_of(policy, tmp_path / "p.onnx")
-    scenario = Scenario(n_robots=25, duration=100.0, restock=True)
+    scenario = Scenario(n_robots=25, duration=40.0, restock=True)
     world = Warehouse(scenario)
-    rows = world.reset(3, [Fault("FM1", 2), Fault("motor_dead", 2, onset=50.0)])
+    rows = world.reset(3, [Fault("FM1", 2), Fault("motor_dead", 2, onset=20.0)])
     policy.configure(scenario)
     policy.reset(25, 3)
     # Beside the policy, a frame of its own: with the same rows it has the same memories.
@@ -65,8 +65,9 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
     keys = row_keys(3, STREAM, 25)
     frame.begin(keys)
     width = len(policy.card.network.inputs)
-    told = session.get_modelmeta().custom_metadata_map[DEVIATIONS]
-    deviations = np.array(told.split(), np.float32)
+    about = session.get_modelmeta().custom_metadata_map
+    assert PolicyCard.from_json(about[CARD]) == policy.card
+    deviations = np.array(about[DEVIATIONS].split(), np.float32)
     assert deviations.any() == (policy.card.network.exploration > 0)
     furthest, n_rows, step = 0.0, 0, 0
     while not (world.is_over_time or world.all_delivered):
@@ -82,9 +83,9 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(name: str, tmp_path:
         np.testing.assert_array_equal(frame.command(ours), commands)
         step += 1
         rows = world.step(commands)
-    assert n_rows == 25_000
+    assert n_rows == 10_000
     assert furthest < 1e-5
-    assert world.state.delivered > 5
+    assert world.state.delivered > 0
 
 
 def test_other_networks_agree_too(
@@ -126,12 +127,6 @@ def test_the_deviations_beside_it_make_the_commands_of_one_that_explores(
     outputs = policy._network(frame.read(rows))
     explore(keys, 0, deviations, outputs)
     np.testing.assert_array_equal(frame.command(outputs), policy.act(rows))
-
-
-def test_the_card_travels_along(tmp_path: Path) -> None:
-    policy: Any = policies.load("ppo-delivery")
-    said = session_of(policy, tmp_path / "p.onnx").get_modelmeta().custom_metadata_map
-    assert PolicyCard.from_json(said[CARD]) == policy.card
 
 
 def test_the_page_tells_the_numbers_of_the_code() -> None:

@@ -40,31 +40,22 @@ def world_with(*faults: Fault) -> Warehouse:
     return world
 
 
-@pytest.mark.parametrize("mode", ["FM3", "FM3_hear", "dead"])
-def test_who_does_not_hear_gets_no_command(mode: str) -> None:
-    world = world_with(Fault(mode, (1, 3)))
-    policy = Everywhere()
-    policy.reset(4, 0)
-    commands = decide(policy, world.observe(), world.state)
-    np.testing.assert_array_equal(commands[[1, 3]], 0.0)
-    np.testing.assert_array_equal(commands[[0, 2]], [policy.command] * 2)
-
-
-@pytest.mark.parametrize("mode", ["FM1", "FM2", "FM3_send", "FM4", "motor_dead"])
-def test_who_hears_does(mode: str) -> None:
-    world = world_with(Fault(mode, (1, 3)))
-    policy = Everywhere()
-    policy.reset(4, 0)
-    commands = decide(policy, world.observe(), world.state)
-    np.testing.assert_array_equal(commands, [policy.command] * 4)
-
-
-def test_robots_that_decide_for_themselves_go_on() -> None:
-    world = world_with(Fault("FM3", 4))
-    policy = OnBoard()
-    policy.reset(4, 0)
-    commands = decide(policy, world.observe(), world.state)
-    np.testing.assert_array_equal(commands, [policy.command] * 4)
+@pytest.mark.parametrize(
+    ("mode", "policy", "arrives"),
+    [
+        *((mode, Everywhere, False) for mode in ("FM3", "FM3_hear", "dead")),
+        *((mode, Everywhere, True) for mode in ("FM1", "FM2", "FM3_send", "FM4", "motor_dead")),
+        ("FM3", OnBoard, True),
+    ],
+)
+def test_only_who_hears_gets_the_command_of_others(
+    mode: str, policy: type[Everywhere], arrives: bool
+) -> None:
+    world, sender = world_with(Fault(mode, (1, 3))), policy()
+    sender.reset(4, 0)
+    commands = decide(sender, world.observe(), world.state)
+    np.testing.assert_array_equal(commands[[0, 2]], [sender.command] * 2)
+    np.testing.assert_array_equal(commands[[1, 3]], [np.multiply(sender.command, arrives)] * 2)
 
 
 def test_it_stands_still_from_then_on_and_keeps_what_it_carries() -> None:

@@ -13,6 +13,7 @@ from swarm_logistics_env.spi.bootstrap import (
     resampled_pivots,
     upper_p,
 )
+from swarm_logistics_env.spi.ratio import paired_ratio
 
 rng = np.random.default_rng(2)
 P_O = rng.poisson(39, 12).astype(float)
@@ -35,12 +36,6 @@ def test_pivots_are_students_statistic_of_resampled_seeds() -> None:
     by_hand = np.sqrt(12) * again.mean(axis=1) / again.std(axis=1, ddof=1)
     for share in (0.025, 0.25, 0.5, 0.75, 0.975):
         assert np.quantile(pivots, share) == pytest.approx(np.quantile(by_hand, share), abs=0.12)
-
-
-def test_many_studies_at_once_are_the_studies_one_by_one() -> None:
-    together = resampled_pivots(np.stack([RESIDUAL, RESIDUAL**3]))
-    assert together.shape == (RESAMPLES, 2)
-    assert together[:, 1] == pytest.approx(resampled_pivots(RESIDUAL**3))
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.0005, 0.3])
@@ -72,3 +67,11 @@ def test_from_ten_seeds_on_the_larger_p_counts() -> None:
     nine = spi.robustness(p_o[:9], lucky[:9], n=25, m=2, threshold=-0.6)
     assert nine.p_value == pytest.approx(ttest_1samp(difference[:9], 0.0).pvalue)
     assert "assumes_normal" in nine.flags
+
+
+def test_the_two_sides_mirror_each_other() -> None:
+    skewed = P_O * 0.9 - 4.0 + np.geomspace(0.1, 12.0, 12) - P_O
+    one, other = (paired_ratio(side * skewed, P_O, threshold=side * -0.05) for side in (1, -1))
+    assert one.p_value == other.p_value
+    assert float(one.low) == pytest.approx(-float(other.high))
+    assert float(one.high) == pytest.approx(-float(other.low))

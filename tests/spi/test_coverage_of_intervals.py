@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -68,7 +67,7 @@ def test_below_ten_seeds_the_interval_of_normal_differences_covers_95_percent(dr
 @pytest.mark.parametrize("n", [10, 20])
 @pytest.mark.parametrize("draw", [binomial, overdispersed])
 def test_from_ten_seeds_on_the_interval_covers_at_least_95_percent(draw: Draw, n: int) -> None:
-    covered, above, below = simulated(draw, n, TRUE_R, 4_000)
+    covered, above, below = simulated(draw, n, TRUE_R, 1_500)
     assert 0.945 <= covered <= 0.975
     # A statistic may equal a pivot up to rounding.
     assert above + below == pytest.approx(1 - covered, abs=1e-3)
@@ -80,26 +79,10 @@ def test_from_ten_seeds_on_the_interval_covers_at_least_95_percent(draw: Draw, n
     [(poisson, TRUE_R), (overdispersed, TRUE_R), (stopped_at_random, 10 / P_O - 1 + M_OVER_N)],
 )
 def test_wrong_verdicts_are_bounded_on_either_side(
-    draw: Draw, truth: float, n: int, most: float, capsys: pytest.CaptureFixture[str]
+    draw: Draw, truth: float, n: int, most: float
 ) -> None:
-    _, above, below = simulated(draw, n, truth, 4_000)
-    with capsys.disabled():
-        sys.stdout.write(
-            f"\n  {draw.__name__}, n = {n}: wrong above {above:.3f}, below {below:.3f}\n"
-        )
+    _, above, below = simulated(draw, n, truth, 1_500)
     assert max(above, below) <= most
-
-
-def test_the_percentile_bootstrap_is_why_it_is_no_default() -> None:
-    n, studies, resamples = 5, 2_000, 400
-    rng = np.random.default_rng(0)
-    p_o, p_f = overdispersed(rng, (studies, n))
-    drawn = rng.integers(n, size=(resamples, studies, n))
-    rows = np.arange(studies)[:, np.newaxis]
-    ratios = p_f[rows, drawn].mean(axis=2) / p_o[rows, drawn].mean(axis=2) - 1 + M_OVER_N
-    low, high = np.quantile(ratios, [0.025, 0.975], axis=0)
-    percentile = float(((low <= TRUE_R) & (high >= TRUE_R)).mean())
-    assert 0.78 < percentile < 0.88
 
 
 def test_the_unpaired_interval_covers_independent_samples_of_unequal_size() -> None:

@@ -8,6 +8,7 @@ from swarm_logistics_env.spi import IndicatorError
 P_O = [40.0, 38, 41, 39, 42]
 ROBUST = spi.robustness(P_O, [40.0, 39, 41, 38, 42], n=25, m=2)
 BROKEN = spi.robustness(P_O, [12.0, 15, 10, 11, 14], n=25, m=2)
+SAME = spi.robustness(P_O, P_O, n=25, m=1, identical=True)
 UNCLEAR = spi.robustness(P_O, [45.0, 20, 38, 50, 30], n=25, m=2)
 
 
@@ -20,6 +21,7 @@ UNCLEAR = spi.robustness(P_O, [45.0, 20, 38, 50, 30], n=25, m=2)
         ({3: ROBUST, 1: ROBUST, 2: ROBUST}, 3, None),  # all supported: a lower bound
         ({1: ROBUST, 3: ROBUST}, 1, 2),  # untested in between
         ({2: ROBUST}, 0, 1),
+        ({1: SAME, 2: ROBUST, 3: BROKEN}, 2, 3),  # the same runs: exactly within it
     ],
 )
 def test_the_first_unsupported_number_ends_the_budget(
@@ -32,15 +34,9 @@ def test_the_first_unsupported_number_ends_the_budget(
 
 
 def test_bad_input_is_named() -> None:
-    with pytest.raises(IndicatorError, match="is empty"):
-        spi.fault_budget({})
-    with pytest.raises(IndicatorError, match="m = 0"):
-        spi.fault_budget({0: ROBUST})
     change = spi.relative_change(P_O, P_O)
-    with pytest.raises(IndicatorError, match="indicator at m = 1 is change"):
-        spi.fault_budget({1: change})
-
-
-def test_a_fault_that_changes_no_run_is_within_the_budget_exactly() -> None:
-    same = spi.robustness(P_O, P_O, n=25, m=1, identical=True)
-    assert spi.fault_budget({1: same, 2: ROBUST, 3: BROKEN}) == (2, 3)
+    for by_m, words in (
+        ({}, "is empty"), ({0: ROBUST}, "m = 0"), ({1: change}, "indicator at m = 1 is change")
+    ):  # fmt: skip
+        with pytest.raises(IndicatorError, match=words):
+            spi.fault_budget(by_m)

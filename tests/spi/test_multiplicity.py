@@ -58,14 +58,6 @@ def test_one_family_has_one_confidence() -> None:
     assert spi.adjust([]) == ()
 
 
-def test_holm_bounds_the_family_of_true_nulls() -> None:
-    rng = np.random.default_rng(5)
-    p = rng.uniform(size=(4_000, 12))
-    any_false = np.mean([(spi.holm(row) < 0.05).any() for row in p])
-    assert any_false == pytest.approx(0.05, abs=0.01)
-    assert np.mean((p < 0.05).any(axis=1)) > 0.4  # what the family would risk unadjusted
-
-
 def test_identical_runs_stand_outside_the_family() -> None:
     p_o = np.array([40.0, 38, 41, 39, 42])
     close = spi.robustness(p_o, p_o + np.array([0, 1, -1, 1, 0]), n=25, m=1)

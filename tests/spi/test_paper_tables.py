@@ -19,50 +19,40 @@ P_F = {
 }
 
 
-@pytest.mark.parametrize(
-    ("n", "larger", "expected"),
-    [
-        (5, 10, 1.000),
-        (10, 20, 0.611),
-        (20, 30, 0.276),
-        (30, 40, 1.091),
-        (40, 50, 0.978),
-        (50, 60, 0.804),
-        (60, 100, 0.208),
-        (100, 150, -0.135),
-    ],
-)
-def test_scalability_of_table_1(n: int, larger: int, expected: float) -> None:
-    s = spi.scalability([TABLE_I[n]], [TABLE_I[larger]], n=n, m=larger - n)
-    assert round(s.value, 3) == expected
+S = [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135]
+FT = {
+    "FM1": [0.051, 0.077, -0.026],
+    "FM2": [0.026, 0.154, -0.026],
+    "FM3": [0.026, 0.154, 0.103],
+    "FM4": [0.0, -0.513, -0.615],
+}
+R = {
+    "FM1": [0.091, 0.054, 0.017],
+    "FM2": [0.066, 0.131, 0.017],
+    "FM3": [0.066, 0.131, 0.146],
+    "FM4": [0.040, -0.535, -0.572],
+}
 
 
-@pytest.mark.parametrize(
-    ("mode", "expected"),
-    [
-        ("FM1", [0.051, 0.077, -0.026]),
-        ("FM2", [0.026, 0.154, -0.026]),
-        ("FM3", [0.026, 0.154, 0.103]),
-        ("FM4", [0.0, -0.513, -0.615]),
-    ],
-)
-def test_fault_tolerance_of_table_2(mode: str, expected: list[float]) -> None:
-    values = [spi.fault_tolerance([P_O], [P_F[mode][m]], [P_S[m]], n=25, m=m) for m in (1, 2, 3)]
-    assert [round(ft.value, 3) for ft in values] == expected
+def test_scalability_of_table_1() -> None:
+    found = [
+        spi.scalability([TABLE_I[n]], [TABLE_I[larger]], n=n, m=larger - n).value
+        for n, larger in pairwise(SIZES)
+    ]
+    assert [round(s, 3) for s in found] == S
+    # Claims follow from strict inequalities: S = 1 at 5 -> 10 is not superlinear.
+    assert [n for n, s in zip(SIZES, found) if s > 1] == [30]
 
 
-@pytest.mark.parametrize(
-    ("mode", "expected"),
-    [
-        ("FM1", [0.091, 0.054, 0.017]),
-        ("FM2", [0.066, 0.131, 0.017]),
-        ("FM3", [0.066, 0.131, 0.146]),
-        ("FM4", [0.040, -0.535, -0.572]),
-    ],
-)
-def test_robustness_of_table_2(mode: str, expected: list[float]) -> None:
-    values = [spi.robustness([P_O], [P_F[mode][m]], n=25, m=m) for m in (1, 2, 3)]
-    assert [round(r.value, 3) for r in values] == expected
+@pytest.mark.parametrize("mode", P_F)
+def test_fault_tolerance_and_robustness_of_table_2(mode: str) -> None:
+    faulty = P_F[mode].items()
+    ft = [spi.fault_tolerance([P_O], [p], [P_S[m]], n=25, m=m).value for m, p in faulty]
+    assert [round(value, 3) for value in ft] == FT[mode]
+    # FT = 0 of FM4 at m = 1 is not tolerant.
+    assert [value > 0 for value in ft] == [value > 0 for value in FT[mode]]
+    robust = [spi.robustness([P_O], [p], n=25, m=m).value for m, p in faulty]
+    assert [round(value, 3) for value in robust] == R[mode]
 
 
 @pytest.mark.parametrize(
@@ -81,26 +71,6 @@ def test_adaptability_of_table_3(
     x_o: float, x_new: float, p_o: int, p_new: int, expected: float
 ) -> None:
     assert round(spi.adaptability([p_o], [p_new], x_o=x_o, x_new=x_new).value, 3) == expected
-
-
-def test_claims_follow_from_strict_inequalities() -> None:
-    s = {
-        n: spi.scalability([TABLE_I[n]], [TABLE_I[larger]], n=n, m=larger - n).value
-        for n, larger in pairwise(SIZES)
-    }
-    assert [n for n, value in s.items() if value > 0] == SIZES[:-2]
-    assert [n for n, value in s.items() if value > 1] == [30]  # S = 1 at 5 -> 10 is not superlinear
-
-    def tolerant(mode: str) -> list[int]:
-        failures = P_F[mode].items()
-        return [m for m, p_f in failures if spi.fault_tolerance([P_O], [p_f], [P_S[m]]).value > 0]
-
-    assert {mode: tolerant(mode) for mode in P_F} == {
-        "FM1": [1, 2],
-        "FM2": [1, 2],
-        "FM3": [1, 2, 3],
-        "FM4": [],  # FT = 0 at m = 1 is not tolerant
-    }
 
 
 def test_the_ways_of_reading_widths_agree() -> None:

@@ -51,30 +51,6 @@ def test_welchs_test_at_the_limits_has_p_05(indicator: str) -> None:
         assert p == pytest.approx(0.05, rel=1e-6)
 
 
-def test_the_covariance_through_p_o_is_counted() -> None:
-    # s_nd = -gain var(P_o)/n_o in Fieller's quadratic, at large n where Welch's t is normal.
-    rng = np.random.default_rng(0)
-    p_o, p_f = rng.normal(40, 10, 4_000), rng.normal(30, 5, 5_000)
-    gain = 10 / 4
-    v_o, v_f = p_o.var(ddof=1) / p_o.size, p_f.var(ddof=1) / p_f.size
-    num, den = gain * (p_f.mean() - p_o.mean()), p_o.mean()
-    s_nn, s_nd, s_dd = gain**2 * (v_o + v_f), -gain * v_o, v_o
-    a, b, c = den**2 - 1.96**2 * s_dd, num * den - 1.96**2 * s_nd, num**2 - 1.96**2 * s_nn
-    s = spi.scalability(p_o, p_f, n=10, m=4, paired=False)
-    assert s.low == pytest.approx((b - math.sqrt(b * b - a * c)) / a, rel=1e-4)
-    assert s.high == pytest.approx((b + math.sqrt(b * b - a * c)) / a, rel=1e-4)
-
-
-def test_pairing_is_worth_its_seeds() -> None:
-    seeds = np.array([20.0, 35.0, 50.0, 65.0, 80.0])
-    p_f = 0.85 * seeds + [1.0, -1.0, 0.0, 1.0, -1.0]
-    paired = spi.robustness(seeds, p_f, n=25, m=2)
-    unpaired = spi.robustness(seeds, p_f, n=25, m=2, paired=False)
-    assert paired.value == unpaired.value
-    assert (paired.verdict, unpaired.verdict) == ("refuted", "inconclusive")
-    assert unpaired.pairing_correlation is None
-
-
 def test_a_single_run_in_any_sample_gives_the_value_only() -> None:
     r = spi.robustness([39.0], P_F, n=25, m=2, paired=False)
     assert r.flags == ("single_seed",)

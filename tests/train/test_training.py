@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
+from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions, PPOSettings
+from swarm_logistics_env.train.settings import PPOSettings
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -15,10 +15,6 @@ def test_every_preset_can_be(name: str) -> None:
     assert training.name == f"ppo-{name}"
     assert Training.from_json(training.to_json()) == training
     assert training.about
-
-
-def test_the_presets_that_are_promised_are_there() -> None:
-    assert {"delivery", "robust", "indicator"} <= set(preset_names())
 
 
 def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone() -> None:
@@ -81,6 +77,7 @@ def test_potentials_are_discounted_as_the_learner_discounts() -> None:
         ("seed = -1", "Training.seed = -1: should be greater than or equal to 0"),
         ("[network]\nhidden = [0]", "hidden"),
         ("seed =", "is not TOML"),
+        ("[[conditions]]\nscenario = { n_robots = [5] }", "swarm sizes belong in `worlds`"),
     ],
 )
 def test_what_cannot_be_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
@@ -95,8 +92,3 @@ def test_unknown_presets_and_files_are_refused(tmp_path: Path) -> None:
         load_training("deliver")
     with pytest.raises(TrainingError, match="cannot read the training"):
         load_training(str(tmp_path / "none.toml"))
-
-
-def test_sizes_are_no_condition() -> None:
-    with pytest.raises(SwarmLogisticsError, match="swarm sizes belong in `worlds`"):
-        Conditions(scenario={"n_robots": [5]})

@@ -12,7 +12,6 @@ from swarm_logistics_env import Scenario
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.train.training import (
     EpisodeMix,
@@ -51,11 +50,11 @@ def test_a_study_tells_the_performance_under_each_condition(tmp_path: Path) -> N
     }
     assert set(told) == expected
     (no_fault,) = {
-        cell.mean
-        for cell in rows_of(results.performance)
-        if cell.arm.condition.scenario == OWN
-        and not cell.arm.condition.faults
-        and not cell.arm.condition.behaviour
+        cell.mean.value
+        for cell in results.cells
+        if cell.arm.case.scenario == OWN
+        and not cell.arm.case.faults
+        and not cell.arm.case.behaviour
     }
     assert told[plain] == no_fault
 

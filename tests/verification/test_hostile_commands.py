@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env.cli import app
 
-COMMANDS = [["run"], ["scenario"], ["study", "plan"], ["study", "run"], ["study", "report"],
+COMMANDS = [["run"], ["list"], ["study", "plan"], ["study", "run"], ["study", "report"],
             ["study", "export"], ["study", "merge"], ["study", "compare"],
-            ["study", "power"], ["study"], []]  # fmt: skip
+            ["study"], []]  # fmt: skip
 WORDS = [
     "--seed", "--set", "--preset", "--policy", "--fault", "--out", "--seeds", "--processes",
-    "--engine", "--shard", "--to", "--json", "--fail-if", "--effect", "--power", "--at", "--help",
+    "--engine", "--shard", "--to", "--json", "--pilot", "scenario",
+    "faults", "--fail-if", "--effect", "--power", "--at", "--help",
     "--version", "0", "-1", "1.5", "nan", "1e400", "99999999999999999999", "", " ", "\n", "=", "x",
     "here", "nowhere/x", "mine.toml", "none.csv", "paper", "quick", "n_robots=0", "n_robots={}",
     "n_robots=[1", "duration=0.2", "duration=1e-300", "duration=null", "n_items=1e9", "local",
@@ -37,7 +38,7 @@ def test_any_command_line_runs_or_is_refused_in_one_sentence(source: random.Rand
     words = [source.choice(WORDS) for _ in range(source.randint(0, 5))]
     if command == ["run"]:
         words = [*CHEAP, *words]  # whatever else is asked, an episode stays short
-    elif command in (["study", "run"], ["study", "power"]):
+    elif command in (["study", "run"], ["study", "plan"]):
         words = [word for word in words if word not in ("paper", "quick")]
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:

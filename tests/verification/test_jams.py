@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from swarm_logistics_env import Scenario
-from verification.jams import SIZES, TARGETS, Overlaps, overlaps
+from verification.soak import SIZES, TARGETS, Overlaps, overlaps
 
 
 @pytest.mark.parametrize("target", TARGETS)

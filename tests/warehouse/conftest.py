@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.warehouse import layout
 
+Build = Callable[..., Warehouse]
+Command = tuple[float, float, float, float]
+
+STAY: Command = (0.0, 0.0, 0.0, 0.0)
+HOLD: Command = (0.0, 0.0, 0.0, 1.0)
+OPEN: Command = (0.0, 0.0, 0.0, -1.0)
+EAST: Command = (1.0, 0.0, 0.0, 0.0)  # to the delivery area
+WEST: Command = (-1.0, 0.0, 0.0, 0.0)
+FAR = (1.0, 9.0)  # out of everybody's reach
+INSIDE = 8.5  # x in the delivery area, which begins at 8 m
+SMALL = Scenario(n_robots=8, n_items=12, warehouse_width=5, warehouse_height=4)
+
+
+def steps(world: Warehouse, *commands: Command, times: int = 1) -> NDArray[np.float32]:
+    """Take `times` steps, each robot with its command; return the last observations."""
+    for _ in range(times):
+        rows = world.step(commands)
+    return rows
+
+
+def follow(world: Warehouse, script: Iterable[Sequence[Command]]) -> Warehouse:
+    """Take a step for each list of commands."""
+    for commands in script:
+        world.step(commands)
+    return world
+
 
 @pytest.fixture
-def build(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Warehouse]:
+def build(monkeypatch: pytest.MonkeyPatch) -> Build:
     """Return a maker of worlds that were just reset, with everything placed by hand.
 
     Items are requested in the order of their numbers. All robots look along +x and do not drift,
@@ -37,8 +63,7 @@ def build(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Warehouse]:
         monkeypatch.setattr(layout, "place_obstacles", lambda *_: solids.copy())
         monkeypatch.setattr(layout, "draw_order", lambda *_: None)  # in the order of their numbers
         counts = {"n_robots": n, "n_items": n_items, "n_obstacles": len(solids)}
-        scenario = Scenario(**{"heading_drift": 0.0, **counts, **fields})
-        world = Warehouse(scenario)
+        world = Warehouse(Scenario(**{"heading_drift": 0.0, **counts, **fields}))
         world.reset(0, faults)
         return world
 

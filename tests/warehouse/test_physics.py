@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Warehouse
-from swarm_logistics_env.warehouse.state import STORED
+from tests.warehouse.conftest import EAST, FAR, HOLD, OPEN, STAY, WEST, Build, steps
 
-Build = Callable[..., Warehouse]
-
-HOLD = (0.0, 0.0, 0.0, 1.0)
-STAY = (0.0, 0.0, 0.0, 0.0)
-EAST = (1.0, 0.0, 0.0, 0.0)
-WEST = (-1.0, 0.0, 0.0, 0.0)
-FAR = (1.0, 9.0)
 DIAMETER = 0.25
 SUSTAINED = 0.02  # [m], how far bodies may sink into each other under steady pressure
 CLOSING = 2 * 2.0 * 0.02  # [m], what two robots at top speed close in one physics step
@@ -42,11 +34,16 @@ def test_two_robots_that_meet_head_on_never_pass_through_each_other(
 ) -> None:
     # One physics step per control step, so that each is looked at.
     world = build([(4.0, 5.0), (4.0 + gap + 1.0, 5.0)], [FAR], control_period=0.02)
+    pushed = build([(2.0, 5.0), (3.0, 5.0)], [FAR], [Fault("dead", (1,))], control_period=0.02)
     for _ in range(100):
-        world.step([EAST, WEST])
+        steps(world, EAST, WEST)
         assert deepest_overlap(world) <= CLOSING
         assert world.state.robot_position[0, 0] < world.state.robot_position[1, 0]
+        steps(pushed, EAST, EAST)
+        assert deepest_overlap(pushed) <= CLOSING
     assert abs(deepest_overlap(world)) <= SUSTAINED
+    assert pushed.state.robot_position[1, 0] > max(pushed.state.robot_position[0, 0], 3.1)
+    assert world.state.robot_heading.tolist() == [0.0, 0.0]  # no collision turns a robot
 
 
 @pytest.mark.parametrize("way", [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1)])
@@ -60,8 +57,7 @@ def test_walls_stop_a_robot(build: Build, way: tuple[int, int]) -> None:
 
 def test_an_obstacle_stops_a_robot(build: Build) -> None:
     world = build([(2.0, 5.0)], [FAR], obstacles=[(4.0, 5.0)], obstacle_radius=0.3)
-    for _ in range(20):
-        world.step([EAST])
+    steps(world, EAST, times=20)
     assert world.state.robot_position[0, 0] == pytest.approx(4.0 - 0.3 - 0.125, abs=SUSTAINED)
     assert world.state.robot_contact[0]
 
@@ -74,33 +70,23 @@ def test_a_robot_speeds_up_to_its_top_speed_and_stops_again(
     needed = math.ceil(top / acceleration / 0.1 + 1e-9)
     before = 0.0
     for _ in range(needed):
-        world.step([EAST])
+        steps(world, EAST)
         now = world.state.robot_velocity[0, 0]
         assert now - before <= acceleration * 0.1 * 1.01
         before = now
     assert before == pytest.approx(top, rel=0.01)
     start = world.state.robot_position[0, 0]
-    world.step([EAST])
+    steps(world, EAST)
     assert world.state.robot_position[0, 0] - start == pytest.approx(top * 0.1, rel=0.01)
-    for _ in range(needed):
-        world.step([STAY])
+    steps(world, STAY, times=needed)
     assert world.state.robot_velocity[0, 0] == pytest.approx(0.0, abs=1e-3)
-
-
-def test_an_unladen_robot_drives_under_items(build: Build) -> None:
-    world, free = build([(2.0, 5.0)], [(3.0, 5.0)]), build([(2.0, 5.0)], [FAR])
-    for _ in range(10):
-        world.step([EAST])
-        free.step([EAST])
-    np.testing.assert_array_equal(world.state.robot_position, free.state.robot_position)
-    assert world.state.item_position[0].tolist() == [3.0, 5.0]
 
 
 def test_a_laden_robot_does_not_drive_through_an_item(build: Build) -> None:
     world = build([(2.0, 5.0)], [FAR, (2.0, 5.1), (3.0, 5.0)], pickup_range=0.15)
-    world.step([HOLD])
+    steps(world, HOLD)
     for _ in range(20):
-        world.step([EAST])
+        steps(world, EAST)
         away = np.linalg.norm(world.state.robot_position[0] - [3.0, 5.0])
         assert away >= DIAMETER - CLOSING / 2
     assert world.state.robot_item[0] == 1
@@ -113,7 +99,7 @@ def test_a_robot_that_lifts_above_other_items_is_not_pushed_off_them(build: Buil
     world = build([(2.0, 5.0)], [FAR, *above], pickup_range=0.15)
     alone = build([(2.0, 5.0)], [FAR, above[0]], pickup_range=0.15)
     for command in [HOLD, *[STAY] * 5, *[EAST] * 10]:
-        world.step([command])
+        steps(world, command)
         alone.step([command])
         np.testing.assert_array_equal(world.state.robot_position, alone.state.robot_position)
         assert not world.state.robot_contact[0]
@@ -123,13 +109,12 @@ def test_a_robot_that_lifts_above_other_items_is_not_pushed_off_them(build: Buil
 
 def test_an_item_that_a_robot_lifted_above_is_in_its_way_once_it_has_left(build: Build) -> None:
     world = build([(2.0, 5.0)], [FAR, (2.0, 5.1), (2.1, 5.0)], memory_size=0, pickup_range=0.1)
-    world.step([HOLD])
+    steps(world, HOLD)
     assert world.state.item_covered.tolist() == [0, 0, 1]
-    for _ in range(5):
-        world.step([WEST])
+    steps(world, WEST, times=5)
     assert world.state.item_covered.tolist() == [0, 0, 0]
     for _ in range(20):
-        world.step([EAST])
+        steps(world, EAST)
         assert world.state.robot_position[0, 0] <= 2.1 - DIAMETER + CLOSING / 2
     assert world.state.robot_contact[0]
 
@@ -138,15 +123,14 @@ def test_an_item_is_in_nobodys_way_while_any_laden_robot_stands_above_it(build: 
     # Robot 0 lifts above item 2, robot 1 drives onto it; when robot 0 has left it still is free.
     items = [FAR, (2.0, 5.1), (2.2, 5.0), (3.0, 5.1)]
     world = build([(2.0, 5.0), (3.0, 5.0)], items, pickup_range=0.15)
-    world.step([HOLD, HOLD])
+    steps(world, HOLD, HOLD)
     for commands in [[STAY, WEST]] * 6 + [[WEST, STAY]] * 8:
         world.step(commands)
     left, right = world.state.robot_position[:, 0]
     assert left < 2.2 - DIAMETER
     assert right < 2.2 + DIAMETER
     assert world.state.item_covered[2] == 1
-    for _ in range(8):
-        world.step([STAY, EAST])
+    steps(world, STAY, EAST, times=8)
     assert world.state.item_covered[2] == 0
 
 
@@ -154,15 +138,13 @@ def test_an_item_put_down_beneath_a_laden_robot_does_not_push_it(build: Build) -
     # Items are wider than robots here: what robot 0 puts down reaches below robot 1.
     items = [FAR, (2.0, 5.0), (2.3, 5.0)]
     world = build([(2.0, 5.0), (2.26, 5.0)], items, item_radius=0.2, pickup_range=0.1)
-    world.step([HOLD, HOLD])
-    world.step([(0.0, 0.0, 0.0, -1.0), STAY])
+    steps(world, HOLD, HOLD)
+    steps(world, OPEN, STAY)
     before = world.state.robot_position.copy()
-    for _ in range(5):
-        world.step([STAY, STAY])
+    steps(world, STAY, STAY, times=5)
     np.testing.assert_allclose(world.state.robot_position, before, atol=1e-3)
     assert world.state.item_covered[1] == 1
-    for _ in range(10):
-        world.step([STAY, EAST])
+    steps(world, STAY, EAST, times=10)
     assert world.state.item_covered[1] == 0
 
 
@@ -170,27 +152,14 @@ def test_an_item_is_in_the_way_where_it_was_put_down_and_nowhere_else(build: Bui
     # Robot 0 carries item 1 from x = 2 to 4 and leaves it; robot 1, laden, then comes along.
     items = [FAR, (2.0, 5.1), (1.0, 5.1)]
     world = build([(2.0, 5.0), (1.0, 5.0)], items, pickup_range=0.15)
-    world.step([HOLD, HOLD])
+    steps(world, HOLD, HOLD)
     while world.state.robot_position[0, 0] < 4.0:
-        world.step([EAST, STAY])
-    world.step([(0.0, 0.0, 0.0, -1.0), STAY])
+        steps(world, EAST, STAY)
+    steps(world, OPEN, STAY)
     left_at = world.state.item_position[1, 0]
-    for _ in range(5):
-        world.step([(0.0, 1.0, 0.0, 0.0), STAY])
-    for _ in range(30):
-        world.step([STAY, EAST])
+    steps(world, (0.0, 1.0, 0.0, 0.0), STAY, times=5)
+    steps(world, STAY, EAST, times=30)
     assert world.state.robot_position[1, 0] == pytest.approx(left_at - DIAMETER, abs=SUSTAINED)
-
-
-def test_after_putting_down_or_delivering_a_robot_drives_under_items_again(build: Build) -> None:
-    world = build([(7.0, 5.0)], [(7.0, 5.1), (5.0, 5.0)])
-    world.step([HOLD])
-    while world.state.delivered == 0:
-        world.step([EAST])
-    for _ in range(25):
-        world.step([WEST])
-    assert world.state.robot_position[0, 0] < 4.5
-    assert world.state.item_status[1] == STORED
 
 
 def test_a_removed_robot_is_in_nobodys_way(build: Build) -> None:
@@ -198,24 +167,9 @@ def test_a_removed_robot_is_in_nobodys_way(build: Build) -> None:
     world = build(robots, [FAR], [Fault("removed", (1,))])
     free = build(robots[:1], [FAR])
     for _ in range(10):
-        world.step([EAST, STAY])
+        steps(world, EAST, STAY)
         free.step([EAST])
     np.testing.assert_array_equal(world.state.robot_position[0], free.state.robot_position[0])
-
-
-def test_a_dead_robot_can_be_pushed_but_not_passed_through(build: Build) -> None:
-    world = build([(2.0, 5.0), (3.0, 5.0)], [FAR], [Fault("dead", (1,))])
-    for _ in range(15):
-        world.step([EAST, EAST])
-        assert deepest_overlap(world) <= CLOSING
-    assert world.state.robot_position[1, 0] > world.state.robot_position[0, 0]
-
-
-def test_collisions_do_not_turn_a_robot(build: Build) -> None:
-    world = build([(2.0, 5.0), (3.0, 5.1)], [FAR])
-    for _ in range(20):
-        world.step([EAST, WEST])
-    assert world.state.robot_heading.tolist() == [0.0, 0.0]
 
 
 def test_the_mirror_image_of_a_world_moves_as_its_mirror_image(build: Build) -> None:

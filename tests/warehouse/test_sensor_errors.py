@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,8 +8,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
 from swarm_logistics_env import observations as row
-
-Build = Callable[..., Warehouse]
+from tests.warehouse.conftest import Build
 
 BEAMS = slice(observations.RANGE_WALLS, observations.RANGE_ITEMS + observations.N_BEAMS)
 

@@ -43,10 +43,6 @@ def commands(step: int) -> NDArray[np.float64]:
 FIRSTS = [0, 2, 7, 8]
 
 
-def pool_of(made: list[Warehouse], n_helpers: int) -> WorldThreadPool:
-    return WorldThreadPool(made, FIRSTS, n_helpers)
-
-
 def step(
     pool: WorldThreadPool, made: list[Warehouse], given: NDArray[np.float64]
 ) -> NDArray[np.float32]:
@@ -68,17 +64,24 @@ def step(
     return rows
 
 
+def step_beside(
+    pool: WorldThreadPool, made: list[Warehouse], alone: list[Warehouse], numbers: range
+) -> None:
+    """Step worlds in a pool, and others alone, which should sense the same."""
+    for number in numbers:
+        given = commands(number)
+        rows = step(pool, made, given)
+        for world, first in zip(alone, FIRSTS):
+            own = slice(first, first + world.state.n_robots)
+            np.testing.assert_array_equal(rows[own], world.step(given[own]))
+
+
 @pytest.mark.parametrize("n_helpers", [0, 1, 3])
 def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
     together, apart = worlds(), worlds()
-    pool = pool_of(together, n_helpers)
+    pool = WorldThreadPool(together, FIRSTS, n_helpers)
     pool.is_watched[2] = 1
-    for number in range(120):
-        given = commands(number)
-        rows = step(pool, together, given)
-        for world, first in zip(apart, FIRSTS):
-            own = slice(first, first + world.state.n_robots)
-            np.testing.assert_array_equal(rows[own], world.step(given[own]))
+    step_beside(pool, together, apart, range(120))
     for mine, theirs in zip(together, apart):
         assert mine.state.delivery_times == theirs.state.delivery_times
         assert mine.state.anchoring_seconds == theirs.state.anchoring_seconds
@@ -89,7 +92,7 @@ def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
 def test_helpers_end_with_the_pool(is_closed: bool) -> None:
     before = set(threading.enumerate())
     made = worlds()
-    pool = pool_of(made, 2)
+    pool = WorldThreadPool(made, FIRSTS, 2)
     step(pool, made, commands(0))
     helpers = [t for t in set(threading.enumerate()) - before if t.name == "swarm-helper"]
     assert len(helpers) == 2
@@ -106,7 +109,7 @@ def test_helpers_end_with_the_pool(is_closed: bool) -> None:
 
 def test_all_worlds_are_taken_over_when_the_caller_fails_at_one() -> None:
     made = worlds()
-    pool = pool_of(made, 1)
+    pool = WorldThreadPool(made, FIRSTS, 1)
     pool.is_watched[:] = 1
     rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
 
@@ -123,7 +126,7 @@ def test_all_worlds_are_taken_over_when_the_caller_fails_at_one() -> None:
 
 def test_a_command_that_is_refused_is_raised_before_any_world_has_moved() -> None:
     made = worlds()
-    pool, given = pool_of(made, 1), commands(0)
+    pool, given = WorldThreadPool(made, FIRSTS, 1), commands(0)
     given[3, 1] = np.nan
     before = [world.state.robot_position.copy() for world in made]
     with pytest.raises(CommandError, match=r"commands\[3, 1\] = nan"):
@@ -138,7 +141,7 @@ def test_a_command_that_is_refused_is_raised_before_any_world_has_moved() -> Non
 
 def test_a_world_that_was_never_reset_is_refused() -> None:
     made = [Warehouse(Scenario(n_robots=2, **SMALL)), *worlds()[1:]]
-    pool = pool_of(made, 1)
+    pool = WorldThreadPool(made, FIRSTS, 1)
     with pytest.raises(SetupError, match="reset"):
         step(pool, made, commands(1))
     assert [world.state.step for world in made] == [0, 0, 0, 0]
@@ -152,7 +155,7 @@ def test_a_pool_goes_on_after_ctrl_c(
 ) -> None:
     original = getattr(thread_pool, kernel)
     made = worlds()
-    pool = pool_of(made, n_helpers)
+    pool = WorldThreadPool(made, FIRSTS, n_helpers)
     pool.is_watched[:] = 1
     step(pool, made, commands(0))
     for interrupted in range(3):
@@ -173,17 +176,10 @@ def test_a_pool_goes_on_after_ctrl_c(
             with contextlib.suppress(KeyboardInterrupt):
                 step(pool, made, commands(1))
         monkeypatch.setattr(thread_pool, kernel, original)
-        for seed, world in enumerate(made):
-            world.reset(seed)
         alone = worlds()
-        for seed, world in enumerate(alone):
-            world.reset(seed)
-        for number in range(10):
-            given = commands(number)
-            rows = step(pool, made, given)
-            for world, first in zip(alone, FIRSTS):
-                own = slice(first, first + world.state.n_robots)
-                np.testing.assert_array_equal(rows[own], world.step(given[own]))
+        for seed, world in enumerate([*made, *alone]):
+            world.reset(seed % len(made))
+        step_beside(pool, made, alone, range(10))
     pool.close()
 
 
@@ -200,7 +196,7 @@ def play_on(pool: WorldThreadPool, made: list[Warehouse], expected: NDArray[np.f
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_a_process_that_was_forked_has_threads_of_its_own() -> None:
     made, ahead = worlds(), worlds()
-    pool, alone = pool_of(made, 2), pool_of(ahead, 0)
+    pool, alone = WorldThreadPool(made, FIRSTS, 2), WorldThreadPool(ahead, FIRSTS, 0)
     step(pool, made, commands(0))
     step(alone, ahead, commands(0))
     expected = step(alone, ahead, commands(1))

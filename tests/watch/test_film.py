@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,19 +72,17 @@ def test_ends_when_everything_is_delivered() -> None:
 
 
 @pytest.mark.parametrize(
-    ("n_takes", "until", "speed", "rate", "size", "words"),
+    ("changed", "words"),
     [
-        (0, 5.0, 1.0, 10.0, 200, "0 runs: should be 1 to 4"),
-        (5, 5.0, 1.0, 10.0, 200, "5 runs"),
-        (1, 0.0, 1.0, 10.0, 200, "until = 0 s"),
-        (1, float("nan"), 1.0, 10.0, 200, "until = nan"),
-        (1, 5.0, 0.0, 10.0, 200, "speed = 0"),
-        (1, 5.0, 1.0, 100.0, 200, "frame rate = 100"),
-        (1, 5.0, 1.0, 10.0, 20, "size = 20"),
+        ({"takes": []}, "0 runs: should be 1 to 4"),
+        ({"takes": [take()] * 5}, "5 runs"),
+        ({"until": 0.0}, "until = 0 s"),
+        ({"until": float("nan")}, "until = nan"),
+        ({"speed": 0.0}, "speed = 0"),
+        ({"frame_rate": 100.0}, "frame rate = 100"),
+        ({"size": 20}, "size = 20"),
     ],
 )
-def test_wrong_arguments(
-    n_takes: int, until: float, speed: float, rate: float, size: int, words: str
-) -> None:
+def test_wrong_arguments(changed: dict[str, Any], words: str) -> None:
     with pytest.raises(SetupError, match=words):
-        Film([take()] * n_takes, until, speed, rate, size)
+        Film(**{"takes": [take()], "until": 5.0, "speed": 1.0, **changed})

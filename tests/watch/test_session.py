@@ -46,32 +46,27 @@ def test_without_faults_run_and_twin_are_the_same() -> None:
     assert not twin.failed.any()
 
 
-def test_speed_is_how_much_time_passes_in_a_second() -> None:
+def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -> None:
     session = Session(SMALL, speed=4.0)
     for _ in range(10):
         session.play(0.1)
     assert session.run.world.state.time == pytest.approx(4.0, abs=0.11)
     session.set_speed(0.25)
     assert session.play(0.1) == 0
-
-
-def test_paused_time_stands_still_and_a_step_is_one_period() -> None:
-    session = Session(SMALL)
-    session.pause()
-    session.play(5.0)
-    assert session.run.world.state.time == 0.0
-    session.step()
-    assert session.run.world.state.step == session.beside.world.state.step == 1
-    session.pause()
-    session.step()
-    assert session.paused
-
-
-def test_what_the_budget_does_not_allow_is_not_caught_up_with() -> None:
-    session = Session(SMALL, speed=64.0)
+    session.set_speed(64.0)
+    # What the budget does not allow is not caught up with.
     assert session.play(1.0, budget=0.0) == 1
     assert session.play(0.0, budget=0.0) <= 1
     assert session.play(0.0, budget=0.0) == 0
+    session.pause()
+    before = session.run.world.state.step
+    session.play(5.0)
+    assert session.run.world.state.step == before
+    session.step()
+    assert session.run.world.state.step == session.beside.world.state.step == before + 1
+    session.pause()
+    session.step()
+    assert session.paused
 
 
 @pytest.mark.parametrize("mode", FAILURE_MODES)
@@ -124,10 +119,6 @@ def test_breaking_twice_in_a_mode_is_once() -> None:
     assert modes() == []
     session.repair_robot(1)
     assert "sound" in session.note
-
-
-def test_without_a_selected_robot_it_says_what_to_do() -> None:
-    session = Session(SMALL)
     session.break_robot()
     assert session.note == "click a robot first"
     finish(session)
@@ -168,6 +159,7 @@ def test_delivery_width_changes_at_once_in_both() -> None:
 
 def test_next_seed_and_again() -> None:
     session = Session(SMALL)
+    assert session.choices[0] == "swarm-dt"
     start = session.run.world.state.robot_position.copy()
     session.play(1.0)
     session.break_robot(0)

@@ -13,9 +13,13 @@ import pytest
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.wrappers import (
+    DiscreteActions,
     FaultInjection,
     FixedAgents,
+    IndicatorReward,
+    MotionFrame,
     ParameterChange,
+    RunningMeans,
     SwarmSize,
     Wrapper,
 )
@@ -52,6 +56,11 @@ WRAPPED: dict[str, Callable[[Env], Env]] = {
     "fixed(changes(sizes(faults)))": lambda env: FixedAgents(
         with_changes(with_sizes(with_faults(env)))
     ),
+    "indicators(faults(sizes(changes)))": lambda env: IndicatorReward(
+        with_faults(with_sizes(with_changes(env))), {"R": 1.0, "P": 0.1}, references=RunningMeans()
+    ),
+    "numbers(sizes(faults))": lambda env: DiscreteActions(with_sizes(with_faults(env))),
+    "motion(sizes(faults))": lambda env: MotionFrame(with_sizes(with_faults(env))),
 }
 
 
@@ -83,6 +92,8 @@ def conformance(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
         warnings.filterwarnings("ignore", "reset option 'options' is ignored")
         # In a swarm smaller than the largest, not all possible agents end.
         warnings.filterwarnings("ignore", "No agents present but not all possible_agents")
+        # Inputs of the frame of motion have no bounds.
+        warnings.filterwarnings("ignore", "Agent's m.* observation space value is")
         # A robot that left observes zeros.
         warnings.filterwarnings("ignore", "Observation numpy array is all zeros")
         yield importlib.import_module("pettingzoo.test")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import doctest
+import importlib
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -10,14 +12,12 @@ import numpy as np
 import pytest
 from pettingzoo.utils.conversions import parallel_to_aec
 
+from swarm_logistics_env import wrappers
 from swarm_logistics_env.errors import SetupError
+from tests.wrappers.conftest import WRAPPED
 
-STACKS = [
-    "plain", "faults", "sizes", "changes", "changes(sizes(faults))", "faults(sizes(changes))",
-    "fixed(changes(sizes(faults)))",
-]  # fmt: skip
-each_stack = pytest.mark.parametrize("stack", STACKS)
-each_size = pytest.mark.parametrize("n_robots", [1, 5, 25])
+each_stack = pytest.mark.parametrize("stack", WRAPPED)
+each_size = pytest.mark.parametrize("n_robots", [1, 12])
 Make = Callable[..., Any]
 
 
@@ -28,23 +28,15 @@ def test_parallel_api(conformance: ModuleType, make: Make, stack: str, n_robots:
 
 
 @each_stack
-def test_parallel_api_after_the_cut(conformance: ModuleType, make: Make, stack: str) -> None:
-    env = make(stack)
-    conformance.parallel_api_test(env, num_cycles=20)
-    assert env.unwrapped.max_cycles == 20
-    assert env.warehouse.state.step == 20
-
-
-@each_stack
 def test_a_step_after_the_end_is_refused(make: Make, stack: str) -> None:
     env = make(stack, max_cycles=1)
     env.reset(seed=0)
     env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-    n_rows, columns = env.n_rows, env.action_space("robot_0").shape[0]
+    assert (env.unwrapped.max_cycles, env.warehouse.state.step) == (1, 1)
     with pytest.raises(SetupError, match="after the end of the episode: call reset"):
         env.step({})
     with pytest.raises(SetupError, match="after the end of the episode: call reset"):
-        env.step_arrays(np.zeros((n_rows, columns)))
+        env.step_arrays(np.zeros((env.n_rows, *env.action_space("robot_0").shape)))
 
 
 @each_size
@@ -67,7 +59,7 @@ def test_state(conformance: ModuleType, make: Make, stack: str, n_robots: int) -
     conformance.state_test(parallel_to_aec(env), env, num_cycles=20)
 
 
-@each_stack
+@pytest.mark.parametrize("stack", ["plain", "fixed(changes(sizes(faults)))"])
 def test_rendering(conformance: ModuleType, make: Make, stack: str) -> None:
     pytest.importorskip("pygame")
 
@@ -84,12 +76,13 @@ def test_observations_and_states_stay_in_their_spaces(
 ) -> None:
     env = make(stack, n_robots)
     space, state_space, largest = env.observation_space("robot_0"), env.state_space, 0
-    rng = np.random.default_rng(0)
+    for agent in env.possible_agents:
+        env.action_space(agent).seed(0)
     for seed in range(4):
         env.reset(seed=seed)
         largest = max(largest, len(env.agents))
         while env.agents:
-            actions = {agent: rng.uniform(-1, 1, 4) for agent in env.agents}
+            actions = {agent: env.action_space(agent).sample() for agent in env.agents}
             observations, rewards, *_ = env.step(actions)
             assert all(space.contains(row) for row in observations.values())
             assert all(np.isfinite(reward) for reward in rewards.values())
@@ -97,3 +90,13 @@ def test_observations_and_states_stay_in_their_spaces(
         assert env.warehouse.state.step == 40
     assert env.observation_space("robot_0") is space
     assert len(env.possible_agents) == largest
+
+
+MODULES = ("action_forms", "disturbances", "indicator_payments", "indicator_reward", "swarm_size")
+
+
+@pytest.mark.parametrize("name", [*MODULES, "wrapper"])
+def test_the_examples_of_docstrings_run(name: str) -> None:
+    ran = doctest.testmod(importlib.import_module(f"{wrappers.__name__}.{name}"))
+    assert ran.attempted
+    assert not ran.failed

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import doctest
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from gymnasium.spaces import Discrete
-from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.wrappers import (
     DiscreteActions,
-    FaultInjection,
-    FixedAgents,
-    SwarmSize,
-    action_forms,
 )
 from swarm_logistics_env.wrappers.action_forms import ACTIONS
 
@@ -57,34 +50,12 @@ def test_a_robot_fetches_an_item_by_numbers_alone() -> None:
     assert total == 1.0
 
 
-def test_turning_left_turns_a_robot_and_moves_nobody() -> None:
-    env = DiscreteActions(small(n_robots=2, heading_drift=0.0))
-    env.reset(seed=0)
-    state = env.warehouse.state
-    before, place = state.robot_heading.copy(), state.robot_position.copy()
-    env.step({"robot_0": NUMBERS["turn_left"], "robot_1": NUMBERS["stay"]})
-    turned = (state.robot_heading - before + np.pi) % (2 * np.pi) - np.pi
-    assert turned[0] > 0.0
-    assert turned[1] == 0.0
-    np.testing.assert_allclose(state.robot_position, place, atol=1e-9)
-
-
-@pytest.mark.parametrize("wrap", [DiscreteActions, lambda env: FixedAgents(DiscreteActions(env))])
-def test_pettingzoos_tests_pass(conformance: ModuleType, wrap: Any) -> None:
-    def make() -> Any:
-        sized = SwarmSize(small(), [2, 4], leave=[(1, 1.0)])
-        return wrap(FaultInjection(sized, "FM1", onset=[0.0, 1.0]))
-
-    conformance.parallel_api_test(make(), num_cycles=45)
-    conformance.api_test(parallel_to_aec(make()), num_cycles=45)
-    conformance.parallel_seed_test(make, num_cycles=20)
-
-
 def test_message_numbers_are_zeros() -> None:
     env = DiscreteActions(small(message_size=2))
     assert env.action_spaces["robot_3"] == Discrete(13)
     env.reset(seed=0)
     env.step(dict.fromkeys(env.agents, np.int64(3)))
+    assert not env.warehouse.state.robot_message.any()
 
 
 @pytest.mark.parametrize(
@@ -119,15 +90,13 @@ def test_numbers_of_numbers_and_central_control_by_numbers_are_refused() -> None
 
 
 def test_stable_baselines3_takes_numbers_for_every_row() -> None:
-    sb3 = pytest.importorskip("stable_baselines3")
+    pytest.importorskip("stable_baselines3")
     from swarm_logistics_env.adapters import SwarmVecEnv
 
     env = SwarmVecEnv(make_env=lambda _: DiscreteActions(small()), n_worlds=2, threads=2, seed=0)
     assert env.action_space == Discrete(13)
-    model = sb3.PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0)
-    assert model.learn(128).num_timesteps == 128
+    env.reset()
+    for _ in range(45):  # beyond the end of an episode
+        rows, *_ = env.step(np.arange(8))
+    assert np.isfinite(rows).all()
     env.close()
-
-
-def test_the_docstrings_example_holds() -> None:
-    assert doctest.testmod(action_forms).failed == 0

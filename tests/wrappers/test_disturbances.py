@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
+from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN
@@ -17,37 +17,6 @@ from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmS
 
 def small(**fields: Any) -> SwarmLogisticsEnv:
     return SwarmLogisticsEnv(n_robots=6, n_items=8, duration=60.0, **fields)
-
-
-@pytest.mark.parametrize("mode", ["FM1", "FM3", "motor_dead", "removed"])
-def test_until_the_onset_the_robots_behave_bit_for_bit_as_without_the_fault(mode: str) -> None:
-    scenario = Scenario(n_robots=10, n_items=30, duration=220.0, restock=True)
-    plain = SwarmLogisticsEnv(scenario)
-    faulty = FaultInjection(SwarmLogisticsEnv(scenario), mode, robots=4, onset=200.0)
-    steered = [policies.load("swarm-dt") for _ in range(2)]
-    for policy in steered:
-        policy.reset(10, 0)
-    rows = [env.reset_arrays(seed=0) for env in (plain, faulty)]
-    diverged = None
-    for step in range(1, 2200):
-        outcomes = [
-            env.step_arrays(policy.act(each))
-            for env, policy, each in zip((plain, faulty), steered, rows)
-        ]
-        rows = [outcome[0] for outcome in outcomes]
-        states = [env.warehouse.state for env in (plain, faulty)]
-        same = np.array_equal(states[0].robot_position, states[1].robot_position) and all(
-            np.array_equal(*pair) for pair in zip(*outcomes)
-        )
-        if step < 2000:
-            assert same, f"differs at {step / 10} s"
-            assert not states[1].failed.any()
-        elif step == 2000:
-            assert states[1].failed.sum() == 4
-        if not same and diverged is None:
-            diverged = step
-    assert diverged is not None
-    assert diverged >= 2000
 
 
 def test_it_does_what_the_same_fault_does_in_the_environment() -> None:
@@ -60,23 +29,7 @@ def test_it_does_what_the_same_fault_does_in_the_environment() -> None:
         for mine, theirs in zip(injected.step_arrays(commands), built_in.step_arrays(commands)):
             np.testing.assert_array_equal(mine, theirs)
     assert injected.failed_robots == built_in.warehouse.struck_robots
-
-
-def test_sets_are_nested_the_same_for_all_modes_and_recorded() -> None:
-    for seed in range(5):
-        before: set[int] = set()
-        for count in range(1, 6):
-            chosen = []
-            for mode in ("FM1", "FM4", "removed"):
-                env = FaultInjection(small(), mode, robots=count)
-                _, infos = env.reset(seed=seed)
-                chosen.append(env.failed_robots)
-                told = {int(agent[6:]) for agent, info in infos.items() if info["failed"]}
-                assert told == (set() if mode == "removed" else set(env.failed_robots))
-            assert len(set(chosen)) == 1
-            assert len(chosen[0]) == count
-            assert before < set(chosen[0])
-            before = set(chosen[0])
+    assert len(injected.failed_robots) == 2
 
 
 def test_listed_onsets_are_drawn_by_the_seed_and_all_occur() -> None:
@@ -88,6 +41,12 @@ def test_listed_onsets_are_drawn_by_the_seed_and_all_occur() -> None:
         env.reset(seed=seed)
         assert env.injected[0].onset == drawn[-1]
     assert set(drawn) == {1.0, 2.0, 30.0}
+    never = FaultInjection(small(), "FM1", onset=lambda rng: [])
+    never.reset(seed=0)
+    assert len(never.injected) == len(never.failed_robots) == 0
+    wrong = FaultInjection(small(), "FM1", onset=lambda rng: -3.0)
+    with pytest.raises(FaultError, match=r"Fault.onset = -3.0"):
+        wrong.reset(seed=0)
 
 
 def test_each_further_onset_takes_more_of_the_same_nested_order() -> None:
@@ -100,12 +59,6 @@ def test_each_further_onset_takes_more_of_the_same_nested_order() -> None:
         assert set().union(*groups[:count]) == first
         assert len(fault.robots) == 2  # type: ignore[arg-type]
     assert env.failed_robots == tuple(range(6))
-
-
-def test_a_distribution_may_give_no_onset_at_all() -> None:
-    env = FaultInjection(small(), "FM1", onset=lambda rng: [])
-    env.reset(seed=0)
-    assert len(env.injected) == len(env.failed_robots) == 0
 
 
 def test_named_robots_fail_anew_at_each_onset_and_not_twice_at_once() -> None:
@@ -178,12 +131,6 @@ def test_wrong_arguments_are_refused_at_once(
         FaultInjection(**{"env": small(), "mode": "FM1", **arguments})
 
 
-def test_what_a_distribution_gives_is_checked_at_the_reset() -> None:
-    env = FaultInjection(small(), "FM1", onset=lambda rng: -3.0)
-    with pytest.raises(FaultError, match=r"Fault.onset = -3.0"):
-        env.reset(seed=0)
-
-
 def test_a_swarm_too_small_for_the_fault_is_refused_in_either_order() -> None:
     with pytest.raises(FaultError, match="should be at most n_robots = 2"):
         FaultInjection(SwarmSize(small(), [2, 6]), "FM1", robots=3)
@@ -200,14 +147,6 @@ def test_options_of_the_wrong_type_are_refused(options: Any) -> None:
     for env in (small(), FaultInjection(small(), "FM1"), SwarmSize(small(), 6)):
         with pytest.raises(SwarmLogisticsError, match="options"):
             env.reset(options=options)
-
-
-def test_every_mode_can_be_injected() -> None:
-    for mode in FAILURE_MODES:
-        env = FaultInjection(small(), mode, onset=0.1)
-        env.reset(seed=0)
-        env.step_arrays(np.zeros((6, 4)))
-        assert env.warehouse.state.failure_modes[env.failed_robots[0]] == (mode,)
 
 
 # A value other than the default for each parameter that can change in mid-run.
@@ -249,11 +188,7 @@ def test_per_episode_it_is_the_scenario_with_the_drawn_value() -> None:
     assert seen == {5, 20}
 
 
-def test_other_for_every_parameter_that_can_change() -> None:
-    assert set(OTHER) == CHANGES_DURING_RUN
-
-
-@pytest.mark.parametrize("name", sorted(OTHER))
+@pytest.mark.parametrize("name", sorted(CHANGES_DURING_RUN))
 def test_in_mid_run_it_is_a_change_of_the_warehouse_at_that_time(name: str) -> None:
     wrapped = ParameterChange(changing(), name, OTHER[name], at=1.0)
     plain = changing()
@@ -278,6 +213,7 @@ def test_in_mid_run_it_is_a_change_of_the_warehouse_at_that_time(name: str) -> N
 def test_before_the_change_nothing_differs_and_a_change_to_the_same_is_none() -> None:
     plain, same = changing(), ParameterChange(changing(), "max_speed", 2.0, at=1.0)
     later = ParameterChange(changing(), "max_speed", 1.0, at=4.0)
+    later, speeds = ParameterChange(later, "max_speed", 1.5, at=5.0), []
     rng = np.random.default_rng(1)
     for env in (plain, same, later):
         env.reset_arrays(0)
@@ -286,6 +222,8 @@ def test_before_the_change_nothing_differs_and_a_change_to_the_same_is_none() ->
         rows, unchanged, changed = (env.step_arrays(commands)[0] for env in (plain, same, later))
         np.testing.assert_array_equal(rows, unchanged)
         assert np.array_equal(rows, changed) == (step < 40)
+        speeds.append(later.warehouse.scenario.max_speed)
+    assert speeds == [2.0] * 40 + [1.0] * 10 + [1.5] * 9
 
 
 def test_values_and_times_may_be_drawn_from_distributions() -> None:
@@ -315,17 +253,6 @@ def test_options_come_first_for_episodes_and_never_get_lost() -> None:
     assert env.env.value == 7
 
 
-def test_several_changes_stack() -> None:
-    env = ParameterChange(changing(), "max_speed", 1.0, at=1.0)
-    env = ParameterChange(env, "max_speed", 1.5, at=2.0)
-    env.reset(seed=0)
-    speeds = []
-    for _ in range(30):
-        env.step_arrays(np.zeros((6, 4)))
-        speeds.append(env.warehouse.scenario.max_speed)
-    assert speeds == [2.0] * 10 + [1.0] * 10 + [1.5] * 10
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "complaint"),
     [
@@ -342,6 +269,12 @@ def test_wrong_changes_are_refused_at_once(
 ) -> None:
     with pytest.raises(error, match=complaint):
         ParameterChange(changing(), *arguments)
+    for at in (-1.0, float("nan"), "soon", [1.0, -2.0]):
+        with pytest.raises(ScenarioError, match="should be a time of at least 0 s"):
+            ParameterChange(changing(), "max_speed", 1.0, at=at)
+    env = ParameterChange(changing(), "delivery_width", 5.0, at=1.0)
+    with pytest.raises(ScenarioError, match="leaves no storage"):  # before the run
+        env.reset(options={"scenario": {"warehouse_width": 4.0}})
 
 
 def test_what_cannot_change_in_mid_run_says_that_it_can_per_episode() -> None:
@@ -355,12 +288,6 @@ def test_what_cannot_change_in_mid_run_says_that_it_can_per_episode() -> None:
         assert getattr(env.warehouse.scenario, name) == value
 
 
-@pytest.mark.parametrize("at", [-1.0, float("nan"), "soon", [1.0, -2.0]])
-def test_times_that_cannot_be_are_refused(at: Any) -> None:
-    with pytest.raises(ScenarioError, match="should be a time of at least 0 s"):
-        ParameterChange(changing(), "max_speed", 1.0, at=at)
-
-
 def test_values_that_cannot_go_together_are_refused_in_either_order() -> None:
     with pytest.raises(ScenarioError, match="do not fit"):
         SwarmSize(ParameterChange(changing(), "warehouse_width", [3.0, 10.0]), [5, 150])
@@ -369,17 +296,3 @@ def test_values_that_cannot_go_together_are_refused_in_either_order() -> None:
     # But not what no episode is played in: 150 robots would not fit into the environment's own.
     narrow = changing(warehouse_width=3.0)
     SwarmSize(ParameterChange(narrow, "warehouse_width", 10.0), [5, 150]).reset(seed=0)
-
-
-def test_a_change_that_an_option_makes_impossible_is_refused_before_the_run() -> None:
-    env = ParameterChange(changing(), "delivery_width", 5.0, at=1.0)
-    with pytest.raises(ScenarioError, match="leaves no storage"):
-        env.reset(options={"scenario": {"warehouse_width": 4.0}})
-
-
-def test_it_keeps_the_faults_of_the_wrappers_around_it() -> None:
-    env = ParameterChange(FaultInjection(changing(), "FM1", (2,)), "max_speed", 1.0, at=1.0)
-    env.reset_arrays(0)
-    for _ in range(15):
-        env.step_arrays(np.zeros((6, 4)))
-    assert env.warehouse.state.failure_modes[2] == ("FM1",)

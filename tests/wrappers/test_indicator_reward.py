@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import copy
-import doctest
 import itertools
 from collections.abc import Callable
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_logistics_env import Fault, spi
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
@@ -23,9 +20,6 @@ from swarm_logistics_env.wrappers import (
     ParameterChange,
     RunningMeans,
     SwarmSize,
-    indicator_payments,
-    indicator_reward,
-    wrapper,
 )
 
 N = 4
@@ -166,17 +160,12 @@ def test_the_order_of_wrappers_does_not_matter(order: tuple[str, ...]) -> None:
 
 
 def test_a_change_in_mid_run_makes_the_return_the_adaptability() -> None:
-    env = ParameterChange(busy(), "delivery_width", 1.5, at=6.0)
-    for stack in (
-        IndicatorReward(env, "A", references=33.0),
-        ParameterChange(
-            IndicatorReward(busy(), "A", references=33.0), "delivery_width", 1.5, at=6.0
-        ),
-    ):
-        rewards, _ = play(stack, 0)
-        value = spi.adaptability([33], [delivered(stack)], x_o=2.0, x_new=1.5).value
-        assert rewards.sum(axis=0) == pytest.approx(value, **CLOSE)
-        assert not rewards[:59].any()
+    env = IndicatorReward(busy(), "A", references=33.0)
+    stack = ParameterChange(env, "delivery_width", 1.5, at=6.0)
+    rewards, _ = play(stack, 0)
+    value = spi.adaptability([33], [delivered(stack)], x_o=2.0, x_new=1.5).value
+    assert rewards.sum(axis=0) == pytest.approx(value, **CLOSE)
+    assert not rewards[:59].any()
 
 
 def test_running_means_are_those_of_the_episodes_that_ended() -> None:
@@ -361,6 +350,9 @@ def test_absent_robots_get_nothing() -> None:
     assert env.condition == Condition(N, ("FM2",), n_failed=1, n_removed=1)
 
 
+SLOWED = ParameterChange(busy(), "max_speed", 1.0)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -377,15 +369,9 @@ def test_absent_robots_get_nothing() -> None:
         ({"env": SwarmSize(busy(), [2, 6]), "weights": "S"}, "S from N = 4 to 2"),
         ({"env": ParameterChange(busy(), "n_obstacles", 1), "weights": "A"}, "n_obstacles from 0"),
         ({"env": ParameterChange(busy(), "restock", False), "weights": "A"}, "that is a number"),
+        ({"env": ParameterChange(SLOWED, "n_items", 9), "weights": "A"}, "in max_speed, n_items"),
         (
-            {
-                "env": ParameterChange(ParameterChange(busy(), "n_items", 9), "max_speed", 1.0),
-                "weights": "A",
-            },
-            "A of changes in max_speed, n_items",
-        ),
-        (
-            {"env": ParameterChange(busy(), "max_speed", 1.0), "weights": "A", "references": {}},
+            {"env": SLOWED, "weights": "A", "references": {}},
             r"performance of Condition\(n_robots=4",
         ),
     ],
@@ -424,20 +410,3 @@ def test_a_copy_goes_on_as_the_original() -> None:
         if not env.agents:
             np.testing.assert_array_equal(env.reset_arrays(), other.reset_arrays())
     assert env.measured.conditions == other.measured.conditions
-
-
-def test_pettingzoos_own_tests_pass(conformance: ModuleType, make: Callable[..., Any]) -> None:
-    def rewarded() -> Any:
-        env = make("faults(sizes(changes))", 5)
-        return IndicatorReward(env, {"R": 1.0, "P": 0.1}, references=RunningMeans())
-
-    conformance.parallel_api_test(rewarded(), num_cycles=45)
-    conformance.parallel_seed_test(rewarded, num_cycles=20)
-    conformance.api_test(parallel_to_aec(rewarded()), num_cycles=25)
-
-
-@pytest.mark.parametrize("module", [wrapper, indicator_reward, indicator_payments])
-def test_the_examples_run(module: ModuleType) -> None:
-    ran = doctest.testmod(module)
-    assert ran.attempted
-    assert not ran.failed

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,6 @@ from swarm_logistics_env.wrappers import (
     FixedAgents,
     MotionFrame,
     SwarmSize,
-    action_forms,
 )
 
 
@@ -79,16 +77,6 @@ def stacked(world: int = 0) -> FixedAgents:
     return FixedAgents(MotionFrame(SwarmSize(FaultInjection(small(), "FM1", 1), [2, 4])))
 
 
-def test_it_stacks_with_the_other_wrappers() -> None:
-    fixed = stacked()
-    observations, _ = fixed.reset(seed=0)
-    while fixed.agents:
-        spaces = fixed.observation_spaces
-        assert all(spaces[agent].contains(observations[agent]) for agent in fixed.agents)
-        actions = {agent: fixed.action_space(agent).sample() for agent in fixed.agents}
-        observations, *_ = fixed.step(actions)
-
-
 def test_it_stacks_in_a_vector_environment() -> None:
     pytest.importorskip("stable_baselines3")
     from swarm_logistics_env.adapters import SwarmVecEnv
@@ -98,9 +86,3 @@ def test_it_stacks_in_a_vector_environment() -> None:
     for _ in range(25):  # beyond the end of an episode
         rows, *_ = env.step(np.full((12, 3), 0.3))
     assert np.isfinite(rows).all()
-
-
-def test_the_example_runs() -> None:
-    ran = doctest.testmod(action_forms)
-    assert ran.attempted
-    assert not ran.failed

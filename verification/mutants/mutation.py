@@ -5,11 +5,8 @@ from __future__ import annotations
 import ast
 import shutil
 import tomllib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = "swarm_logistics_env"
@@ -63,15 +60,6 @@ def read_mutants() -> tuple[Mutant, ...]:
             rest = {"interpreted": interpreted, "room": path.stem, **told}
             found.append(Mutant(name, file, where, node, tests=chosen, **rest))
     return tuple(found)
-
-
-@contextmanager
-def scratch_copy() -> Iterator[Path]:
-    """Yield a copy of the repository that is gone afterwards."""
-    with TemporaryDirectory(prefix="mutants-") as folder:
-        copy = Path(folder) / "copy"
-        shutil.copytree(ROOT, copy, symlinks=True, ignore=LEFT_OUT)
-        yield copy
 
 
 def mutated(mutant: Mutant, source: str) -> str:

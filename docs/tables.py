@@ -1,16 +1,45 @@
-"""Markdown tables, those of a record's fields among them, for the pages that are generated."""
+"""Blocks of a page between markers, and Markdown tables to put there."""
 
 from __future__ import annotations
 
 import inspect
 import json
 import re
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 from pydantic_core import PydanticUndefined
 
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
+
+BLOCK = "<!-- tables: {name} -->"
+END = "<!-- end of tables -->"
+
+
+def block_of(text: str, name: str) -> str:
+    """Return what stands between the markers of a block.
+
+    Raises:
+        SystemExit: the page has no such block.
+    """
+    _, found, rest = text.partition(BLOCK.format(name=name))
+    block, ended, _ = rest.partition(END)
+    if not (found and ended):
+        raise SystemExit(f"the page has no {BLOCK.format(name=name)} followed by {END}")
+    return block.strip()
+
+
+def rewritten(text: str, blocks: Mapping[str, str]) -> str:
+    """Return a page with other text between the markers of each block.
+
+    Raises:
+        SystemExit: a block has no pair of markers.
+    """
+    for name, block in blocks.items():
+        block_of(text, name)  # it is there
+        before, start, rest = text.partition(BLOCK.format(name=name))
+        text = f"{before}{start}\n\n{block}\n\n{END}{rest.partition(END)[2]}"
+    return text
 
 
 def fields(record: type[Record], leave_out: Container[str] = ()) -> str:

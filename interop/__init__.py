@@ -1,1 +1,0 @@
-"""Third parties' code, unchanged, on this environment: see README.md here."""
