@@ -101,7 +101,7 @@ def slug(*parts: object) -> str:
 
 def digits_of(p: float) -> int:
     """Return how many digits after the point tell a performance: three in all where it is small."""
-    return 1 if p >= 1 or p <= 0 else 2 - math.floor(math.log10(p))
+    return 1 if not 0 < p < 1 else 2 - math.floor(math.log10(p))
 
 
 def fixed(value: float, digits: int) -> str:
