@@ -1,4 +1,4 @@
-"""The report as files: what it holds, from outcomes that are made up, so that the answer is known."""
+"""The report as files: what it holds, from outcomes that are made up."""
 
 from __future__ import annotations
 

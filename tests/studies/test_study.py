@@ -1,4 +1,4 @@
-"""A study from end to end: failures are kept, a killed study goes on, declared seeds are guarded."""
+"""A study from end to end: failures are kept, a killed one goes on, declared seeds are guarded."""
 
 from __future__ import annotations
 
