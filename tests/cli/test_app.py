@@ -11,8 +11,11 @@ import typer
 import swarm_logistics_env
 from swarm_logistics_env import SCENARIO_PRESETS, Scenario, policies
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.cli.terminal_tables import show
 from swarm_logistics_env.studies.presets import PRESETS
+from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.train import preset_names
+from swarm_logistics_env.warehouse import FAILURE_MODES
 
 SMALL = [
     *("--set", "n_robots=3"),
@@ -47,10 +50,25 @@ SMALL = [
         (["run", "--fault", "FM4:2:carier@9"], "did you mean 'carrier'?"),
         (["run", "--fault", "FM1:99"], "at most n_robots = 25"),
         (["run", "--fault", "FM1:2@500"], "should begin before the episode ends at 500 s"),
-        (["film", "x.gif", "--fault", "FM1@900"], "should begin before the episode ends"),
+        (["run", "--film", "x.gif", "--fault", "FM1@900"], "should begin before the episode ends"),
+        (["run", "--film", "film.avi"], "should end in .mp4 or .gif"),
+        (["run", "--film", "nowhere/film.mp4"], "a folder that can be written to"),
+        (["run", "--film", "film.mp4", "--twin"], "--fault should be given"),
+        (["run", "--film", "film.mp4", "--speed", "0"], "speed = 0"),
+        (
+            ["run", "--film", "x.mp4", *["--policy", "homing"] * 3, "--fault", "FM1", "--twin"],
+            "1 to 4",
+        ),
+        (["run", "--twin"], "are for a film, with --film"),
+        (["run", "--policy", "homing", "--policy", "swarm-dt"], "several --policy: are for a film"),
+        (["watch", "--policy", "swarm-td"], "did you mean 'swarm-dt'?"),
+        (["watch", "--fault", "FM1:99"], "at most n_robots = 25"),
+        (["watch", "--speed", "3"], "speed = 3: should be one of"),
+        (["watch", "--port", "99999"], "--port"),
+        (["watch", "--until", "5"], "--until 5: should be above 0 s, together with --save"),
         (["watch", "--save", "nowhere/x.html"], "should be a file in a folder that can be"),
         (["attack", "swarm-td"], "did you mean 'swarm-dt'?"),
-        (["scenario", "--set", "delivery_width=10"], "leaves no storage"),
+        (["list", "scenario", "--set", "delivery_width=10"], "leaves no storage"),
         (["study", "run", "papr", "--out", "x"], "did you mean 'paper'?"),
         (["study", "run", "none.toml", "--out", "x"], "cannot read the study file none.toml"),
         (["study", "run", "quick", "--out", "x", "--shard", "0/2"], "i/n with i from 1 to n"),
@@ -58,7 +76,7 @@ SMALL = [
         (["study", "merge", "nowhere", "--out", "x"], "no study in nowhere"),
         (["study", "compare", "nowhere", "nowhere", "--fail-if", "R"], "should be [possibly]"),
         (["study", "compare", "nowhere", "nowhere"], "no study in nowhere"),
-        (["study", "power", "quik"], "did you mean 'quick'?"),
+        (["list", "robots"], "'robots' is not one of"),
         (["study", "plan", "quik"], "did you mean 'quick'?"),
         (["study", "plan", "quick", "--policy", "nobody"], "'nobody'"),
         (["study", "report", "nowhere"], "no study in nowhere"),
@@ -91,7 +109,7 @@ def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(Scenario, "conditions", broken)
     with pytest.raises(ZeroDivisionError):
-        app.run(["scenario"])
+        app.run(["list", "scenario"])
 
 
 def command_lines(command: Any, *names: str) -> Iterator[tuple[list[str], Any]]:
@@ -110,7 +128,7 @@ def test_a_help_page_shows_each_help_text_in_full(
     monkeypatch.setenv("COLUMNS", "400")
     assert app.run(arguments) == 0
     page = " ".join(capsys.readouterr().out.split())
-    for text in [command.help, *(parameter.help for parameter in command.params)]:
+    for text in [command.help, *(getattr(one, "help", "") for one in command.params)]:
         assert " ".join((text or "").split()) in page
 
 
@@ -186,7 +204,7 @@ def test_a_file_without_a_class_is_told_its_classes(
 
 
 def test_policies_lists_every_name_that_load_knows(capsys: pytest.CaptureFixture[str]) -> None:
-    assert app.run(["policies"]) == 0
+    assert app.run(["list", "policies"]) == 0
     printed = capsys.readouterr().out
     for name in policies.NAMES:
         (row,) = [line for line in printed.splitlines() if line.startswith(f"| {name} |")]
@@ -199,9 +217,8 @@ def test_help_names_every_preset(
     monkeypatch.setenv("COLUMNS", "400")
     for command, names in (
         (["run"], SCENARIO_PRESETS),
-        (["scenario"], SCENARIO_PRESETS),
+        (["list"], SCENARIO_PRESETS),
         (["study", "run"], PRESETS),
-        (["study", "plan"], PRESETS),
         (["train"], preset_names()),
     ):
         assert app.run([*command, "--help"]) == 0
@@ -214,7 +231,7 @@ def test_a_scenario_is_read_from_a_file_wherever_fields_are_set(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert app.run(["scenario", *SMALL, "--json"]) == 0
+    assert app.run(["list", "scenario", *SMALL, "--json"]) == 0
     Path("small.json").write_text(capsys.readouterr().out)
     assert app.run(["run", *SMALL]) == 0
     expected = capsys.readouterr().out.splitlines()[:-1]
@@ -223,7 +240,7 @@ def test_a_scenario_is_read_from_a_file_wherever_fields_are_set(
     # --set has the last word, and the file goes before --preset.
     Path("dots.toml").write_text("preset = 'dots'\nn_robots = 7\nn_items = 9\n")
     given = ["--preset", "realistic", "--scenario", "dots.toml", "--set", "n_items=8"]
-    assert app.run(["scenario", "--json", *given]) == 0
+    assert app.run(["list", "scenario", "--json", *given]) == 0
     wanted = Scenario.preset("dots").replace(n_robots=7, n_items=8)
     assert Scenario.from_json(capsys.readouterr().out) == wanted
     for text, words in (("n_robots = [", "is not TOML"), ("robots = 7", "'n_robots'?")):
@@ -236,13 +253,19 @@ def test_a_scenario_is_read_from_a_file_wherever_fields_are_set(
         assert ("--scenario" in options) == ("--set" in options), name
 
 
-def test_scenario_sheet_and_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert app.run(["scenario", "--set", "n_robots=40"]) == 0
+def test_scenario_sheet_json_faults_and_studies(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["list", "scenario", "--set", "n_robots=40"]) == 0
     printed = capsys.readouterr().out
     assert "| n_robots | 40 (default 25) |" in printed
     assert "https://arxiv.org/abs/2311.01944" in printed  # whose defaults these are
-    assert app.run(["scenario", "--preset", "paper_scalability", "--json"]) == 0
+    preset = ["list", "scenario", "--preset", "paper_scalability", "--json"]
+    assert app.run(preset) == 0
     assert Scenario.from_json(capsys.readouterr().out) == Scenario.preset("paper_scalability")
+    for what, names in (("faults", FAILURE_MODES), ("studies", PRESETS)):
+        assert app.run(["list", what]) == 0
+        printed = capsys.readouterr().out
+        assert all(f"| {name} | " in printed for name in names)
+    assert "| paper | 20 | 680 | Table I: scalability; " in printed
 
 
 def test_run_prints_what_the_episode_gave(capsys: pytest.CaptureFixture[str]) -> None:
@@ -274,16 +297,24 @@ def test_policy_of_ones_own_is_found_where_the_command_is_run(
     assert "P = 0 items" in capsys.readouterr().out
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert app.run(["--version"]) == 0
-    assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__
-
-
-def test_a_run_names_the_number_of_items_only_where_they_do_not_come_back(
+def test_version_and_the_number_of_items_only_where_they_do_not_come_back(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    short = ["run", "--set", "duration=5"]
-    assert app.run(short) == 0
-    assert "items delivered of 60 in 5 s" in capsys.readouterr().out
-    assert app.run([*short, "--set", "restock=true"]) == 0
-    assert "items delivered in 5 s" in capsys.readouterr().out
+    assert app.run(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__
+    for restock, words in (("false", "delivered of 4 in 20 s"), ("true", "delivered in 20 s")):
+        assert app.run(["run", *SMALL, "--set", f"restock={restock}"]) == 0
+        assert f" items {words}" in capsys.readouterr().out
+
+
+def test_no_number_is_cut_at_a_narrow_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes the output for a terminal
+    monkeypatch.setenv("COLUMNS", "30")
+    value = "123.4567[122.1234,125.9876]"
+    show(Section("P", ("policy", "P", "R"), (("swarm-dt-follow", value, value),)))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    for digits in "123456789":
+        assert printed.count(digits) >= 2 * value.count(digits)

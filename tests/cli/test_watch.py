@@ -15,27 +15,26 @@ from swarm_logistics_env.cli import app
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    "arguments",
     [
-        (["watch", "--policy", "swarm-td"], "did you mean 'swarm-dt'?"),
-        (["watch", "--fault", "FM9"], "no failure mode 'FM9'"),
-        (["watch", "--fault", "FM1:99"], "at most n_robots = 25"),
-        (["watch", "--set", "n_robot=40"], "did you mean 'n_robots'?"),
-        (["watch", "--speed", "3"], "speed = 3: should be one of"),
-        (["watch", "--port", "99999"], "--port"),
-        (["watch", "--until", "5"], "--until 5: should be above 0 s, together with --save"),
+        ["--film", "film.mp4", "--policy", "swarm-dt", "--policy", "random-walk"],
+        ["--film", "film.gif", "--fault", "FM4:2", "--twin"],
     ],
 )
-def test_bad_input_is_one_sentence_and_exit_code_2(
+def test_film_is_written(
     arguments: list[str],
-    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert app.run(arguments) == 2
+    monkeypatch.chdir(tmp_path)
+    assert app.run(["run", *arguments, "--until", "1", "--set", "n_robots=4"]) == 0
     printed = capsys.readouterr()
-    assert printed.out == ""
-    assert words in printed.err
-    assert len(printed.err.splitlines()) == 1
+    assert re.fullmatch(rf"{arguments[1]}: \d+ frames, [\d.]+ s, [\d.]+ MB\n", printed.out)
+    assert printed.err == ""
+    [film] = tmp_path.iterdir()
+    assert film.stat().st_size > 1000
+    assert film.read_bytes()[:8].endswith(b"ftyp") == (film.suffix == ".mp4")
 
 
 def test_port_in_use_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,183 @@
+"""`study compare` as a gate: on short studies that are really played, and on recorded trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.studies import Study
+from tests.conftest import SMALL
+
+
+class Still:
+    """Stands still."""
+
+    identity = "still"
+
+    def reset(self, n_robots: int, seed: int) -> None: ...
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        return np.zeros((len(observations), 4))
+
+
+FIELDS: dict[str, Any] = {
+    **SMALL,
+    "policies": [{"name": "swarm-dt", "label": "mine"}],
+    "seeds": 6,
+    "sizes": [{"values": [4, 6]}],
+    "faults": [],
+    "parameters": [],
+}
+PLAYED: dict[str, dict[str, Any]] = {
+    "old": {},
+    "same": {},
+    "still": {"policies": [Still()]},
+    "more policies": {"policies": [Still(), "swarm-dt"]},
+    "later seeds": {"first_seed": 3},
+    "fresh seeds": {"first_seed": 1000},
+}
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with a study for each entry of `PLAYED`."""
+    folder = tmp_path_factory.mktemp("gate")
+    for name, fields in PLAYED.items():
+        Study(out=folder / name, **{**FIELDS, **fields}).run()
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("new", "gates", "code", "words"),
+    [
+        (
+            "same",
+            ["change < 0", "possibly change < -0.1"],
+            0,
+            [
+                "Gate 'change < 0' passes",
+                *(
+                    f"| mine: change, N = {size} (Scalability) | 0.000 | exact: the runs of both "
+                    "studies are the same |"
+                    for size in (4, 6)
+                ),
+            ],
+        ),
+        # Another policy in the place of the judged one is named.
+        ("still", ["change < 0"], 1, ["| mine -> Still: change, N = 6 (Scalability) | -1.000"]),
+        ("still", ["change > 0"], 0, ["Gate 'change > 0' passes"]),
+        (
+            "more policies",
+            ["change < 0"],
+            1,
+            [
+                "policy 'Still' of the new study has no match: the old study judges 'mine'",
+                "policy 'mine' of the old study has no match: the new study judges 'Still', 'swa",
+            ],
+        ),
+        ("more policies", [], 0, ["Change of P"]),  # without a gate nothing fails
+        (
+            "later seeds",
+            ["possibly change < 0"],
+            0,
+            [
+                "exact: the runs of both studies are the same",
+                "Only in the old study, and left out: seeds 0 to 2. Runs are paired over the shar",
+                "Only in the new study, and left out: seeds 6 to 8.",
+            ],
+        ),
+        ("fresh seeds", ["change < 0"], 1, ["share no seed: the old one has 0 to 5, the new one"]),
+    ],
+)
+def test_gates_end_with_their_code_and_name_what_they_are_about(
+    studies: Path,
+    new: str,
+    gates: list[str],
+    code: int,
+    words: list[str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    options = [option for gate in gates for option in ("--fail-if", gate)]
+    place = [str(studies / "old"), str(studies / new)]
+    assert app.run(["study", "compare", *place, *options]) == code
+    printed = capsys.readouterr().out
+    for part in words:
+        assert part in printed
+    # Whatever an ablation takes beside it is not judged.
+    assert "random-walk" not in printed
+
+
+TABLE = "fault,faulty,robots,seed,delivered\n"
+
+
+def imported(path: Path, faulty: tuple[int, ...], first: int = 0) -> str:
+    """A study of four seeds of P_o, P_S and the P_F that are given."""
+    seeds = range(first, first + 4)
+    rows = [f"none,0,25,{s},{40 + s}\nremoved,1,25,{s},{38 + s}\n" for s in seeds]
+    rows += [f"FM1,1,25,{seed},{p}\n" for seed, p in zip(seeds, faulty)]
+    path.with_suffix(".csv").write_text(TABLE + "".join(rows))
+    assert app.run(["judge", str(path.with_suffix(".csv")), "--out", str(path)]) == 0
+    return str(path)
+
+
+def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = imported(tmp_path / "old", (40, 41, 43, 42))
+    new = imported(tmp_path / "new", (20, 22, 21, 23))
+    late = imported(tmp_path / "late", (44, 41, 41, 42), first=2)
+    capsys.readouterr()
+    for arguments, code, words in (
+        ([old, new], 0, "change, FM1, m = 1"),
+        ([old, new, "--fail-if", "R < 0"], 1, "Gate 'R < 0' fails"),
+        ([old, new, "--fail-if", "change < -0.2 at FM1"], 1, "fails"),
+        ([new, old, "--fail-if", "R < 0", "--fail-if", "change < 0"], 0, "passes"),
+        # Seeds 2 and 3: 44 + 41 instead of 43 + 42. By their places it would be another change.
+        ([old, late, "--fail-if", "change < 0 at FM1"], 0, "change, FM1, m = 1 (Fault tolerance "
+         "and robustness) | 0.000 ["),
+        ([old, late], 0, "Only in the old study, and left out: seeds 0 to 1."),
+    ):  # fmt: skip
+        assert app.run(["study", "compare", *arguments]) == code
+        assert words in capsys.readouterr().out
+    assert app.run(["study", "compare", old, new, "--fail-if", "S < 0"]) == 2
+    assert "tests nothing" in capsys.readouterr().err
+
+
+def test_seeds_needed_are_told_of_a_stored_study_and_of_a_pilot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored = imported(tmp_path / "old", (40, 41, 43, 42))
+    capsys.readouterr()
+    plan = ["study", "plan"]
+    assert app.run([*plan, stored, "--effect", "-0.1", "--indicator", "R"]) == 0
+    printed = capsys.readouterr().out
+    assert "R > 0, FM1, m = 1 | -0.100 | " in printed
+    assert "FT" not in printed
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        "seeds = 30\nuntil_clear = true\nscenario = { n_robots = 3, n_items = 4, "
+        "warehouse_width = 3, warehouse_height = 3, delivery_width = 1, duration = 20 }\n"
+        "[[sizes]]\nvalues = [2, 3]\n"
+    )
+    pilot = [*plan, str(path), "--pilot", "3", "--processes", "1", "--effect", "1"]
+    assert app.run(pilot) == 0
+    printed = capsys.readouterr().out
+    assert "Seeds needed, from 3 seeds" in printed
+    assert "S > 0, N 2 -> 3 | 1.000 | " in printed
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.toml", "old", "old.csv"}
+    for arguments, words in (
+        (
+            [*pilot, "--indicator", "R"],
+            "--indicator R: the study makes no such comparison; it asks",
+        ),
+        ([*pilot, "--at", "FM9"], "no such comparison"),
+        ([*plan, stored, "--power", "2"], "power"),
+        ([*plan, stored, "--policy", "homing"], "--policy is for a pilot"),
+    ):
+        assert app.run(arguments) == 2
+        assert words in capsys.readouterr().err
