@@ -22,11 +22,7 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import (
-    RANDOM_HEADING_TIME,
-    MotionFrame,
-    random_heading,
-)
+from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionFrame, random_heading
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -75,19 +71,12 @@ class Homing:
                 f"observations of {len(observations)} robots: reset was told "
                 f"{len(self._frame.keys)}"
             )
-        self._frame.read(observations)
-        commands = homing_commands(self._frame, observations, self._period)
-        return self._frame.command(self._frame.outputs_for(commands))
-
-
-def homing_commands(
-    frame: MotionFrame, observations: NDArray[np.float32], period: float
-) -> NDArray[np.float64]:
-    """Return the policy's commands (N, 4) for the rows that `frame` read last; period in s."""
-    numbers = ((frame.counts - 1) * period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
-    commands = np.zeros((len(observations), 4))
-    decide_homing(observations, frame.memory, frame.keys, numbers, period, commands)
-    return commands
+        frame, period = self._frame, self._period
+        frame.read(observations)
+        numbers = ((frame.counts - 1) * period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+        commands = np.zeros((len(observations), 4))
+        decide_homing(observations, frame.memory, frame.keys, numbers, period, commands)
+        return frame.command(frame.outputs_for(commands))
 
 
 @kernel

@@ -8,7 +8,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
-import re
 import signal
 import threading
 import time
@@ -19,10 +18,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
-from itertools import islice
 from multiprocessing.connection import Connection
 from types import ModuleType
-from typing import Self
 from unittest.mock import patch
 
 from swarm_logistics_env.errors import StudyError, suggest
@@ -56,43 +53,6 @@ class Tally:
     seconds: float
     error: str | None = None
     left: int = 0
-
-
-@dataclass(frozen=True)
-class Shard:
-    """Part `number` of `count`, counted from 1.
-
-    Raises:
-        StudyError: there is no such part.
-    """
-
-    number: int
-    count: int
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.number <= self.count:
-            raise StudyError(f"shard {self}: should be i/n with i from 1 to n")
-
-    @classmethod
-    def parse(cls, text: str) -> Self:
-        """Return the shard that "i/n" means."""
-        match = re.fullmatch(r"(\d+)/(\d+)", text)
-        if match is None:
-            raise StudyError(f"shard {text}: should be i/n, e.g. 2/8")
-        return cls(int(match[1]), int(match[2]))
-
-    def __str__(self) -> str:
-        return f"{self.number}/{self.count}"
-
-    @property
-    def directory(self) -> str:
-        """Name of the directory of its store: shards on one disk never share a file."""
-        return f"shard-{self.number}-of-{self.count}"
-
-    def of(self, runs: Iterable[Run]) -> list[Run]:
-        """Return every n-th run from the i-th on."""
-        # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
-        return list(islice(runs, self.number - 1, None, self.count))
 
 
 def play(

@@ -15,8 +15,8 @@ from swarm_logistics_env.tasks.task import Run, Task
 from .columns import frame_of_cells, frame_of_verdicts
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
-from .plan import Plan, make_plan
-from .play import Engine, Shard, Tally, engine_named, play
+from .plan import Plan, Shard, make_plan
+from .play import Engine, Tally, engine_named, play
 from .presets import load_preset
 from .results import StudyResults, judge
 from .runs import FILE_NAME, Runs
