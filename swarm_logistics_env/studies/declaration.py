@@ -228,17 +228,17 @@ def merge(directories: Sequence[Path], out: Path) -> int:
         StudyError: a store cannot be read, they are not of one study, two of them have different
             results of one run, or `out` holds a study.
     """
+    stored = {directory: StoredStudy.existing(directory) for directory in directories}
+    first, one = next(iter(stored.items()))
+    for directory, other in stored.items():
+        if other.imported is not None:
+            raise StudyError(f"{directory} was imported: only studies that were run are merged")
+        if differing := _differing(one, other):
+            raise StudyError(
+                f"{first} and {directory} differ in {', '.join(differing)}: should be shards "
+                "of one study"
+            )
     with Runs.new(out, "merge") as runs:
-        stored = {directory: StoredStudy.existing(directory) for directory in directories}
-        first, one = next(iter(stored.items()))
-        for directory, other in stored.items():
-            if other.imported is not None:
-                raise StudyError(f"{directory} was imported: only studies that were run are merged")
-            if differing := _differing(one, other):
-                raise StudyError(
-                    f"{first} and {directory} differ in {', '.join(differing)}: should be shards "
-                    "of one study"
-                )
         for directory in directories:
             runs.absorb(directory / FILE_NAME)
         note(runs, one.specification, one.code, one.identities, one.declared)
