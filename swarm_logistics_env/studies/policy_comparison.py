@@ -190,7 +190,7 @@ def agreement(policy: str, cells: Sequence[Cell]) -> Agreement:
     width = [
         c.one_run.high - c.one_run.low
         for c in cells
-        if c.one_run.high and c.one_run.low is not None
+        if c.one_run.low is not None and c.one_run.high is not None
     ]
     met = [
         cell
