@@ -11,8 +11,8 @@ import pytest
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.attack import STORE, Attack, attack, random_search, search
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.studies.engines import serial
-from swarm_logistics_env.studies.store import Store
+from swarm_logistics_env.studies.play import serial
+from swarm_logistics_env.studies.runs import Runs
 
 SCENARIO = Scenario(
     n_robots=6,
@@ -70,8 +70,8 @@ def test_a_search_that_was_stopped_goes_on_and_ends_alike(tmp_path: Path) -> Non
 
     with pytest.raises(StoppedError):
         attack(asked, stopped, tmp_path / "stopped")  # type: ignore[arg-type]
-    with Store(tmp_path / "stopped" / STORE) as store:
-        assert len(store) == 3
+    with Runs(tmp_path / "stopped" / STORE) as runs:
+        assert len(runs) == 3
     assert attack(asked, serial, tmp_path / "stopped") == whole
     assert [found.by for found in whole.found] == ["search", "random search", "named modes"]
     assert {found.robustness.n_seeds for found in whole.found} == {3}
@@ -106,7 +106,8 @@ def test_a_fault_that_changes_no_run_is_no_evidence(tmp_path: Path) -> None:
 def test_few_tries_leave_the_seeds_of_the_estimates_fresh(tmp_path: Path) -> None:
     asked = Attack("swarm-dt", SCENARIO, modes=("FM2", "FM4"), budget=1, fresh=3)
     attack(asked, serial, tmp_path)
-    with Store(tmp_path / STORE) as store:
-        seeds = [row["seed"] for row in store.rows() if row["faults"] == "[]"]
+    with Runs(tmp_path / STORE) as runs:
+        rows = runs.frame().to_dict("records")
+    seeds = [row["seed"] for row in rows if not row["faults"]]
     # Five for the choice among the named modes, and three that had no part in any choice.
     assert sorted(seeds) == [0, 1, 2, 3, 4, 5, 6, 7]

@@ -43,8 +43,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
-    "studies": {"errors", "records", "streams", "kernels", "spi", "tasks"},
-    "report": {"errors", "records", "fault_text", "spi", "tasks", "studies"},
+    "studies": RUNS | {"progress_bar", "spi", "tasks"},
+    "report": {"errors", "records", "fault_text", "warehouse", "spi", "tasks", "studies"},
     "attack": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS
     | ENVIRONMENT
@@ -52,7 +52,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "testing": RUNS | ENVIRONMENT | {"spi"},
 }
 # A Study offers its report, so it stands above both; the other modules of studies stand below.
-MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report", "progress_bar"}
+MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report"}
 MAY_IMPORT["train"] |= {"Study", "report", "progress_bar"}
 # The front doors import whatever they offer.
 MAY_IMPORT["cli"] = set(MAY_IMPORT)

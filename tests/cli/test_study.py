@@ -1,4 +1,4 @@
-"""`study ...`: what it prints, writes and ends with; Ctrl-C, shards, declared seeds, failed runs."""
+"""`study ...`: what it prints, writes and ends with, and what it leaves when it is stopped."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 
 FILE = """
 seeds = 2
-scenario = { warehouse_width = 4, warehouse_height = 3, n_robots = 4, duration = 2 }
+scenario = { warehouse_width = 4, warehouse_height = 3, n_robots = 4, n_items = 8, duration = 2 }
 
 [[sizes]]
 values = [2, 4]
@@ -128,7 +128,7 @@ if __name__ == "__main__":
 
 
 def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
-    file.write_text(FILE.replace("duration = 2", "duration = 500, n_items = 1000"))
+    file.write_text(FILE.replace("duration = 2", "duration = 500, restock = true"))
     Path("slow.py").write_text(SLOW)
     options = ["study", "run", "mine.toml", "--seeds", "30", "--processes", "2", "--out", "out"]
     process = subprocess.Popen(
@@ -190,7 +190,7 @@ def test_options_of_run_change_the_study(file: Path, capsys: pytest.CaptureFixtu
     assert Study.stored("results/mine").specification.looks == (20, 30)
     assert app.run([*local, "--until-clear", "--most", "20"]) == 2
     assert "--most 20: should be more than 20 seeds" in capsys.readouterr().err
-    file.write_text(FILE.replace("duration = 2", "duration = 60, n_items = 1"))
+    file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
     capped = [*local, "--policy", "homing", "--seeds", "1", "--out", "capped"]
     assert app.run(capped) == 0
     assert "homing delivers every item before the end" in capsys.readouterr().out

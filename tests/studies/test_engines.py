@@ -19,7 +19,8 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
-from swarm_logistics_env.studies.play import Shard, engine_named, expected_seconds
+from swarm_logistics_env.studies.plan import Shard
+from swarm_logistics_env.studies.play import engine_named, expected_seconds
 from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.tasks.task import Case
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, code_version

@@ -19,7 +19,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.play import Shard
+from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.specification import looks_up_to
 from swarm_logistics_env.studies.until_clear import SPENDING
 from swarm_logistics_env.studies.verdict import Verdict
