@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import swarm_logistics_env
 from swarm_logistics_env import Scenario
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import ScenarioError, StudyError
 from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.policies.policy import modules_used, without_prose
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Case, Outcome
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
+from swarm_logistics_env.warehouse import Warehouse
+from tests.tasks import lane
+
+PACKAGE = Path(swarm_logistics_env.__file__).parent
 
 
 class Foraging(WarehouseTask):
@@ -47,9 +58,9 @@ def test_a_study_of_another_task(tmp_path: Path) -> None:
     assert p["dead, m = 1"] == p["removed, m = 1"] == [72, 73, 72]
     study.report()
     assert "code version foraging 1" in (tmp_path / "report.md").read_text()
-
-
-def test_conditions_of_two_tasks_never_share_runs() -> None:
+    with pytest.raises(StudyError, match=r"task 'toy'.*Study\.stored\("):
+        Study.stored(tmp_path, trust_code=True)
+    assert Study.stored(tmp_path, task=FORAGING).run().kept == 15
     policy = PolicySpec(name="x")
     own, other = (Case(policy, "x", Scenario(), task=t) for t in (WAREHOUSE, Foraging()))
     assert own.key != other.key
@@ -78,13 +89,6 @@ def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_p
     assert again.specification == study.specification
     assert again.run().played == 0
     assert Study.stored(out, task=FORAGING).finished() == (4, 4)
-
-
-def test_a_task_that_was_an_object_is_handed_over_again(tmp_path: Path) -> None:
-    Study(out=tmp_path, task=FORAGING, seeds=1, sizes=[{"values": [2, 4]}]).run()
-    with pytest.raises(StudyError, match=r"task 'toy'.*Study\.stored\("):
-        Study.stored(tmp_path, trust_code=True)
-    assert Study.stored(tmp_path, task=FORAGING).run().kept == 2
 
 
 @pytest.mark.parametrize(
@@ -137,3 +141,62 @@ def test_the_warehouse_names_its_fields_and_failure_modes() -> None:
     assert WAREHOUSE.vary(Scenario(), {"preset": "dots"}) == Scenario.preset("dots")
     with pytest.raises(ScenarioError, match="no scenario preset"):
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
+
+
+SCRIPT = """
+from swarm_logistics_env.studies import Study
+
+study = Study(task="lane", policies=["walker"], seeds=2, sizes=[{"values": [2, 4]}])
+assert study.run().failed == 0
+assert Study(task="lane").specification.played.name == "lane"
+assert (study.performance()["mean"] > 0).all()
+"""
+
+
+def test_a_task_needs_two_files(tmp_path: Path) -> None:
+    copy = tmp_path / PACKAGE.name
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(lane.__file__, copy / "tasks" / "lane_task.py")
+    choice = copy / "tasks" / "task.py"
+    text = choice.read_text(encoding="utf-8")
+    name = '    "lane": "swarm_logistics_env.tasks.lane_task:LANE",\n'
+    choice.write_text(text.replace("NAMES = {\n", f"NAMES = {{\n{name}"), encoding="utf-8")
+    subprocess.run(
+        [sys.executable, "-c", SCRIPT],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        check=True,
+    )
+    page = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert "Files: `tasks/NAME_task.py`, `tasks/task.py`" in page
+
+
+def test_prose_does_not_count() -> None:
+    bare = "def f(x: int) -> int:\n    return x  # kept\nclass A:\n    b = '''text\n# inside'''\n"
+    told = (
+        '"""Module."""\n\n# why\ndef f(x: int) -> int:\n    """Tell.\n\n    More.\n    """\n\n'
+        "    return x  # kept\nclass A:\n    # note\n    b = '''text\n# inside'''\n"
+    )
+    assert without_prose(told) == without_prose(bare)
+    assert without_prose(bare.replace("x  #", "x + 1  #")) != without_prose(bare)
+
+
+def test_covers_all_that_an_episode_loads() -> None:
+    """A module that decides what a run gives must make stored runs stale when it changes."""
+    script = (
+        "import sys, swarm_logistics_env.episode as e; "
+        "print(*(m.__file__ for n, m in sys.modules.items() "
+        "if n.startswith('swarm_logistics_env.')), sep='\\n')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    loaded = {Path(line).relative_to(PACKAGE).as_posix() for line in done.stdout.split()}
+    used = modules_used(Play, Warehouse).values()
+    covered = {path.relative_to(PACKAGE).as_posix() for path in used}
+    # Policies have identities of their own; these hold messages, validation and names only.
+    others = {name for name in loaded - covered if name.split("/")[0] not in ("motion", "policies")}
+    assert others <= {
+        "errors.py", "records.py", "environment/__init__.py", "environment/registration.py"
+    }  # fmt: skip
+    assert {"warehouse/physics.py", "policies/policy.py", "kernels.py"} <= covered <= loaded
