@@ -1,5 +1,8 @@
+"""Plans: the conditions and comparisons of presets, of files and of fields; and what is refused."""
+
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,6 +11,8 @@ from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparison import OTHER_BEHAVIOUR, Comparison
+from swarm_logistics_env.studies.presets import PAPER, PRESETS
 from swarm_logistics_env.tasks.task import Case
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import Fault
@@ -94,6 +99,13 @@ def test_policy_parameters_make_another_condition() -> None:
         ({"sizes": [{"values": [5, 9], "superlinear": [[5, 8]]}]}, "neighbouring sizes"),
         ({"faults": [{"modes": ["FM9"]}]}, "no failure mode 'FM9'; did you mean"),
         ({"faults": [{"modes": ["removed"]}]}, "no failure mode 'removed'"),
+        ({"faults": [{"modes": ["FM1"], "factor": 0.5}]}, "FM1 takes no factor"),
+        ({"faults": [{"modes": ["dead[mov]"]}]}, "not 'mov'; did you mean 'move'?"),
+        (
+            {"faults": [{"modes": ["FM1"], "intermittent": [0.001, 5]}]},
+            "greater than or equal to 0.01",
+        ),
+        ({"faults": [{"modes": ["FM1"], "intermittent": 5}]}, "intermittent = 5: should be a list"),
         ({"faults": [{"modes": ["FM1"], "robots": [25]}]}, "no working robot is left"),
         ({"faults": [{"modes": ["FM1"], "onsets": [500]}]}, "or nothing fails"),
         ({"parameters": [{"name": "relay", "values": [1, 2]}]}, "no numeric scenario field"),
@@ -133,3 +145,175 @@ def test_unknown_names_are_refused_before_any_run() -> None:
         Study.preset("paper", policies=("swarm-td",)).plan()
     with pytest.raises(StudyError, match="did you mean 'paper'"):
         Study.preset("papr")
+
+
+def test_quick_asks_every_indicator_at_four_seeds_and_every_preset_can_be_planned() -> None:
+    assert all(Study.preset(name).plan().comparisons for name in PRESETS)
+    plan = Study.preset("quick").plan()
+    assert {c.indicator for c in plan.comparisons} == {"S", "FT", "R", "A", "change"}
+    # N = 10, N = 25, removed, FM4, delivery width 1, random walk; restocked: none, its twin,
+    # removed, FM4.
+    assert len(plan.cases) == 10
+    assert len(plan.seeds) == 4
+
+
+def test_resilience_has_both_references_and_a_null() -> None:
+    plan = Study.preset("resilience").plan()
+    # No fault, its twin, and m = 1, 2, 3 of the removed and of three modes.
+    assert len(plan.cases) == 2 + 3 * 4
+    (null,) = plan.nulls.values()
+    assert null.setting == OTHER_BEHAVIOUR
+    for comparison in plan.comparisons:
+        assert comparison.original.case.scenario == null.case.scenario
+        (fault,) = comparison.changed.case.faults
+        assert fault.onset == pytest.approx(comparison.changed.case.scenario.duration / 3, 0.1)
+        assert comparison.changed.case.scenario.restock
+        if comparison.removed:
+            assert comparison.removed.case.faults[0].onset == fault.onset
+
+
+# The specification of the statistics prints these to three decimals.
+GOLDEN = {
+    "S": [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135],
+    "FT": [0.051, 0.077, -0.026, 0.026, 0.154, -0.026, 0.026, 0.154, 0.103, 0.0, -0.513, -0.615],
+    "R": [0.091, 0.054, 0.017, 0.066, 0.131, 0.017, 0.066, 0.131, 0.146, 0.040, -0.535, -0.572],
+    "A": [0.872, 0.723, 0.723, 0.610, 0.268, 0.187, -0.773],
+}
+
+COMPARISONS = Study.preset("paper").plan().comparisons
+
+
+def published(comparison: Comparison) -> float:
+    estimate = PAPER.estimate(comparison)
+    assert estimate is not None
+    return estimate.value
+
+
+def test_published_tables_give_the_golden_values_and_every_claim_follows_from_them() -> None:
+    for symbol, golden in GOLDEN.items():
+        asked = (c for c in COMPARISONS if (c.indicator, c.threshold) == (symbol, 0))
+        assert [published(c) for c in asked] == pytest.approx(golden, abs=5e-4)
+    claims = {
+        comparison: PAPER.claims[comparison.question]
+        for comparison in COMPARISONS
+        if comparison.indicator != "change"
+    }
+    assert len(claims) == len(PAPER.claims) == 41
+    for comparison, claim in claims.items():
+        assert (published(comparison) > comparison.threshold) == claim, comparison.label
+
+
+def test_the_paper_has_33_cells_under_one_set_of_defaults() -> None:
+    assert len(PAPER.cells) == 9 + 4 + 12 + 4 + 3 + 1
+    planned = {arm.setting for comparison in COMPARISONS for arm in comparison.arms}
+    assert set(PAPER.cells) <= planned
+    # All but the factor itself and Table I's number of items is the base scenario.
+    plan = Study.preset("paper").plan()
+    base = plan.specification.scenario
+    for _, table, arm in plan.cells:
+        ours, theirs = arm.case.scenario.model_dump(), base.model_dump()
+        varied = {name for name in ours if ours[name] != theirs[name]}
+        allowed = {arm.setting.name} if arm.setting.kind in {"size", "parameter"} else set()
+        if table.startswith("Table I:") or arm.setting.value == 100:
+            allowed |= {"n_items", "n_robots"}
+        assert varied <= allowed
+
+
+FILE = """
+seeds = 3
+policies = ["swarm-dt", "random-walk"]
+scenario = { preset = "paper", duration = 50 }
+
+[[sizes]]
+values = [5, 10]
+
+[[faults]]
+modes = ["FM1"]
+robots = [1]
+onsets = [10]
+
+[[parameters]]
+name = "delivery_width"
+values = [2.0, 1.0]
+"""
+
+
+def test_file_says_what_python_says(tmp_path: Path) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text(FILE)
+    from_file = Study.from_file(path)
+    written = Study(
+        name="small",
+        seeds=3,
+        policies=("swarm-dt", "random-walk"),
+        scenario={"duration": 50},
+        sizes=[{"values": (5, 10)}],
+        faults=[{"modes": ("FM1",), "robots": (1,), "onsets": (10,)}],
+        parameters=[{"name": "delivery_width", "values": (2.0, 1.0)}],
+    )
+    assert from_file.specification == written.specification
+    assert Study.from_file(path, seeds=5).plan().seeds == range(5)
+
+
+def test_robots_may_fail_and_be_repaired_at_random_lose_parts_of_a_mode_or_a_factor(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "repair.toml"
+    path.write_text(
+        """
+        seeds = 2
+        scenario = { n_robots = 4, warehouse_width = 4, warehouse_height = 4, duration = 20 }
+
+        [[faults]]
+        modes = ["dead[move,send]"]
+        robots = [1]
+        intermittent = [2.0, 3]
+        duration = 15
+
+        [[faults]]
+        modes = ["motor_slow"]
+        robots = [2]
+        factor = 0.1
+        """
+    )
+    study = Study.from_file(path, out=tmp_path / "out")
+    faults = {fault for c in study.plan().cases for fault in c.faults}
+    assert faults == {
+        Fault("dead[move,send]", 1, duration=15.0, intermittent=(2.0, 3.0)),
+        Fault("motor_slow", 2, factor=0.1),
+        Fault("removed", 1),
+        Fault("removed", 2),
+    }
+    assert study.run().failed == 0
+    study.report()
+    told = (tmp_path / "out" / "report.md").read_text()
+    assert "Fault tolerance and robustness (for 15 s, 2 s failed, 3 s not, in turn)" in told
+    assert "Fault tolerance and robustness (factor 0.1)" in told
+    assert "keeps what it carries; of this: move, send |" in told
+    assert Study.stored(tmp_path / "out").plan().comparisons == study.plan().comparisons
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[[faults]]\nmode = ['FM1']", "Faults has no field 'mode'; did you mean 'modes'?"),
+        ("[[faults]]\nmodes = ['FM1']\nrobots = [1, 1]", "each value once"),
+        ("[faults]\nmodes = ['FM1']", "Specification.faults = {'modes': ['FM1']}"),
+        ("indicators = ['Q']", "Specification.indicators = ['Q']: no indicator 'Q'"),
+        ("scenario = 3", "Specification.scenario = 3"),
+        ("seeds = ", "is not TOML: Invalid value"),
+        ("\udc00", "is not TOML"),
+    ],
+)
+def test_bad_file_is_refused_in_one_sentence_that_names_it(
+    tmp_path: Path, text: str, words: str
+) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_bytes(text.encode(errors="surrogatepass"))
+    with pytest.raises(StudyError) as caught:
+        Study.from_file(path)
+    assert str(path) in str(caught.value)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(StudyError, match=r"cannot read the study file .*No such file"):
+        Study.from_file(tmp_path / "none.toml")
