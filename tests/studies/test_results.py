@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 
 import numpy as np
@@ -108,15 +107,6 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
     assert power["FT", "FM4, m = 3", 0.0].seeds_needed == 10
 
 
-def test_holm_never_adds_a_verdict(found: StudyResults) -> None:
-    for test in found.verdicts:
-        assert test.estimate is not None
-        assert test.p_holm is not None
-        assert test.estimate.p_value is not None
-        assert test.p_holm >= test.estimate.p_value
-        assert test.plain != "inconclusive" or test.holm == "inconclusive"
-
-
 def test_saturated_cell_marks_what_rests_on_it() -> None:
     narrow = Setting("parameter", "warehouse_width", 5.0)
     capped = paper(full=narrow)
@@ -213,13 +203,6 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     assert tests["value"].isna().all()
     assert tests["published"].notna().any()
     assert set(tests["verdict"]) == {None}
-
-
-@pytest.mark.parametrize("seeds", [1, 5])
-def test_warnings_are_sentences(seeds: int) -> None:
-    told = list(warnings(paper(seeds=seeds, same=frozenset({"FM2"}))))
-    assert len(told) > 1
-    assert all(re.match(r"[A-Z]\w+ \w+ \w+ .*\.$", line) for line in told)
 
 
 def test_a_named_effect_decides_the_number_of_seeds_and_the_seen_one_never() -> None:

@@ -44,28 +44,19 @@ class Dying(SwarmDT):
         return super().act(observations)
 """
 
-SCRIPT = """
-import json, sys
-from swarm_logistics_env.studies import Study
-
-if __name__ == "__main__":
-    study = Study(out=sys.argv[1], **json.loads(sys.argv[2]))
-    study.run(processes=int(sys.argv[3]))
-"""
-
-# Plays the study in a process group of its own per line that it reads, without a new interpreter.
+# Plays the study, in a process group of its own per number of processes that it reads.
 SEVERAL_TIMES = """
 import json, os, sys
 from swarm_logistics_env.studies import Study
 
-study = Study(**{**json.loads(sys.argv[2]), "seeds": 1, "faults": [], "parameters": []})
-study.run()  # loads what is compiled
-for _ in sys.stdin:
+fields = json.loads(sys.argv[2])
+Study(**{**fields, "seeds": 1, "faults": [], "parameters": []}).run()  # loads what is compiled
+for line in sys.stdin:
     child = os.fork()
     if child == 0:
-        Study(out=sys.argv[1], **json.loads(sys.argv[2])).run()
+        os.setpgid(0, 0)
+        Study(out=sys.argv[1], **fields).run(processes=int(line))
         os._exit(0)
-    os.setpgid(child, child)
     print(child, flush=True)
     os.waitpid(child, 0)
 """
@@ -115,22 +106,9 @@ def test_swarm_delivers_and_frames_are_whole(played: Path) -> None:
 
 
 def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(SCRIPT)
-    out = tmp_path / "out"
-    command = [sys.executable, str(script), str(out), json.dumps(SMALL)]
-    total, kept = stored(played), 0
-
-    def killed(group: int) -> None:
-        nonlocal kept
-        while stored(out) == kept:
-            os.killpg(group, 0)  # it still runs
-            time.sleep(0.002)
-        time.sleep(random.Random().uniform(0, 0.01))
-        os.killpg(group, signal.SIGKILL)
-
+    out, total, kept = tmp_path / "out", stored(played), 0
     with subprocess.Popen(
-        [sys.executable, "-c", SEVERAL_TIMES, *command[2:]],
+        [sys.executable, "-c", SEVERAL_TIMES, str(out), json.dumps(SMALL)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -138,12 +116,13 @@ def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path
         assert warm.stdin is not None
         assert warm.stdout is not None
         for kill in range(10):
-            if kill == 5:  # from a new interpreter, with workers of its own
-                with subprocess.Popen([*command, "2"], start_new_session=True) as process:
-                    killed(process.pid)
-            else:
-                print(file=warm.stdin, flush=True)
-                killed(int(warm.stdout.readline()))
+            print(2 if kill == 5 else 1, file=warm.stdin, flush=True)
+            group = int(warm.stdout.readline())
+            while stored(out) == kept:
+                os.kill(group, 0)  # it still runs
+                time.sleep(0.002)
+            time.sleep(random.Random().uniform(0, 0.01))
+            os.killpg(group, signal.SIGKILL)
             assert kept < stored(out) < total
             kept = stored(out)
     Study(out=out, **SMALL).run()
