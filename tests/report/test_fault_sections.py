@@ -165,16 +165,12 @@ def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) ->
         assert top >= max(curve.high.max() for curve in many)
 
 
-def test_anchoring_load_per_failed_robot(repaired: StudyResults) -> None:
-    (load,) = anchoring_loads(repaired)
+def test_anchoring_load_and_fault_budget(unharmed: StudyResults) -> None:
+    (load,) = anchoring_loads(unharmed)
     assert load.load.value == 21.0
     assert load.neighbours.value == pytest.approx(21.0 / (3 * (END - ONSET)))
-
-
-def test_fault_budget_stops_at_what_was_not_tested(unharmed: StudyResults) -> None:
     (budget,) = fault_budgets(unharmed)
-    assert budget.tested == (3,)
-    assert budget.budget == spi.FaultBudget(0, 1)
+    assert (budget.tested, budget.budget) == ((3,), spi.FaultBudget(0, 1))
     # A budget that is 0 for every mode tells nothing that R does not tell.
     assert table(unharmed, "Fault budget") == []
 

@@ -170,7 +170,7 @@ def test_resilience_has_both_references_and_a_null() -> None:
         assert comparison.original.case.scenario == null.case.scenario
         (fault,) = comparison.changed.case.faults
         assert fault.onset == pytest.approx(comparison.changed.case.scenario.duration / 3, 0.1)
-        assert comparison.changed.case.scenario.restock
+        assert comparison.changed.case.scenario.model_dump()["restock"]
         if comparison.removed:
             assert comparison.removed.case.faults[0].onset == fault.onset
 

@@ -112,7 +112,7 @@ def spoilt(path: Path, *statements: str) -> None:
         (lambda path: spoilt(path, "PRAGMA user_version = 99"), "store schema 99"),
         (lambda path: spoilt(path, "PRAGMA application_id = 0"), "not the store of a study"),
         (
-            lambda path: spoilt(path) or path.write_bytes(path.read_bytes()[:5000]),
+            lambda path: (spoilt(path), path.write_bytes(path.read_bytes()[:5000])),
             "malformed",
         ),
         (
