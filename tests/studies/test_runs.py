@@ -97,12 +97,13 @@ def test_failed_runs_are_rows_of_the_csv_too(tmp_path: Path) -> None:
     assert list(table["error"]) == ["Traceback"]
 
 
-def spoilt(path: Path, *statements: str) -> None:
+def spoilt(path: Path, *statements: str) -> Path:
     with Runs(path) as runs:
         for seed in range(50):
             runs.add(run(seed), outcome(*[1.0] * 50))
         for statement in statements:
             runs._connection.execute(statement)
+    return path
 
 
 @pytest.mark.parametrize(
@@ -112,7 +113,7 @@ def spoilt(path: Path, *statements: str) -> None:
         (lambda path: spoilt(path, "PRAGMA user_version = 99"), "store schema 99"),
         (lambda path: spoilt(path, "PRAGMA application_id = 0"), "not the store of a study"),
         (
-            lambda path: (spoilt(path), path.write_bytes(path.read_bytes()[:5000])),
+            lambda path: path.write_bytes(spoilt(path).read_bytes()[:5000]),
             "malformed",
         ),
         (
