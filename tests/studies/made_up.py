@@ -14,6 +14,14 @@ from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.studies.verdict import Verdict
 from swarm_logistics_env.tasks.task import Outcome
 
+# The specification of the statistics prints these to three decimals.
+GOLDEN = {
+    "S": [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135],
+    "FT": [0.051, 0.077, -0.026, 0.026, 0.154, -0.026, 0.026, 0.154, 0.103, 0.0, -0.513, -0.615],
+    "R": [0.091, 0.054, 0.017, 0.066, 0.131, 0.017, 0.066, 0.131, 0.146, 0.040, -0.535, -0.572],
+    "A": [0.872, 0.723, 0.723, 0.610, 0.268, 0.187, -0.773],
+}
+
 
 def delivered(count: float, **fields: Any) -> Outcome:
     return Outcome(delivery_times=np.arange(float(count)), **fields)
