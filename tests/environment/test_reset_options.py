@@ -39,7 +39,8 @@ def test_wrappers_add_to_dicts() -> None:
 
 
 def test_a_text_is_the_fault_that_it_describes_wherever_faults_are_given() -> None:
-    texts, faults = ["FM1:2@0.1+3"], (Fault("FM1", 2, 0.1, 3.0),)
+    texts = ["FM1:2@0.1+3"]
+    faults: tuple[Fault, ...] = (Fault("FM1", 2, 0.1, 3.0),)
     scenario = Scenario(n_robots=4, duration=0.3)
     world = Warehouse(scenario)
     world.reset(0, texts)
