@@ -47,12 +47,8 @@ def watch_command(
         int,
         typer.Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free."),
     ] = 8765,
-    host: Annotated[
-        str, typer.Option(help="Name or address of this machine to listen on; 0.0.0.0: all.")
-    ] = "127.0.0.1",
-    no_open: Annotated[
-        bool, typer.Option("--no-open", help="Print the address only; open no browser.")
-    ] = False,
+    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
+    no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser.")] = False,
     save: Annotated[
         Path | None,
         typer.Option(help="Play to the end and write a page that replays it; serve nothing."),
@@ -89,11 +85,8 @@ def watch_command(
     )
     if save is None:
         if not is_loopback(host):
-            typer.echo(
-                f"Warning: --host {host}: who learns the address below may watch and steer from "
-                "other machines, by this one's address; what is sent is not encrypted.",
-                err=True,
-            )
+            told = "whoever learns the address can watch and steer; nothing is encrypted"
+            typer.echo(f"Warning: --host {host}: {told}.", err=True)
         shows = not no_open and sys.stdout.isatty() and _has_screen()
         serve(session, port, typer.echo, host, webbrowser.open if shows else None)
         return

@@ -104,11 +104,8 @@ def train(
         log.references = log.references or reference_means(training)
         with _live_table(training, learner.num_timesteps, log) as table:
             callback = TrainingCallback(training, view, log, out, table, kept)
-            learner.learn(
-                training.agent_steps - learner.num_timesteps,
-                [callback, *callbacks],
-                reset_num_timesteps=False,
-            )
+            left = training.agent_steps - learner.num_timesteps
+            learner.learn(left, [callback, *callbacks], reset_num_timesteps=False)
             callback.end()
     view.close()
     asked = training.evaluation

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hmac
-import ipaddress
 import logging
 import os
 import re
@@ -171,6 +170,7 @@ def indicators(
 
 LOOPBACK = "127.0.0.1"
 _OWN_NAMES = ("localhost", LOOPBACK, "::1")
+_ADDRESS = re.compile(r"[\d.]+|[\da-f.]*:[\da-f:.]*")  # what is written so is no name
 _HOST = re.compile(r"([^\s:/@\[\]]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
 _TOKEN = re.compile(r"[\w-]{24}")
 FILES = {
@@ -258,9 +258,7 @@ class WatchServer:
                     f"port = {self.port}: is in use, should be another one, or 0 for any that "
                     "is free"
                 ) from None
-            raise SetupError(
-                f"host = {self.host!r}, port = {self.port}: {error.strerror}"
-            ) from None
+            raise SetupError(f"host = {self.host}, port = {self.port}: {error.strerror}") from None
         self.port = self._runner.addresses[0][1]
         shown = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
         shown = f"[{shown}]" if ":" in shown else shown
@@ -348,19 +346,12 @@ class WatchServer:
         name = match[1].strip("[]").lower() if match else ""
         if name in (*_OWN_NAMES, self.host.lower()):
             return True
-        return not is_loopback(self.host) and _is_address(name)
+        return not is_loopback(self.host) and _ADDRESS.fullmatch(name) is not None
 
 
 def is_loopback(host: str) -> bool:
     """Return whether only this machine itself reaches it by that name or address."""
-    return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
-
-
-def _is_address(host: str) -> bool:
-    try:
-        return bool(ipaddress.ip_address(host))
-    except ValueError:
-        return False
+    return host in _OWN_NAMES or host.startswith("127.")
 
 
 def _is_own_error(record: logging.LogRecord) -> bool:

@@ -142,7 +142,7 @@ class Stops(BaseCallback):  # type: ignore[misc]  # not in the environment of th
         self.seen = self.num_timesteps
 
     def _on_step(self) -> bool:
-        return self.num_timesteps < self.after
+        return bool(self.num_timesteps < self.after)
 
 
 def test_callbacks_see_a_training_and_may_stop_it_for_the_next_call(
@@ -186,7 +186,7 @@ def test_nothing_is_begun_that_cannot_be(
     with pytest.raises(SwarmLogisticsError, match=sentence):
         train(small(**fields), tmp_path / "out", device=device)
     with pytest.raises(TrainingError, match=r"callbacks = .*: should be a list of callbacks"):
-        train(small(), tmp_path / "out", callbacks=[print])  # type: ignore[list-item]
+        train(small(), tmp_path / "out", callbacks=[print])
     assert not (tmp_path / "out").exists()
 
 
