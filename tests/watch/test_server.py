@@ -23,7 +23,8 @@ import pytest
 from swarm_logistics_env import Fault, policies, run_episode, spi
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.server import WatchServer, indicators, kept_token, serve
+from swarm_logistics_env.watch.replicas import indicators
+from swarm_logistics_env.watch.server import WatchServer, kept_token, serve
 from tests.watch.conftest import SMALL, Served
 
 
