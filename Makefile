@@ -60,11 +60,7 @@ quick: $(DEV)/installed
 
 QUICK := $(addprefix tests/warehouse/test_,kinematics.py fault_text.py) tests/studies/test_plan.py tests/verification/test_mutants.py \
 	$(addprefix tests/spi/test_,definitions.py indicators.py multiplicity.py paper_tables.py) \
-<<<<<<< HEAD
-	$(addprefix tests/test_,imports.py records.py scenario.py streams.py fault_text.py sizes.py)
-=======
-	$(addprefix tests/test_,imports.py records.py scenario.py streams.py size_of_functions.py)
->>>>>>> habits
+	$(addprefix tests/test_,imports.py records.py scenario.py streams.py sizes.py)
 
 # What reaches every line of the kernels in seconds, without the compiler.
 KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py kinematics.py layout.py grid.py) \
