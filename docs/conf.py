@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.metadata import version as installed_version
 from typing import TYPE_CHECKING, Any
 
+from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
 
 if TYPE_CHECKING:
@@ -44,7 +46,8 @@ autodoc_mock_imports = ["stable_baselines3"]
 
 def setup(app: Sphinx) -> None:
     """Render formulas as MathML, which browsers draw themselves."""
-    app.add_html_math_renderer("mathml", (inline, None), (block, None))
+    renderers = [(partial(formula, display), None) for display in ("inline", "block")]
+    app.add_html_math_renderer("mathml", *renderers)
     app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
 
 
@@ -60,23 +63,10 @@ def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str
         lines[0] = lines[0].replace(": ", ", ", 1)
 
 
-def inline(translator: Any, node: Any) -> None:
-    """Write a formula within a line."""
-    from docutils.nodes import SkipNode
-
-    translator.body.append(_mathml(node, "inline"))
-    raise SkipNode
-
-
-def block(translator: Any, node: Any) -> None:
-    """Write a formula on a line of its own."""
-    from docutils.nodes import SkipNode
-
-    translator.body.append(f'<div class="math">{_mathml(node, "block")}</div>\n')
-    raise SkipNode
-
-
-def _mathml(node: Any, display: str) -> str:
+def formula(display: str, translator: Any, node: Any) -> None:
+    """Write a formula within a line (display "inline"), or on a line of its own ("block")."""
+    found: str = convert(node.astext(), display=display)
     # Without these, browsers set the bars of an absolute value apart as they do a relation.
-    formula: str = convert(node.astext(), display=display)
-    return formula.replace("<mo>&#x0007C;</mo>", '<mo lspace="0" rspace="0">&#x0007C;</mo>')
+    found = found.replace("<mo>&#x0007C;</mo>", '<mo lspace="0" rspace="0">&#x0007C;</mo>')
+    translator.body.append(f'<div class="math">{found}</div>\n' if display == "block" else found)
+    raise SkipNode

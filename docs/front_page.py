@@ -45,11 +45,15 @@ def rows_of(block: str) -> Rows:
         label, *cells = [cell.strip() for cell in line.split("|")[1:-1]]
         matches = {name: _VALUE.match(cell) for name, cell in zip(columns, cells, strict=True)}
         found[label] = {
-            name: Value(*(float(part.replace("∞", "inf")) for part in match.groups()), match[0])
+            name: Value(_number(match[1]), _number(match[2]), _number(match[3]), match[0])
             for name, match in matches.items()
             if match
         }
     return found
+
+
+def _number(text: str) -> float:
+    return float(text.replace("∞", "inf"))
 
 
 _MODES = {

@@ -36,8 +36,13 @@ from swarm_logistics_env.train.settings import (
 from swarm_logistics_env.train.training import Training, load_training, preset_names
 
 DOCS = Path(__file__).parent
-FACTORS = {"sizes": Sizes, "faults": Faults, "parameters": Parameter, "ablations": Ablation}
-PARTS = {
+FACTORS: dict[str, type[Record]] = {
+    "sizes": Sizes,
+    "faults": Faults,
+    "parameters": Parameter,
+    "ablations": Ablation,
+}
+PARTS: dict[str, type[Record]] = {
     "[network]": Network,
     "[[worlds]]": WorldKind,
     "[[conditions]]": Conditions,

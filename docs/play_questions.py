@@ -34,9 +34,10 @@ STUDIES = ROOT / "examples" / "questions"
 Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
 
 
-def study(name: str, **fields: int) -> Study:
-    """Return the study of a question, with some fields changed."""
-    return Study.from_file(STUDIES / f"{name}.toml", out=OUT / "questions" / name, **fields)
+def study(name: str, seeds: int | None = None) -> Study:
+    """Return the study of a question; `seeds`: None: as many as its file says."""
+    changed = {} if seeds is None else {"seeds": seeds}
+    return Study.from_file(STUDIES / f"{name}.toml", out=OUT / "questions" / name, **changed)
 
 
 def policies_compared(found: StudyResults) -> Answer:
@@ -53,7 +54,7 @@ def larger_swarms(found: StudyResults) -> Answer:
         "robustness": f"{tables.by_size(found)}\n\n{tables.over(found)}. [95 %]; the "
         f"last column is paired by seed and unadjusted. {tables.LEGEND}.",
     }
-    known = [test for test in found.verdicts if test.compared.indicator == "R" and test.interval]
+    known = [test for test in found.verdicts if test.compared.indicator == "R"]
     panels = []
     for mode, tests in grouped(known, lambda test: test.after.name).items():
         points = tuple(
@@ -61,10 +62,11 @@ def larger_swarms(found: StudyResults) -> Answer:
                 test.compared.policy,
                 found.policies.index(test.compared.policy),
                 f"{test.compared.n_robots}, m = {test.after.value:g}",
-                *(test.interval or ()),
+                *interval,
                 decided=test.holm in DECIDED,
             )
             for test in tests
+            if (interval := test.interval)
         )
         panels.append(Panel(mode, "robustness R", points, (0.0,), ""))
     panels[-1] = replace(panels[-1], x_label="swarm size N, faulty robots m")
