@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import VecMonitor
 
 from swarm_logistics_env import Scenario, run_episode
-from swarm_logistics_env.adapters import SwarmVecEnv
+from swarm_logistics_env.adapters import LogDeliveries, SwarmVecEnv
 
 ARENA: dict[str, Any] = {
     "warehouse_width": 4.0,
@@ -44,9 +43,8 @@ def main(total_timesteps=500_000, duration=60.0, seed=0):
     env = SwarmVecEnv(
         n_worlds=4, n_robots=[3, 6], seed=seed, duration=duration, rewards=REWARDS, **ARENA
     )
-    env = VecMonitor(env, info_keywords=("delivered",))
     model = PPO("MlpPolicy", env, n_steps=128, batch_size=576, gamma=0.99, seed=seed, device="cpu")
-    model.learn(total_timesteps)
+    model.learn(total_timesteps, callback=LogDeliveries())
     scenario = Scenario(n_robots=6, duration=duration, **ARENA)
     delivered = [run_episode(scenario, Learned(model), seed).delivered for seed in range(3)]
     print(f"P on three new seeds: {delivered}")

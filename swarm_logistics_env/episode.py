@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import CommandError, PolicyError
 from swarm_logistics_env.policies.policy import Policy, decide, start
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import Fault, Warehouse
+from swarm_logistics_env.warehouse import Warehouse
+from swarm_logistics_env.warehouse.fault_text import FaultLike
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Play:
         scenario: Scenario,
         policy: Policy,
         seed: int,
-        faults: Sequence[Fault] = (),
+        faults: Sequence[FaultLike] = (),
         policy_seed: int | None = None,
     ) -> None:
         self.world = Warehouse(scenario)
@@ -104,7 +105,7 @@ def run_episode(
     scenario: Scenario,
     policy: Policy,
     seed: int,
-    faults: Sequence[Fault] = (),
+    faults: Sequence[FaultLike] = (),
     policy_seed: int | None = None,
 ) -> Episode:
     """Play `policy` in `scenario` to the end.
@@ -113,7 +114,7 @@ def run_episode(
 
     Args:
         seed: decides the layout, the requests, which robots fail and the policy's own randomness.
-        faults: the faults that are scheduled in the episode.
+        faults: the faults that are scheduled in the episode, each as `Warehouse.reset` takes it.
         policy_seed: decides the policy's own randomness instead of `seed`; the same world with
             another behaviour.
 

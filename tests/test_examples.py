@@ -32,9 +32,9 @@ def test_ppo_learns_over_two_swarm_sizes(
     weights: list[list[Any]] = []
     learn = PPO.learn
 
-    def watched(model: Any, *arguments: Any) -> Any:
+    def watched(model: Any, *arguments: Any, **named: Any) -> Any:
         weights.append([part.detach().clone() for part in model.policy.parameters()])
-        learn(model, *arguments)
+        learn(model, *arguments, **named)
         weights.append([part.detach().clone() for part in model.policy.parameters()])
         assert model.num_timesteps == 2_304
         assert model.n_envs == 2 * 3 + 2 * 6

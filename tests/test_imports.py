@@ -31,7 +31,6 @@ MAY_IMPORT: dict[str, set[str]] = {
     "scenario": {"errors", "records", "streams"},
     "observations": FOUNDATION,
     "warehouse": FOUNDATION | {"observations"},
-    "fault_text": {"errors", "warehouse"},
     "rendering": FOUNDATION | {"warehouse"},
     "environment": WORLD | {"rendering"},
     "swarm_logistics_v0": WORLD | {"environment"},
@@ -44,7 +43,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS,
     "studies": RUNS | {"progress_bar", "spi", "tasks"},
-    "report": {"errors", "records", "fault_text", "warehouse", "spi", "tasks", "studies"},
+    "report": {"errors", "records", "warehouse", "spi", "tasks", "studies"},
     "attack": RUNS | {"spi", "tasks", "studies"},
     "train": RUNS
     | ENVIRONMENT

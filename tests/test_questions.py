@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from swarm_logistics_env.studies.performance_table import rows_of
 
 from swarm_logistics_env.report import wording
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.performance_table import rows_of
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
 ROOT = Path(__file__).parents[1]

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 from .central_env import CentralEnv
 
 if TYPE_CHECKING:
-    from .sb3 import SwarmVecEnv, SwarmVecNormalize
+    from .sb3 import LogDeliveries, SwarmVecEnv, SwarmVecNormalize
 
-__all__ = ["CentralEnv", "SwarmVecEnv", "SwarmVecNormalize"]
+__all__ = ["CentralEnv", "LogDeliveries", "SwarmVecEnv", "SwarmVecNormalize"]
 
 
-def __getattr__(name: str) -> type[SwarmVecEnv | SwarmVecNormalize]:
+def __getattr__(name: str) -> type[LogDeliveries | SwarmVecEnv | SwarmVecNormalize]:
     # These load stable-baselines3 and torch, so they are imported when somebody asks for them.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from . import sb3
 
-    found: type[SwarmVecEnv | SwarmVecNormalize] = getattr(sb3, name)
+    found: type[LogDeliveries | SwarmVecEnv | SwarmVecNormalize] = getattr(sb3, name)
     return found

@@ -5,6 +5,7 @@ Its VecNormalize as well, with statistics of robots alone.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -19,6 +20,7 @@ from swarm_logistics_env.streams import key
 from .worlds import RowsStep, World, Worlds, layers_of, maker
 
 try:
+    from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.running_mean_std import RunningMeanStd
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 except ModuleNotFoundError as error:
@@ -50,8 +52,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     The info of a row is a dict of its own of numbers: `TimeLimit.truncated`, `padding`, `failed`
     (1 while any failure mode holds for the row's robot, else 0), `world`, `n_robots`, `delivered`
     (the paper's P, so far), and what wrappers add (see `wrappers.IndicatorReward`). A done row's
-    has `terminal_observation` besides, as stable-baselines3 expects. Name them as `info_keywords`
-    of a `VecMonitor` to log them; its mean return counts padding as episodes of return 0.
+    has `terminal_observation` besides, as stable-baselines3 expects, and, where it was a robot's,
+    `episode`: its return "r", length "l" [steps], wall time "t" [s] and the world's "delivered". So
+    learners log `rollout/ep_rew_mean` and `ep_len_mean` by themselves; the means of a `VecMonitor`
+    count padding as episodes of return 0. `learn(.., callback=LogDeliveries())` logs
+    `rollout/delivered_mean` as well.
 
     Args:
         scenario: the conditions; default: the paper's.
@@ -111,6 +116,9 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         # What the next infos are copies of, unless a world has something to tell.
         self._abouts: Infos = [{} for _ in range(self._worlds.n_rows)]
         n_rows = self._worlds.n_rows
+        # Of each row's episode: its rewards so far, and the step that it began with.
+        self._returns, self._begun = np.zeros(n_rows, np.float32), np.zeros(n_rows, np.int64)
+        self._n_steps, self._made_at = 0, time.time()
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
         if seed is not None:
             self.seed(seed)
@@ -165,6 +173,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world; returns the observations (num_envs, D)."""
         observations = self._worlds.blank()
+        self._returns[:], self._begun[:] = 0.0, self._n_steps
         for world, rows in enumerate(self._worlds.rows):
             options = self._options[rows.start] or None
             self._worlds.begin(world, observations, self._seeds[rows.start], options)
@@ -191,6 +200,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         The arrays and dicts are the caller's own.
         """
         step = self._worlds.step()
+        self._n_steps += 1
+        self._returns += step.rewards
         # In the order of the worlds, so that what episodes share does not depend on the threads.
         told = sorted(self._worlds.told)
         for world in told:
@@ -295,6 +306,14 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             is_cut = bool(step.truncated[row] and not step.terminated[row])
             infos[row]["TimeLimit.truncated"] = is_cut
             infos[row]["terminal_observation"] = step.observations[row].copy()
+            if not infos[row]["padding"]:
+                infos[row]["episode"] = {
+                    "r": float(self._returns[row]),
+                    "l": int(self._n_steps - self._begun[row]),
+                    "t": round(time.time() - self._made_at, 6),
+                    "delivered": infos[row]["delivered"],
+                }
+            self._returns[row], self._begun[row] = 0.0, self._n_steps
         if self._worlds.is_over[world]:
             self._worlds.begin(world, step.observations)
         else:
@@ -304,6 +323,27 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
 def _each(indices: int | Iterable[int]) -> Iterable[int]:
     return indices if isinstance(indices, Iterable) else (indices,)
+
+
+class LogDeliveries(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
+    """Logs `rollout/delivered_mean`: the mean P [items] of the episodes that `ep_rew_mean` is of.
+
+    Example:
+        >>> from stable_baselines3 import PPO
+        >>> model = PPO("MlpPolicy", SwarmVecEnv(n_robots=2, duration=2.0), n_steps=32)
+        >>> model.learn(512, callback=LogDeliveries()).num_timesteps
+        512
+    """
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        # A VecMonitor around the worlds replaces what they say of an episode.
+        ended = [each for each in self.model.ep_info_buffer or () if "delivered" in each]
+        if ended:
+            delivered = float(np.mean([each["delivered"] for each in ended]))
+            self.logger.record("rollout/delivered_mean", delivered)
 
 
 class SwarmVecNormalize(VecNormalize):  # type: ignore[misc]  # not in the environment of the type check

@@ -91,8 +91,8 @@ def _stopped(place: Path) -> None:
 
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
-    from swarm_logistics_env.fault_text import text_of
     from swarm_logistics_env.report.section import bracketed
+    from swarm_logistics_env.warehouse.fault_text import text_of
 
     from .terminal_tables import show_table
 

@@ -182,7 +182,7 @@ def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
     Raises:
         FaultError: a text does not read so, there is no such fault, or the episode ends before.
     """
-    from swarm_logistics_env.fault_text import fault_of
+    from swarm_logistics_env.warehouse.fault_text import fault_of
 
     faults = [fault_of(text) for text in texts or []]
     for fault, text in zip(faults, texts or []):

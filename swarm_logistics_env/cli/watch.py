@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,7 +32,7 @@ FILM_SIZE = 480  # longer side of each warehouse [px]
 
 
 def watch_command(
-    policy: PolicyOption = "swarm-dt",
+    policy: PolicyOption = "ppo-delivery",
     against: Annotated[
         str | None,
         typer.Option(help="Policy of the run beside it; left out: the same without faults."),
@@ -45,6 +47,8 @@ def watch_command(
         int,
         typer.Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free."),
     ] = 8765,
+    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
+    no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser.")] = False,
     save: Annotated[
         Path | None,
         typer.Option(help="Play to the end and write a page that replays it; serve nothing."),
@@ -55,14 +59,14 @@ def watch_command(
     trust_code: TrustPolicyOption = False,
 ) -> None:
     """Watch two runs side by side in the browser; inspect, break and repair robots."""
-    import os
+    import webbrowser
 
     from swarm_logistics_env import policies
     from swarm_logistics_env.errors import SetupError
     from swarm_logistics_env.records import becoming
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.messages import recorded_page
-    from swarm_logistics_env.watch.server import serve
+    from swarm_logistics_env.watch.server import is_loopback, serve
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
@@ -80,12 +84,22 @@ def watch_command(
         lambda name: policies.load(given.get(name, name), trust_code=trust_code),
     )
     if save is None:
-        serve(session, port, announce=typer.echo)
+        if not is_loopback(host):
+            told = "whoever learns the address can watch and steer; nothing is encrypted"
+            typer.echo(f"Warning: --host {host}: {told}.", err=True)
+        shows = not no_open and sys.stdout.isatty() and _has_screen()
+        serve(session, port, typer.echo, host, webbrowser.open if shows else None)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)
     with becoming(save, SetupError) as part:
         part.write_text(page, encoding="utf-8")
     typer.echo(f"{save}: {session.run.world.state.time:g} s, {len(page) / 1e6:.2f} MB")
+
+
+def _has_screen() -> bool:
+    """Return whether a browser has a window to open; one in text would take the terminal."""
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    return sys.platform in ("darwin", "win32") or any(map(os.environ.get, names))
 
 
 def write_film_of(

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
-from swarm_logistics_env.warehouse import Fault, Warehouse
+from swarm_logistics_env.warehouse import Warehouse
+from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
 
 from .dict_view import ArrayStep, DictView, agent_names
 from .requests import (
@@ -21,7 +22,6 @@ from .requests import (
     as_array,
     check_somebody_is_there,
     checked_count,
-    checked_faults,
     checked_options,
     checked_seed,
     faults_among,
@@ -51,8 +51,8 @@ class SwarmLogisticsEnv(DictView):
 
     Args:
         scenario: the conditions; the paper's by default.
-        faults: the faults that are scheduled in every episode, each a `Fault` or a dict of its
-            arguments, as `{"mode": "FM1", "robots": 2}`.
+        faults: the faults that are scheduled in every episode, each a `Fault`, a text, as
+            "FM1:2@200", or a dict of its arguments, as `{"mode": "FM1", "robots": 2}`.
         rewards: reward term -> weight; by default each robot gets 1 for each delivery.
         render_mode: None, "rgb_array" (`render` returns a picture) or "human" (a window).
         max_cycles: steps after which an episode is truncated, if sooner than the duration.
@@ -86,7 +86,7 @@ class SwarmLogisticsEnv(DictView):
         self,
         scenario: Scenario | None = None,
         *,
-        faults: Sequence[Fault | Mapping[str, Any]] = (),
+        faults: Sequence[FaultLike] = (),
         rewards: Mapping[str, float] | None = None,
         render_mode: Literal["human", "rgb_array"] | None = None,
         max_cycles: int | None = None,
@@ -94,7 +94,7 @@ class SwarmLogisticsEnv(DictView):
         **fields: Any,
     ) -> None:
         self.scenario = _scenario_of(scenario, fields)
-        self.faults = checked_faults("faults", faults)
+        self.faults = checked_faults("faults", faults, SetupError)
         self.max_cycles = None if max_cycles is None else checked_count("max_cycles", max_cycles)
         modes = self.metadata["render_modes"]
         if render_mode is not None and render_mode not in modes:
@@ -136,11 +136,13 @@ class SwarmLogisticsEnv(DictView):
             seed: decides everything random in this episode, and in later ones that begin with
                 seed None; these differ from each other.
             options: conditions of this episode. "scenario" has the fields to replace; "faults"
-                replaces the environment's faults. Other keys are ignored with a warning.
+                replaces the environment's faults. Other keys are ignored with a warning, unless
+                they are nearly one of these.
 
         Raises:
             ScenarioError, FaultError: an option is not allowed.
-            SetupError: a seed or option is of the wrong type; no robot would be present; or the
+            SetupError: a seed or option is of the wrong type; an option is nearly called as one
+                that there is; no robot would be present; or the
                 scenario has more robots than `possible_agents`, or observations or states that
                 could leave the spaces. Spaces hold the environment's own scenario and those given
                 to `declare_spaces`.

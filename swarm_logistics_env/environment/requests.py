@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, FaultError, SetupError, suggest
+from swarm_logistics_env.errors import CommandError, SetupError, suggest
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.warehouse.fault_text import checked_faults
 from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
 
 
@@ -104,12 +106,16 @@ def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return a copy of the options as a dict; it is empty for None.
 
     Raises:
-        SetupError: they are not a mapping.
+        SetupError: they are not a mapping, or one is nearly called as one of `OPTIONS`.
     """
     if options is None:
         return {}
     if not isinstance(options, Mapping):
         raise SetupError(f"options = {options!r}: should be None or a dict with keys {OPTIONS}")
+    for unknown in map(str, options.keys() - set(OPTIONS)):
+        # Other libraries pass options of their own, which have no such name.
+        if get_close_matches(unknown.casefold(), OPTIONS, cutoff=0.8):
+            raise SetupError(f"there is no reset option {unknown!r}{suggest(unknown, OPTIONS)}")
     return dict(options)
 
 
@@ -158,35 +164,10 @@ def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[
     """Return the faults of the options, or `default` if there are none.
 
     Raises:
-        SetupError, FaultError: as `checked_faults`.
-    """
-    return checked_faults('options["faults"]', options.get("faults", default))
-
-
-def checked_faults(name: str, faults: Any) -> tuple[Fault, ...]:
-    """Return faults as a tuple; a dict of a fault's arguments, as JSON and YAML have it, is one.
-
-    Raises:
         SetupError: they are not a sequence of faults.
-        FaultError: a dict is not that of a fault that can be.
+        FaultError: one of them cannot be.
     """
-    is_list = isinstance(faults, Sequence) and not isinstance(faults, str)
-    if not is_list or not all(isinstance(fault, Fault | Mapping) for fault in faults):
-        raise SetupError(
-            f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)] or '
-            '[{"mode": "FM1", "robots": 2}]'
-        )
-    return tuple(fault if isinstance(fault, Fault) else _fault_of(name, fault) for fault in faults)
-
-
-def _fault_of(name: str, fields: Mapping[str, Any]) -> Fault:
-    known = Fault.model_fields
-    for field in fields:
-        if field not in known:
-            raise FaultError(f"{name}: a fault has no {field!r}{suggest(str(field), known)}")
-    if "mode" not in fields:
-        raise FaultError(f'{name}: {dict(fields)!r} has no "mode": should name one, as "FM1"')
-    return Fault(**fields)
+    return checked_faults('options["faults"]', options.get("faults", default), SetupError)
 
 
 def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.fault_text import text_of
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparison import Arm, Comparison
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse.fault_text import text_of
 
 from .answer import Answer
 from .section import sentence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,12 @@ CHECKPOINT_EVERY = 20.0  # seconds
 
 
 def train(
-    training: Training, out: str | Path, *, command: str = "", device: str | None = None
+    training: Training,
+    out: str | Path,
+    *,
+    command: str = "",
+    device: str | None = None,
+    callbacks: Sequence[BaseCallback] = (),
 ) -> Path:
     """Train a policy, or go on with it, and return the path of its file.
 
@@ -61,14 +66,20 @@ def train(
         out: directory of this training.
         command: the command line that asks for it, for the card.
         device: "cpu" or "cuda"; None: the GPU where there is one.
+        callbacks: of stable-baselines3, played beside its own; what they keep is in no checkpoint.
+            One that returns False ends this call; the next one goes on.
 
     Raises:
-        TrainingError: the directory holds another training or cannot be used, or there is no such
-            device.
+        TrainingError: the directory holds another training or cannot be used, there is no such
+            device, or `callbacks` are none.
         SetupError, ScenarioError, FaultError: worlds that cannot be.
     """
     out = Path(out)
     # Everything that may be refused comes first, before anything is written.
+    if not all(isinstance(each, BaseCallback) for each in callbacks):
+        raise TrainingError(
+            f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
+        )
     device, begun = device_of(device), _new_view(training)
     first = None if training.start is None else _tensors_of_start(training, training.start)
     # A robot that reads 0 in the inputs learned decides as before only with the same noise.
@@ -93,9 +104,8 @@ def train(
         log.references = log.references or reference_means(training)
         with _live_table(training, learner.num_timesteps, log) as table:
             callback = TrainingCallback(training, view, log, out, table, kept)
-            learner.learn(
-                training.agent_steps - learner.num_timesteps, callback, reset_num_timesteps=False
-            )
+            left = training.agent_steps - learner.num_timesteps
+            learner.learn(left, [callback, *callbacks], reset_num_timesteps=False)
             callback.end()
     view.close()
     asked = training.evaluation

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, FaultError, ScenarioError, SetupError
+from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
 
 from . import layout, stepping
+from .fault_text import FaultLike, checked_faults
 from .faults import GRACE, Fault, Occurrence, apply_faults
 from .grid import blank_grid
 from .packing import blank, packed
@@ -62,13 +63,14 @@ class Warehouse:
         self._words = np.zeros(0, np.int64)
 
     def reset(
-        self, seed: int = 0, faults: Sequence[Fault] = (), scenario: Scenario | None = None
+        self, seed: int = 0, faults: Sequence[FaultLike] = (), scenario: Scenario | None = None
     ) -> Sensed:
         """Begin an episode and return the first observations (N, D).
 
         Args:
             seed: alone decides layout, requests, start poses and which robots fail.
-            faults: what will affect whom and when; several may affect one robot.
+            faults: what will affect whom and when, each a `Fault`, a text, as "FM1:2@200", or a
+                dict of its arguments; several may affect one robot.
             scenario: from now on, instead of the one before.
 
         Raises:
@@ -76,11 +78,12 @@ class Warehouse:
             ScenarioError: it is none, or items or robots found no room.
         """
         scenario = _scenario(scenario, self.scenario)
-        occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in _faults(faults)]
+        faults = checked_faults("faults", faults)
+        occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in faults]
         state = WarehouseState(scenario)
         self._lay_out(state, scenario, seed)
         self.scenario, self.state, self._seed = scenario, state, seed
-        self.faults, self._occurrences, self.n_removed = tuple(faults), occurrences, 0
+        self.faults, self._occurrences, self.n_removed = faults, occurrences, 0
         self._make_room_to_work()
         self._build()
         self._apply_faults()
@@ -170,7 +173,7 @@ class Warehouse:
         self._apply_faults()
         self._remember()
 
-    def set_faults(self, faults: Sequence[Fault]) -> None:
+    def set_faults(self, faults: Sequence[FaultLike]) -> None:
         """Let these faults, instead of those before, hold from now on; none of them repairs all.
 
         Raises:
@@ -178,8 +181,9 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         seed, n = self._begun("set_faults"), self.state.n_robots
-        occurrences = [Occurrence(fault, seed, n) for fault in _faults(faults)]
-        self.faults, self._occurrences = tuple(faults), occurrences
+        faults = checked_faults("faults", faults)
+        occurrences = [Occurrence(fault, seed, n) for fault in faults]
+        self.faults, self._occurrences = faults, occurrences
         self._apply_faults()
         self._remember()
 
@@ -391,9 +395,3 @@ def _scenario(given: Scenario | None, otherwise: Scenario) -> Scenario:
     if not isinstance(given, Scenario | None):
         raise ScenarioError(f"scenario = {given!r}: should be a Scenario")
     return otherwise if given is None else given
-
-
-def _faults(given: Sequence[Fault]) -> Sequence[Fault]:
-    if not isinstance(given, Sequence) or not all(isinstance(each, Fault) for each in given):
-        raise FaultError(f'faults = {given!r}: should be a list of Fault, as [Fault("FM1", 2)]')
-    return given

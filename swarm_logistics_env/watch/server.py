@@ -168,9 +168,10 @@ def indicators(
     ]
 
 
-_LOOPBACK = "127.0.0.1"
-# A foreign page may resolve its name to this machine, but it cannot forge these headers.
-_OWN_HOST = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?")
+LOOPBACK = "127.0.0.1"
+_OWN_NAMES = ("localhost", LOOPBACK, "::1")
+_ADDRESS = re.compile(r"[\d.]+|[\da-f.]*:[\da-f:.]*")  # what is written so is no name
+_HOST = re.compile(r"([^\s:/@\[\]]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
 _TOKEN = re.compile(r"[\w-]{24}")
 FILES = {
     "page.html": "text/html",
@@ -201,6 +202,7 @@ class WatchServer:
         session: the session to show.
         port: the port; 0 takes any that is free.
         token: 24 letters, digits, - or _; None: random ones.
+        host: the name or address of this machine to listen on; "0.0.0.0" or "::" are all.
 
     Attributes:
         address: the address to open in a browser, once `start` is done.
@@ -209,7 +211,9 @@ class WatchServer:
         SetupError: aiohttp is not installed.
     """
 
-    def __init__(self, session: Session, port: int, token: str | None = None) -> None:
+    def __init__(
+        self, session: Session, port: int, token: str | None = None, host: str = LOOPBACK
+    ) -> None:
         try:
             from aiohttp import web
         except ImportError as error:
@@ -217,7 +221,7 @@ class WatchServer:
                 f"watch needs aiohttp ({error}): pip install 'swarm-logistics-env[watch]'"
             ) from None
         self._web = web
-        self.session, self.port = session, port
+        self.session, self.port, self.host = session, port, host
         self.token = token or secrets.token_urlsafe(18)
         self.recording, self.replicas = Recording(session), Replicas()
         self.address = ""
@@ -238,13 +242,13 @@ class WatchServer:
         self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
 
     async def start(self) -> None:
-        """Listen on the loopback interface.
+        """Listen on the host.
 
         Raises:
-            SetupError: the port is in use or not allowed.
+            SetupError: the port is in use or not allowed, or the host is none of this machine's.
         """
         await self._runner.setup()
-        site = self._web.TCPSite(self._runner, _LOOPBACK, self.port)
+        site = self._web.TCPSite(self._runner, self.host, self.port)
         try:
             await site.start()
         except OSError as error:
@@ -254,9 +258,11 @@ class WatchServer:
                     f"port = {self.port}: is in use, should be another one, or 0 for any that "
                     "is free"
                 ) from None
-            raise SetupError(f"port = {self.port}: {error.strerror}") from None
+            raise SetupError(f"host = {self.host}, port = {self.port}: {error.strerror}") from None
         self.port = self._runner.addresses[0][1]
-        self.address = f"http://{_LOOPBACK}:{self.port}/{self.token}/"
+        shown = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
+        shown = f"[{shown}]" if ":" in shown else shown
+        self.address = f"http://{shown}:{self.port}/{self.token}/"
 
     async def play(self) -> None:
         """Let the session go on while a page is open, until this is cancelled.
@@ -323,12 +329,29 @@ class WatchServer:
 
     def _check(self, request: web.Request) -> None:
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
-        own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0])
+        own = len(hosts) == 1 and self._is_own(hosts[0])
         token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
         known = hmac.compare_digest(token.encode(), self.token.encode())
         if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
             raise self._web.HTTPForbidden(text=text)
+
+    def _is_own(self, host: str) -> bool:
+        """Return whether a request's Host means this machine.
+
+        A foreign page may resolve its own name to this machine, but it cannot forge this header;
+        and it has a name, so that any address will do where others may reach this machine.
+        """
+        match = _HOST.fullmatch(host)
+        name = match[1].strip("[]").lower() if match else ""
+        if name in (*_OWN_NAMES, self.host.lower()):
+            return True
+        return not is_loopback(self.host) and _ADDRESS.fullmatch(name) is not None
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine itself reaches it by that name or address."""
+    return host in _OWN_NAMES or host.startswith("127.")
 
 
 def _is_own_error(record: logging.LogRecord) -> bool:
@@ -362,11 +385,19 @@ def kept_token() -> str | None:
     return token if _TOKEN.fullmatch(token) else None
 
 
-def serve(session: Session, port: int, announce: Callable[[str], None]) -> None:
+def serve(
+    session: Session,
+    port: int,
+    announce: Callable[[str], None],
+    host: str = LOOPBACK,
+    show: Callable[[str], object] | None = None,
+) -> None:
     """Show a session in the browser until Ctrl-C.
 
     Args:
         announce: is called with a sentence that has the address.
+        host: see `WatchServer`.
+        show: is called with the address, in a thread of its own, as a browser may not return.
 
     Raises:
         SetupError: the port is in use or not allowed, or aiohttp is not installed.
@@ -374,12 +405,14 @@ def serve(session: Session, port: int, announce: Callable[[str], None]) -> None:
     """
 
     async def run() -> None:
-        server = WatchServer(session, port, kept_token())
+        server = WatchServer(session, port, kept_token(), host)
         await server.start()
         announce(
             f"Open {server.address} in a browser on this machine (from another one: "
             f"ssh -L {server.port}:127.0.0.1:{server.port}). Ctrl-C ends it."
         )
+        if show is not None:
+            threading.Thread(target=show, args=[server.address], daemon=True).start()
         await server.play()
 
     with contextlib.suppress(KeyboardInterrupt):

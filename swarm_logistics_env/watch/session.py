@@ -19,6 +19,7 @@ from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.readings import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
 from swarm_logistics_env.warehouse.faults import failed_robots
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
@@ -60,13 +61,13 @@ class Session:
         policy: str = "swarm-dt",
         against: str | None = None,
         seed: int = 0,
-        faults: Sequence[Fault] = (),
+        faults: Sequence[FaultLike] = (),
         speed: float = 1.0,
         load: Callable[[str], Policy] = policies.load,
     ) -> None:
-        for fault in faults:
+        self.load, self._planned = load, checked_faults("faults", faults)
+        for fault in self._planned:
             failed_robots(fault, seed, scenario.n_robots)
-        self.load, self._planned = load, tuple(faults)
         self.policy, self.against = policy, against
         named = [name for name in (policy, against) if name is not None]
         self.choices = tuple(dict.fromkeys([*named, *policies.NAMES]))

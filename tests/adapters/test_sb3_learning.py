@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +17,12 @@ pytest.importorskip("stable_baselines3")
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
 
-from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
+from swarm_logistics_env.adapters.sb3 import LogDeliveries, SwarmVecEnv
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.wrappers import SwarmSize, Wrapper
 
 Played = Callable[[SwarmVecEnv, int], list[Any]]
 Small = dict[str, Any]
@@ -72,6 +77,64 @@ def test_their_wrappers_callbacks_and_evaluation_work(small: Small) -> None:
     assert env.get_attr("render_mode") == [None] * 6
     mean, _ = evaluate_policy(model, env, n_eval_episodes=6)
     assert np.isfinite(mean)
+
+
+def test_robots_ends_are_those_that_a_monitor_finds(small: Small) -> None:
+    def make_env(world: int) -> Any:
+        env = SwarmLogisticsEnv(**small, n_robots=4, rewards={"delivery": 1.0, "contact": -0.1})
+        return SwarmSize(env, [3, 4], leave=[(1, 0.7)])
+
+    own = SwarmVecEnv(make_env=make_env, n_worlds=3, seed=0)
+    monitored = VecMonitor(SwarmVecEnv(make_env=make_env, n_worlds=3, seed=0))
+    rng = np.random.default_rng(0)
+    own.reset(), monitored.reset()
+    lengths, returns = set(), set()
+    for step in range(70):
+        if step == 50:  # in mid-episode
+            own.reset(), monitored.reset()
+        actions = rng.uniform(-1, 1, (12, 4))
+        *_, dones, infos = own.step(actions)
+        *_, others = monitored.step(actions)
+        for done, info, other in zip(dones, infos, others, strict=True):
+            assert ("episode" in info) == (done and not info["padding"])
+            if "episode" in info:
+                ended, found = info["episode"], other["episode"]
+                assert (ended["r"], ended["l"]) == (found["r"], found["l"])
+                assert ended["delivered"] == info["delivered"]
+                assert ended["t"] > 0.0
+                lengths.add(ended["l"])
+                returns.add(ended["r"])
+    assert lengths == {7, 20}
+    assert len(returns) > 1
+
+
+class Delivering(Wrapper):
+    """Tells of seven deliveries."""
+
+    @property
+    def episode_info(self) -> dict[str, float]:
+        return {"delivered": 7}
+
+
+def test_learners_log_returns_lengths_and_deliveries_by_themselves(
+    small: Small, tmp_path: Path
+) -> None:
+    rewards = {"contact": -1.0}
+    env = SwarmVecEnv(
+        make_env=lambda _: Delivering(SwarmLogisticsEnv(**small, n_robots=4, rewards=rewards)),
+        n_worlds=2,
+        seed=0,
+    )
+    model = PPO("MlpPolicy", env, n_steps=50, batch_size=50, policy_kwargs={"net_arch": [16]})
+    model.set_logger(configure(str(tmp_path), ["json"]))
+    seen = Ends()
+    model.learn(400, callback=[seen, LogDeliveries()])
+    model.logger.close()
+    told = json.loads((tmp_path / "progress.json").read_text())
+    returns = [info["episode"]["r"] for info in seen.ends]
+    assert told["rollout/ep_rew_mean"] == pytest.approx(np.mean(returns))
+    assert told["rollout/ep_len_mean"] == 20
+    assert told["rollout/delivered_mean"] == 7
 
 
 def test_asking_for_adapters_does_not_load_torch() -> None:

@@ -157,7 +157,7 @@ def test_infos_that_are_written_into_share_nothing(small: Small) -> None:
         env.reset()
     for _ in range(21):
         *_, infos = first.step(np.zeros((4, 4)))
-        keys = [set(info) - {"terminal_observation", "mine"} for info in infos]
+        keys = [set(info) - {"terminal_observation", "episode", "mine"} for info in infos]
         assert keys == [set(first.reset_infos[0])] * 4
         assert not any("mine" in info for info in infos)
         infos[0]["mine"] = 1

@@ -7,11 +7,14 @@ import signal
 import socket
 import subprocess
 import sys
+import webbrowser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.watch import server
 
 
 @pytest.mark.parametrize(
@@ -75,6 +78,49 @@ def test_page_is_served_until_ctrl_c_without_pygame(tmp_path: Path) -> None:
     connection.close()
     assert started.returncode == 0
     assert errors == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "at_terminal", "screen", "opens"),
+    [
+        ([], True, ":0", True),
+        ([], False, ":0", False),
+        ([], True, "", False),
+        (["--no-open"], True, ":0", False),
+    ],
+)
+def test_the_browser_opens_at_a_terminal_with_a_screen(
+    arguments: list[str],
+    at_terminal: bool,
+    screen: str,
+    opens: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    served: list[Any] = []
+    monkeypatch.setattr(server, "serve", lambda *given: served.append(given))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: at_terminal)
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("DISPLAY", screen)
+    assert app.run(["watch", *arguments]) == 0
+    ((session, port, _, host, show),) = served
+    assert (session.policy, port, host) == ("ppo-delivery", 8765, "127.0.0.1")
+    assert (show is webbrowser.open) == opens
+    assert show is None or opens
+
+
+@pytest.mark.parametrize(
+    ("host", "lines"), [("0.0.0.0", 1), ("lab.example", 1), ("::1", 0), ("localhost", 0)]
+)
+def test_a_host_that_others_reach_is_warned_of_in_a_line(
+    host: str, lines: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(server, "serve", lambda *_: None)
+    assert app.run(["watch", "--host", host]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == lines
+    assert all(f"--host {host}" in line for line in told)
 
 
 def test_replay_is_written_without_a_server(

@@ -20,6 +20,7 @@ from swarm_logistics_env.errors import (
     SetupError,
 )
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
+from swarm_logistics_env.wrappers import FaultInjection
 
 # Everything is in reach of everybody, so that whoever drives east delivers.
 REACHABLE = Scenario(n_robots=2, n_items=1, pickup_range=14.0, duration=60.0)
@@ -242,9 +243,19 @@ def test_a_step_after_the_end_is_refused_and_moves_nothing(end: str) -> None:
 
 def test_unknown_options_are_ignored_with_a_warning() -> None:
     env = parallel_env(n_robots=2)
-    with pytest.warns(UserWarning, match="reset option 'fault' is ignored; did you mean 'faults'"):
-        observations, _ = env.reset(seed=0, options={"fault": [Fault("removed", 1)]})
-    assert len(observations) == 2
+    for name in ("options", "default"):
+        with pytest.warns(UserWarning, match=f"reset option '{name}' is ignored; "):
+            observations, _ = env.reset(seed=0, options={name: [Fault("removed", 1)]})
+        assert len(observations) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"), [("fault", "faults"), ("FAULTS", "faults"), ("senario", "scenario")]
+)
+def test_an_option_that_is_nearly_a_known_one_is_refused(name: str, meant: str) -> None:
+    for env in (parallel_env(n_robots=2), FaultInjection(parallel_env(n_robots=2), "FM1")):
+        with pytest.raises(SetupError, match=f"no reset option '{name}'; did you mean '{meant}'"):
+            env.reset(seed=0, options={name: ()})
 
 
 # -- who leaves, and how it ends ----------------------------------------------------------------

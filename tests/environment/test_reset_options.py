@@ -1,4 +1,4 @@
-"""Faults as dicts, as JSON and YAML have them."""
+"""Faults as dicts, as JSON and YAML have them, and as texts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import gymnasium
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from swarm_logistics_env import Fault
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies, run_episode
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import FaultError, SetupError
 from swarm_logistics_env.wrappers import FaultInjection, SwarmSize
@@ -38,6 +38,26 @@ def test_wrappers_add_to_dicts() -> None:
     assert env.warehouse.faults == (*AS_FAULTS, Fault("FM2", (1,)))
 
 
+def test_a_text_is_the_fault_that_it_describes_wherever_faults_are_given() -> None:
+    texts = ["FM1:2@0.1+3"]
+    faults: tuple[Fault, ...] = (Fault("FM1", 2, 0.1, 3.0),)
+    scenario = Scenario(n_robots=4, duration=0.3)
+    world = Warehouse(scenario)
+    world.reset(0, texts)
+    assert world.faults == faults
+    world.set_faults([*texts, {"mode": "FM2"}])
+    assert world.faults == (*faults, Fault("FM2"))
+    env = SwarmLogisticsEnv(scenario, faults=texts)
+    assert env.faults == faults
+    wrapped = FaultInjection(SwarmSize(env, [4]), "FM2", [1])
+    wrapped.reset(seed=0, options={"faults": texts})
+    assert env.warehouse.faults == (*faults, Fault("FM2", (1,)))
+    policy = policies.load("homing")
+    played = run_episode(scenario, policy, 0, texts)
+    assert len(played.failed_robots) == 2
+    assert played.digest == run_episode(scenario, policy, 0, faults).digest
+
+
 @pytest.mark.parametrize(
     ("faults", "said"),
     [
@@ -46,6 +66,8 @@ def test_wrappers_add_to_dicts() -> None:
         ([{"mode": "FM9"}], "no failure mode 'FM9'"),
         ([{"mode": "FM1", "robots": 0}], "Fault.robots = 0"),
         ([{1: "FM1"}], "a fault has no 1"),
+        (["FM1:0"], "Fault.robots = 0"),
+        (["FM1 2"], r"fault 'FM1 2': should be MODE\["),
     ],
 )
 def test_a_dict_that_is_no_fault_is_refused(faults: list[Any], said: str) -> None:
@@ -56,7 +78,7 @@ def test_a_dict_that_is_no_fault_is_refused(faults: list[Any], said: str) -> Non
         env.reset(options={"faults": faults})
 
 
-@pytest.mark.parametrize("faults", [{"mode": "FM1"}, "FM1", ["FM1"], 3, None])
+@pytest.mark.parametrize("faults", [{"mode": "FM1"}, "FM1", [3], 3, None])
 def test_what_is_no_list_of_faults_is_refused(faults: Any) -> None:
     with pytest.raises(SetupError, match=r"should be a list of faults, .*\"mode\": \"FM1\""):
         SwarmLogisticsEnv(faults=faults)

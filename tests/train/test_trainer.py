@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
 import torch
+from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
@@ -129,6 +131,33 @@ def test_the_same_seed_gives_the_same_policy(small: Any, tmp_path: Path) -> None
     assert not same(paths[0], paths[2])
 
 
+class Stops(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
+    """Notes what is logged at the end of each rollout, and stops after so many steps."""
+
+    def __init__(self, after: float) -> None:
+        super().__init__()
+        self.after, self.seen = after, 0
+
+    def _on_rollout_end(self) -> None:
+        self.seen = self.num_timesteps
+
+    def _on_step(self) -> bool:
+        return bool(self.num_timesteps < self.after)
+
+
+def test_callbacks_see_a_training_and_may_stop_it_for_the_next_call(
+    small: Any, tmp_path: Path
+) -> None:
+    seeing, stopping = Stops(math.inf), Stops(320)
+    whole = train(small(), tmp_path / "whole", callbacks=[seeing])
+    assert seeing.seen == 640
+    path = train(small(), tmp_path / "cut", callbacks=[stopping])
+    assert policies.read_card(path).agent_steps == 320
+    train(small(), tmp_path / "cut")
+    assert policies.read_card(path).agent_steps == 640
+    assert same(train(small(), tmp_path / "plain"), whole)
+
+
 def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> None:
     train(small(), tmp_path)
     with pytest.raises(TrainingError, match="holds a training with another seed, worlds"):
@@ -156,6 +185,8 @@ def test_nothing_is_begun_that_cannot_be(
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(SwarmLogisticsError, match=sentence):
         train(small(**fields), tmp_path / "out", device=device)
+    with pytest.raises(TrainingError, match=r"callbacks = .*: should be a list of callbacks"):
+        train(small(), tmp_path / "out", callbacks=[print])
     assert not (tmp_path / "out").exists()
 
 

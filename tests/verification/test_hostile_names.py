@@ -7,7 +7,6 @@ import csv
 import io
 import itertools
 import json
-import re
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -61,11 +60,8 @@ def check_report(out: Path) -> None:
     assert tags.found == []
     assert "<script>alert" not in page
     report = (out / "report.md").read_text(encoding="utf-8")
-    # A page shows what is fenced as it is.
-    outside = re.sub(r"^(`{3,})text\n.*?^\1$", "", report, flags=re.DOTALL | re.MULTILINE)
-    assert "## Answer\n\n\n" in outside
     for active in ("<script", "<img", "](javascript", "](http", "\n# A heading"):
-        assert active not in outside
+        assert active not in report
     assert not steers(report.replace("\n", ""))
 
 

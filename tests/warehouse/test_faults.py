@@ -76,7 +76,9 @@ def test_named_robots_fail_and_their_faults_add_up() -> None:
     [
         (Fault("FM1", 9), "robots = 9: should be at most n_robots = 8"),
         (Fault("FM1", (0, 8)), r"\(0, 8\): robots are numbered 0 to 7"),
-        ("FM1", r"faults = \['FM1'\]: should be a list of Fault"),
+        (3, r"faults = \[3\]: should be a list of faults"),
+        ("FM1:x", r"fault 'FM1:x': should be MODE"),
+        ("FM1:9", "robots = 9: should be at most n_robots = 8"),
     ],
 )
 def test_faults_that_cannot_be_are_refused_at_the_reset(fault: Any, complaint: str) -> None:

@@ -46,7 +46,7 @@ def test_what_needs_an_episode_is_refused_before_the_first_reset(
     ("make", "error", "complaint"),
     [
         (lambda world: world.reset(0, None), FaultError, "faults = None: should be a list of"),
-        (lambda world: world.reset(0, ["FM1"]), FaultError, "should be a list of Fault"),
+        (lambda world: world.reset(0, "FM1"), FaultError, "should be a list of faults"),
         (lambda world: world.reset(0, (), {}), ScenarioError, "scenario = {}: should be a Scen"),
         (lambda world: world.reset(1, [Fault("FM1", 3)]), FaultError, "at most n_robots = 2"),
         (lambda world: world.set_faults(None), FaultError, "faults = None"),

@@ -11,7 +11,7 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.server import WatchServer
+from swarm_logistics_env.watch.server import LOOPBACK, WatchServer
 from verification.browser import Browser
 
 SMALL = Scenario(
@@ -32,8 +32,8 @@ def browser(tmp_path: Path) -> Iterator[Browser]:
 class Served:
     """A server that plays in a thread; its session is changed by orders alone."""
 
-    def __init__(self, port: int = 0, token: str | None = None) -> None:
-        self.server = WatchServer(Session(SMALL, speed=8.0), port, token)
+    def __init__(self, port: int = 0, token: str | None = None, host: str = LOOPBACK) -> None:
+        self.server = WatchServer(Session(SMALL, speed=8.0), port, token, host)
         self._started = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
         self._thread.start()

@@ -6,12 +6,16 @@ import asyncio
 import contextlib
 import http.client
 import json
+import os
 import random
+import signal
 import socket
 import stat
 import struct
+import urllib.request
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import aiohttp
 import pytest
@@ -19,12 +23,13 @@ import pytest
 from swarm_logistics_env import Fault, policies, run_episode, spi
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.server import WatchServer, indicators, kept_token
+from swarm_logistics_env.watch.server import WatchServer, indicators, kept_token, serve
 from tests.watch.conftest import SMALL, Served
 
 
 def ask(served: Served, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
-    connection = http.client.HTTPConnection("127.0.0.1", served.server.port, timeout=30)
+    host = urlsplit(served.server.address).hostname or ""
+    connection = http.client.HTTPConnection(host, served.server.port, timeout=30)
     connection.request("GET", path, headers=headers)
     answer = connection.getresponse()
     found = answer.status, answer.read(), dict(answer.getheaders())
@@ -70,6 +75,8 @@ def test_page_and_scripts_come_with_a_content_policy(served: Served) -> None:
     [
         {"Host": "swarm.example"},
         {"Host": "127.0.0.1.swarm.example:8765"},
+        {"Host": "127.0.0.1:8765.swarm.example"},
+        {"Host": "192.168.0.7:8765"},
         {"Host": ""},
         {"Origin": "http://swarm.example"},
         {"Origin": "null"},
@@ -104,6 +111,69 @@ def test_serves_no_other_file(served: Served, name: str) -> None:
 def test_listens_on_loopback_only(served: Served) -> None:
     listening = {site[0] for site in served.server._runner.addresses}
     assert listening == {"127.0.0.1"}
+
+
+@pytest.mark.parametrize(
+    ("host", "asked", "is_own"),
+    [
+        ("0.0.0.0", "192.168.0.7:8765", True),
+        ("0.0.0.0", "[fe80::7]:8765", True),
+        ("0.0.0.0", "swarm.example:8765", False),
+        ("Lab.example", "lab.example:8765", True),
+        ("192.168.0.7", "swarm.example", False),
+        ("192.168.0.7", "7.example", False),
+        ("127.0.0.2", "192.168.0.7", False),
+        ("127.0.0.1", "[::1]:8765", True),
+    ],
+)
+def test_names_that_nobody_gave_are_refused_on_any_host(
+    host: str, asked: str, is_own: bool
+) -> None:
+    assert WatchServer(Session(SMALL), 0, host=host)._is_own(asked) is is_own
+
+
+@pytest.mark.parametrize(
+    ("host", "shown"), [("0.0.0.0", "127.0.0.1"), ("127.0.0.2", "127.0.0.2"), ("::1", "[::1]")]
+)
+def test_serves_on_the_host_that_was_asked_for(host: str, shown: str) -> None:
+    served = Served(host=host)
+    try:
+        assert served.server.address.startswith(f"http://{shown}:")
+        with urllib.request.urlopen(served.server.address, timeout=30) as answer:
+            assert answer.status == 200
+        assert ask(served, f"/{served.server.token}/", Host="swarm.example")[0] == 403
+        origin = {"Host": f"{shown}:1", "Origin": "http://swarm.example"}
+        assert ask(served, f"/{served.server.token}/live", **origin)[0] == 403
+    finally:
+        served.stop()
+
+
+def test_a_host_of_another_machine_is_refused() -> None:
+    with pytest.raises(SetupError, match=r"host = 192\.0\.2\.7, port = 0: "):
+        asyncio.run(WatchServer(Session(SMALL), 0, host="192.0.2.7").start())
+
+
+def test_the_page_is_shown_once_it_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("swarm_logistics_env.watch.server.kept_token", lambda: None)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    told: list[str] = []
+
+    def show(address: str) -> None:
+        try:
+            with urllib.request.urlopen(address, timeout=30) as answer:
+                told.append(answer.read().decode())
+        finally:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    try:
+        serve(Session(SMALL), 0, lambda sentence: None, show=show)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    (page,) = told
+    title = page.partition('id="indicators" title="')[2].partition('"')[0]
+    assert {"R, robustness", "FT, fault tolerance"} <= {
+        line.partition(":")[0] for line in title.splitlines()
+    }
 
 
 def test_frames_hold_what_changed(served: Served) -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from swarm_logistics_env import Fault
 from swarm_logistics_env.errors import FaultError
-from swarm_logistics_env.fault_text import fault_of, text_of
+from swarm_logistics_env.warehouse.fault_text import fault_of, text_of
 
 
 @pytest.mark.parametrize(
