@@ -42,7 +42,7 @@ class Study:
         >>> study = Study(
         ...     seeds=2, scenario={"duration": 5.0}, faults=[{"modes": ["FM1"], "robots": [1]}]
         ... )
-        >>> len(study.plan().conditions)
+        >>> len(study.plan().cases)
         3
     """
 
