@@ -16,8 +16,7 @@ from swarm_logistics_env.observations import columns, n_columns
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
-from swarm_logistics_env.studies.indicator_table import INDICATORS
-from swarm_logistics_env.studies.performance_table import PERFORMANCE, Columns
+from swarm_logistics_env.studies.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.specification import (
     Ablation,
@@ -124,8 +123,8 @@ def study_files() -> dict[str, str]:
         "scenarios": f"Presets of the scenario: {', '.join(SCENARIO_PRESETS)}.",
         "factors": sections({f"[[{name}]]": kind for name, kind in FACTORS.items()}),
         "presets": presets,
-        "performance": columns_of(PERFORMANCE),
-        "indicators": columns_of(INDICATORS),
+        "performance": columns_of(CELL_COLUMNS),
+        "indicators": columns_of(VERDICT_COLUMNS),
     }
 
 
@@ -139,7 +138,7 @@ def about(study: Specification) -> str:
 
 def columns_of(known: Columns) -> str:
     """Return the columns of a table of results with what they mean."""
-    return table(("column", "meaning"), [(f"`{name}`", text) for name, (_, text) in known.items()])
+    return table(("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in known.items()])
 
 
 def sections(kinds: Mapping[str, type[Record]]) -> str:

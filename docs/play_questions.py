@@ -10,21 +10,21 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import question_tables as tables
 from play_tables import OUT, ROOT, play
 from tables import rewritten
 
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.drawing import Draw, Panel
+from swarm_logistics_env.report.drawing import Draw, Panel, Point
+from swarm_logistics_env.report.section import DECIDED
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.fault_measures import rate_curves
-from swarm_logistics_env.studies.performance_table import rows_of
+from swarm_logistics_env.studies.fault_measures import RateCurve, rate_curves
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import grouped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
@@ -46,16 +46,6 @@ def policies_compared(found: StudyResults) -> Answer:
     return blocks, figure.draw, figure.height
 
 
-def point(series: str, known: Sequence[str], category: str, of: Any) -> dict[str, Any]:
-    """Return a point of a figure, from a row with an interval."""
-    value = getattr(of, "value", float("nan"))
-    return {
-        "series": series, "style": known.index(series), "category": category, "value": value,
-        "low": of.low, "high": of.high, "decided": True, "saturated": False,
-        "published": float("nan"),
-    }  # fmt: skip
-
-
 def larger_swarms(found: StudyResults) -> Answer:
     """Answer with P and R against N."""
     blocks = {
@@ -63,20 +53,20 @@ def larger_swarms(found: StudyResults) -> Answer:
         "robustness": f"{tables.by_size(found)}\n\n{tables.over(found)}. [95 %]; the "
         f"last column is paired by seed and unadjusted. {tables.LEGEND}.",
     }
-    rows = [test for test in rows_of(found.indicators) if test.indicator == "R"]
-    policies = list(dict.fromkeys(test.policy for test in rows))
-    points = pd.DataFrame(
-        {
-            "mode": test.factor,
-            **point(test.policy, policies, f"{test.n_robots}, m = {test.after:g}", test),
-            "decided": test.verdict_holm in ("supported", "refuted"),
-        }
-        for test in rows
-    )
-    panels = [
-        Panel(mode, "robustness R", own, (0.0,), "")
-        for mode, own in points.groupby("mode", sort=False)
-    ]
+    known = [test for test in found.verdicts if test.compared.indicator == "R" and test.interval]
+    panels = []
+    for mode, tests in grouped(known, lambda test: test.after.name).items():
+        points = tuple(
+            Point(
+                test.compared.policy,
+                found.policies.index(test.compared.policy),
+                f"{test.compared.n_robots}, m = {test.after.value:g}",
+                *(test.interval or ()),
+                decided=test.holm in DECIDED,
+            )
+            for test in tests
+        )
+        panels.append(Panel(mode, "robustness R", points, (0.0,), ""))
     panels[-1] = replace(panels[-1], x_label="swarm size N, faulty robots m")
     return blocks, partial(on_one_scale, panels=panels), 0.7 + 1.8 * len(panels)
 
@@ -96,21 +86,18 @@ def wear_and_repair(found: StudyResults) -> Answer:
         "repair": tables.repairs(found),
         "after": f"{tables.after_repairs(found)}\n\n{tables.over(found)}. [95 %]. {tables.LEGEND}.",
     }
-    panels = {}
-    for test in rows_of(found.indicators):
-        if test.factor == "FM4":
-            frame = rate_curves(found, test.compared)
-            whole = frame.loc[frame["runs"] == "no fault", "deliveries"].mean()
-            columns = ["deliveries", "low", "high"]
-            frame[columns] *= 100.0 / whole
-            told = {"fault": test.table.lower(), "no fault": "no fault"}
-            curves = panels.setdefault(f"{test.policy}, 100 % are {whole:.1f} items", {})
-            curves |= {told[runs]: own for runs, own in frame.groupby("runs", sort=False)}
-    drawn = {
-        title: pd.concat([own.assign(runs=runs) for runs, own in curves.items()])
-        for title, curves in panels.items()
-    }
-    draw = partial(drawing.rates, panels=drawn, onset=100.0, y_label="deliveries [%]")
+    panels: dict[str, dict[str, RateCurve]] = {}
+    for test in found.verdicts:
+        if test.after.name == "FM4":
+            curves = {curve.runs: curve for curve in rate_curves(found, test.compared)}
+            whole = float(curves["no fault"].deliveries.mean())
+            drawn = panels.setdefault(f"{test.compared.policy}, 100 % are {whole:.1f} items", {})
+            told = {"fault": test.compared.table.lower(), "no fault": "no fault"}
+            for runs, curve in curves.items():
+                numbers = (100.0 / whole * column for column in curve[2:])
+                drawn[told[runs]] = RateCurve(told[runs], curve.seconds, *numbers)
+    shown = {title: list(curves.values()) for title, curves in panels.items()}
+    draw = partial(drawing.rates, panels=shown, onset=100.0, y_label="deliveries [%]")
     return blocks, draw, 0.5 + 1.9 * len(panels)
 
 
@@ -120,26 +107,23 @@ def mixed_swarms(found: StudyResults) -> Answer:
         "shares": f"{tables.shares(found)}\n\n{tables.over(found)}. [95 %]. "
         f"{tables.LEGEND}; the steps are one family, straight lines are unadjusted."
     }
-    rows = [cell for cell in rows_of(found.performance) if cell.n_seeds]
-    faults = list(dict.fromkeys(str(cell.arm.setting) for cell in rows))
+    cells = [cell for cell in found.cells if cell.n_seeds]
+    faults = list(dict.fromkeys(cell.words for cell in cells))
     panels = []
     for policies in tables.replacements(found):
-        points = pd.DataFrame(
-            {
-                **point(
-                    str(cell.arm.setting),
-                    faults,
-                    f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
-                    cell,
-                ),
-                "value": cell.mean,
-                "saturated": cell.saturated,
-            }
-            for cell in rows
+        points = tuple(
+            Point(
+                cell.words,
+                faults.index(cell.words),
+                f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
+                *cell.mean,
+                decided=True,
+                saturated=cell.saturated,
+            )
+            for cell in cells
             if cell.policy in policies
         )
-        title = f"from {policies[0]} to {policies[-1]}"
-        share = f"share of {policies[-1]}"
+        title, share = f"from {policies[0]} to {policies[-1]}", f"share of {policies[-1]}"
         panels.append(Panel(title, "P [items in 500 s]", points, (0.0,), share))
     return blocks, partial(drawing.intervals, panels=panels), 0.5 + 2.5 * len(panels)
 

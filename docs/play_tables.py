@@ -1,6 +1,6 @@
 """Plays the studies behind docs/results.md and writes its tables: `python docs/play_tables.py`.
 
-From these tables follow the README's numbers and picture, and `judge` gets its score cards.
+From these tables follow the README's numbers and picture; `judge` gets what it ranks beside.
 
 What is played is kept, so that a second call plays nothing, and one after an interruption the rest.
 Costs are not measured here: their table is written from what `make benchmark` left, if it did.
@@ -10,24 +10,21 @@ from __future__ import annotations
 
 import json
 import os
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import front_page
-import pandas as pd
-import score_cards
 from tables import rewritten, table
 
-from swarm_logistics_env import spi
-from swarm_logistics_env.report import wording
+from swarm_logistics_env import policies, spi
+from swarm_logistics_env.cli.judging import RECORDED, STUDY
+from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparisons import Setting
-from swarm_logistics_env.studies.indicator_table import Finding
-from swarm_logistics_env.studies.performance_table import Cell, rows_of
-from swarm_logistics_env.studies.policy_comparison import agreement, judged_policies
+from swarm_logistics_env.studies.comparison import NO_FAULT, Setting
+from swarm_logistics_env.studies.policy_comparison import agreement
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import UNAFFECTED, Cell, Verdict, grouped
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "results.md"
@@ -97,20 +94,21 @@ _FAULTS = {
 
 def paper_block(parts: list[StudyResults]) -> str:
     """Return the paper's table: P of the paper beside ours, and how well they agree."""
-    p = pd.concat([part.performance for part in parts])
+    all_cells = [cell for part in parts for cell in part.cells]
     kinds = ["size", "fault", "parameter"]
-    counted = p[p["counted"]].sort_values("kind", key=lambda k: k.map(kinds.index), kind="stable")
-    counted = counted.drop_duplicates("cell")
-    cells = {cell.arm.setting: cell for cell in rows_of(counted)}
-    figure = agreement("", counted)
-    missed = set() if figure.misses is None else set(figure.misses["cell"])
+    counted = [cell for cell in all_cells if cell.counted]
+    counted.sort(key=lambda cell: kinds.index(cell.arm.setting.kind))
+    cells = {one: here[0] for one, here in grouped(counted, lambda c: c.arm.setting).items()}
+    figure = agreement("", list(cells.values()))
+    missed = {cell.arm.setting for cell in figure.misses or ()}
     rows = [
-        _row(label, [cells[level] for level in levels if level in cells], missed)
+        _row(label, [cells[level] for level in levels], missed)
         for label, levels in _paper_rows(cells)
     ]
     rows += [
-        (f"without taxis, N = {cell.n_robots}", "", wording.mean_p(cell), str(cell.n_seeds))
-        for cell in rows_of(p[(p["kind"] == "policy") & (p["factor"] == "random-walk")])
+        (f"without taxis, N = {cell.arm.setting.value:g}", "", *_ours([cell]))
+        for cell in all_cells
+        if cell.arm.setting.name == "random-walk"
     ]
     lines = [
         table(("", "paper's P", "ours, mean [95 %]", "seeds"), rows),
@@ -122,71 +120,69 @@ def paper_block(parts: list[StudyResults]) -> str:
             f"The mean of |ln(ours / paper's)| is {figure.mean_log_error:.3f} over the "
             f"{len(figure.cells)} published values."
         )
-    if figure.met is not None and figure.misses is not None:
-        inside = len(figure.cells) - len(figure.misses)
+    if figure.met is not None:
         lines.append(
             f"{len(figure.met)} of {len(figure.cells)} lie inside the 95 % interval of our mean; "
-            f"{inside} lie inside the 95 % prediction interval of one of our runs, whose mean "
-            f"width is {figure.mean_interval_width:.1f} items (the others are bold). The second "
-            "count is a weak test: quite different controllers pass it as well."
+            f"{len(figure.cells) - len(missed)} lie inside the 95 % prediction interval of one of "
+            f"our runs, whose mean width is {figure.mean_interval_width:.1f} items (the others are "
+            "bold). The second count is a weak test: quite different controllers pass it as well."
         )
-    if counted["saturated"].any():
+    if any(cell.saturated for cell in counted):
         lines.append(
-            f"{wording.SATURATED}: in some run every item was delivered, so this P is capped and "
+            f"{section.SATURATED}: in some run every item was delivered, so this P is capped and "
             "what rests on it as well."
         )
-    lines += ["", *_claims([test for part in parts for test in rows_of(part.indicators)])]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", *_claims([test for part in parts for test in part.verdicts])])
 
 
 def _paper_rows(cells: Mapping[Setting, Cell]) -> list[tuple[str, list[Setting]]]:
     """Return the rows: a label, and the levels that stand side by side in it."""
-    factors: dict[str, list[Setting]] = {}
-    for level in cells:
-        factors.setdefault(level.name, []).append(level)
     rows = []
-    for levels in factors.values():
+    for levels in grouped(cells, lambda level: level.name).values():
         width = len(levels) if len(levels) <= 4 else 3
         for start in range(0, len(levels), width):
             some = levels[start : start + width]
-            rows.append((_label(some, cells[some[0]].arm.condition.scenario.n_items), some))
+            rows.append((_label(some, cells[some[0]]), some))
     return rows
 
 
-def _label(levels: list[Setting], n_items: int) -> str:
+def _label(levels: list[Setting], first: Cell) -> str:
     values = ", ".join(f"{level.value:g}" for level in levels)
     kind, name = levels[0].kind, levels[0].name
     if kind == "size":
-        return f"N = {values} ({n_items} items)"
+        return f"N = {values} ({first.arm.case.scenario.model_dump()['n_items']} items)"
     if kind == "parameter":
         return f"{name} = {values}" + (" m" if name.endswith("_width") else "")
     return f"{_FAULTS[name]}, m = {values}" if levels[0].value else "no fault"
 
 
-def _row(label: str, cells: list[Cell], missed: set[str]) -> tuple[str, ...]:
+def _row(label: str, cells: list[Cell], missed: set[Setting]) -> tuple[str, ...]:
     published = [
-        f"**{cell.published:g}**" if cell.cell in missed else f"{cell.published:g}"
+        f"**{cell.published:g}**" if cell.arm.setting in missed else f"{cell.published:g}"
         for cell in cells
     ]
+    return label, ", ".join(published), *_ours(cells)
+
+
+def _ours(cells: list[Cell]) -> tuple[str, str]:
     seeds = dict.fromkeys(str(cell.n_seeds) for cell in cells)
-    ours = [wording.mean_p(cell) for cell in cells]
-    return label, ", ".join(published), ", ".join(ours), ", ".join(seeds)
+    return ", ".join(map(section.mean_p, cells)), ", ".join(seeds)
 
 
-def _claims(tests: list[Finding]) -> list[str]:
+def _claims(tests: list[Verdict]) -> list[str]:
     """Return how many claims of the paper's text are supported, and which are not."""
     claims = [test for test in tests if test.claim]
     if not claims:
         return []
-    said = [wording.counted_as(test, test.claim_verdict_holm) for test in claims]
+    counted = section.counted(section.counted_as(one, one.claim_verdict_holm) for one in claims)
     text = (
         f"Of {len(claims)} claims (those of the paper's text, and that P falls without taxis), "
-        f"adjusted after Holm: {wording.counted(Counter(said))}."
+        f"adjusted after Holm: {counted}."
     )
     refuted = [
-        f"{test.claim}, {test.comparison}"
-        for test, verdict in zip(claims, said)
-        if verdict == "refuted"
+        f"{test.claim}, {test.compared.label}"
+        for test in claims
+        if section.counted_as(test, test.claim_verdict_holm) == "refuted"
     ]
     return [text, *([f"Refuted: {'; '.join(refuted)}."] if refuted else [])]
 
@@ -196,52 +192,53 @@ def _claims(tests: list[Finding]) -> list[str]:
 
 def policies_block(results: StudyResults, skewed: StudyResults) -> str:
     """Return P and the indicators of every policy, those of `skewed` in place of the others."""
-    names = judged_policies(results)
+    names = results.policies
     rows: dict[str, dict[str, str]] = {}
-    for cell in rows_of(results.performance):
-        if cell.kind in ("size", "parameter"):
-            rows.setdefault(f"P, {cell.cell}", {})[cell.policy] = wording.mean_p(cell)
-    for test in (*rows_of(results.indicators), *rows_of(skewed.indicators)):
-        mark = _EXACT if test.verdict == "unaffected" else ""
-        label = f"{test.indicator}, {test.comparison}"
-        rows.setdefault(label, {})[test.policy] = wording.ratio(test) + mark
+    for cell in results.cells:
+        if cell.arm.setting.kind in ("size", "parameter"):
+            rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
+    for test in (*results.verdicts, *skewed.verdicts):
+        mark = _EXACT if test.plain == UNAFFECTED else ""
+        rows.setdefault(_asked(test), {})[test.compared.policy] = section.ratio(test) + mark
     first, count, more = results.plan.seeds[0], len(results.plan.seeds), len(skewed.plan.seeds)
-    replaced = dict.fromkeys(f"{j.indicator}, {j.comparison}" for j in rows_of(skewed.indicators))
-    fewer = [f"`{name}`" for name in judged_policies(skewed)]
+    replaced = list(dict.fromkeys(map(_asked, skewed.verdicts)))
+    fewer = [f"`{name}`" for name in skewed.policies]
     text = (
         f"{count} seeds from {first:,} on; {more} for "
-        f"{wording.listed(list(replaced))} of {wording.listed(fewer)}, whose P is skewed there."
+        f"{section.listed(replaced)} of {section.listed(fewer)}, whose P is skewed there."
     )
     head = ("", *(f"`{name}`" for name in names))
     body = [(label, *(row.get(name, "") for name in names)) for label, row in rows.items()]
-    if (results.indicators["verdict"] == "unaffected").any():
+    if any(test.plain == UNAFFECTED for test in results.verdicts):
         text += (
-            f"\nThe sign{_EXACT} marks what is {wording.UNAFFECTED}: equal runs, an exact value, "
+            f"\nThe sign{_EXACT} marks what is {section.UNAFFECTED}: equal runs, an exact value, "
             "and no evidence."
         )
     return "\n".join([table(head, body), "", text, *_beside_homing(results)])
 
 
+def _asked(test: Verdict) -> str:
+    return f"{test.compared.indicator}, {test.compared.label}"
+
+
 def _beside_homing(results: StudyResults) -> list[str]:
     """Return a sentence: how much less or more than the script `homing` the networks deliver."""
-    p = results.performance
-    unbroken = {cell.policy: cell for cell in rows_of(p[p["factor"] == "none"])}
+    unbroken = {cell.policy: cell for cell in results.cells if cell.arm.setting == NO_FAULT}
     networks = [name for name in unbroken if name.startswith("ppo-")]
     if "homing" not in unbroken or not networks:
         return []
-    told = []
+    homing, told = unbroken["homing"], []
     for name in networks:
-        change = spi.relative_change(unbroken["homing"].by_seed, unbroken[name].by_seed)
+        change = spi.relative_change(homing.by_seed, unbroken[name].by_seed)
         sign, word = (-1.0, "less") if change.value < 0.0 else (1.0, "more")
         limits = ""
         if change.low is not None and change.high is not None:
             low, high = sorted((100 * sign * change.low, 100 * sign * change.high))
             limits = f" [{low:.1f}, {high:.1f}]"
         told.append(f"`{name}` {100 * abs(change.value):.1f} %{limits} {word}")
-    robots = unbroken["homing"].n_robots
     text = (
-        f"Compared with the script `homing`, at N = {robots} without faults and paired by seed, "
-        f"the networks deliver: {', '.join(told)}."
+        f"Compared with the script `homing`, at N = {homing.arm.case.scenario.n_robots} without "
+        f"faults and paired by seed, the networks deliver: {', '.join(told)}."
     )
     return ["", text]
 
@@ -273,8 +270,23 @@ def costs_block(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+# -- what `judge` ranks a policy beside ---------------------------------------------------------
+
+
+def record_scores(out: Path) -> None:
+    """Record P of the shipped swarms in the study of `judge`; one that needs the state is none."""
+    loaded = {name: policies.load(name) for name in policies.NAMES}
+    names = [name for name, one in loaded.items() if not getattr(one, "needs_state", False)]
+    study = Study.preset(STUDY, out=out / STUDY, policies=names)
+    (found,) = play([study])
+    p = {c.policy: {"p": c.by_seed.tolist()} for c in found.cells if c.arm.setting == NO_FAULT}
+    seeds = [found.plan.seeds[0], found.plan.seeds[-1]]
+    recorded = {"command": "python docs/play_tables.py", "seeds": seeds, "policies": p}
+    RECORDED.write_text(json.dumps(recorded) + "\n", encoding="utf-8")
+
+
 def main() -> None:
-    """Play, rewrite the page of results, then the README, and record the score cards."""
+    """Play, rewrite the page of results, then the README, and record P of the shipped swarms."""
     blocks = {
         "paper": paper_block(play(paper_studies(OUT))),
         "policies": policies_block(*play(policy_studies(OUT))),
@@ -283,7 +295,7 @@ def main() -> None:
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
     PAGE.write_text(rewritten(PAGE.read_text(encoding="utf-8"), blocks), encoding="utf-8")
     front_page.main()
-    score_cards.main()
+    record_scores(OUT)
 
 
 if __name__ == "__main__":

@@ -10,20 +10,18 @@ from numpy.typing import NDArray
 from tables import table
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report import wording
+from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.spi.verdict_signs import SIGNS
-from swarm_logistics_env.studies.comparisons import Arm
-from swarm_logistics_env.studies.indicator_table import Finding
-from swarm_logistics_env.studies.performance_table import Cell, rows_of
+from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
 from swarm_logistics_env.studies.policy_comparison import (
     cells_against_baseline,
     indicators_against_baseline,
     jackknife_interval,
-    judged_policies,
 )
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
 LEGEND = (
     f"{SIGNS['supported'].mark} above the threshold, {SIGNS['refuted'].mark} below it, "
@@ -38,13 +36,17 @@ def over(found: StudyResults) -> str:
     return f"{len(seeds)} paired seeds from {seeds[0]:,} on"
 
 
-def with_sign(test: Finding) -> str:
+def with_sign(test: Verdict) -> str:
     """Return an indicator with its interval and the sign of its verdict."""
-    known = "unaffected" if test.verdict == "unaffected" else test.conclusion or "blocked"
-    return f"{wording.ratio(test)} {SIGNS[known].mark}"
+    return f"{section.ratio(test)} {SIGNS[test.conclusion or 'blocked'].mark}"
 
 
-Judged = tuple[StudyResults, Finding]
+def asked(test: Verdict) -> str:
+    """Return an indicator and what is changed."""
+    return f"{test.compared.indicator}, {test.compared.label}"
+
+
+Judged = tuple[StudyResults, Verdict]
 
 
 def difference(one: Judged, other: Judged) -> Interval:
@@ -53,10 +55,10 @@ def difference(one: Judged, other: Judged) -> Interval:
     assert list(seeds) == list(others)
 
     def value(judged: Judged, some: NDArray[np.intp]) -> float:
-        results, test = judged
-        key = test.policy, test.table
-        estimate = test.compared.estimate(lambda arm: results.by_arm[*key, arm].by_seed[some])
-        return float(estimate.value)
+        results, compared = judged[0], judged[1].compared
+        place = compared.policy, compared.table
+        p = {arm: results.by_place[*place, arm].by_seed[some] for arm in compared.arms}
+        return compared.estimate(p).value
 
     return jackknife_interval(len(seeds), lambda some: value(one, some) - value(other, some))
 
@@ -68,24 +70,22 @@ def side_by_side(found: StudyResults) -> str:
     """Return P and the indicators of every policy, a column a policy."""
     rows: dict[str, dict[str, str]] = {}
     for label, cell, _ in performances(found):
-        rows.setdefault(label, {})[cell.policy] = wording.mean_p(cell)
-    for asked in indicators_against_baseline(found):
-        label = f"{asked.test.indicator}, {asked.test.comparison}"
-        rows[label] = {policy: with_sign(own) for policy, own in asked.tests.items()}
-    return f"{_columns(rows, judged_policies(found))}\n\n{over(found)}. [95 %]; {LEGEND}."
+        rows.setdefault(label, {})[cell.policy] = section.mean_p(cell)
+    for one in indicators_against_baseline(found):
+        rows[asked(one.test)] = {policy: with_sign(own) for policy, own in one.tests.items()}
+    return f"{_columns(rows, found.policies)}\n\n{over(found)}. [95 %]; {LEGEND}."
 
 
 def differences(found: StudyResults) -> str:
     """Return how P and the indicators of every other policy differ from the first one's."""
-    baseline, *others = judged_policies(found)
+    baseline, *others = found.policies
     rows: dict[str, dict[str, str]] = {}
     for label, cell, less in performances(found):
-        rows.setdefault(label, {})[cell.policy] = wording.bracketed(less, 1)
-    for asked in indicators_against_baseline(found):
-        label = f"{asked.test.indicator}, {asked.test.comparison}"
-        rows[label] = {
-            policy: f"{wording.bracketed(less, 3)} {_side(less)}"
-            for policy, less in asked.differences.items()
+        rows.setdefault(label, {})[cell.policy] = section.bracketed(less, 1)
+    for one in indicators_against_baseline(found):
+        rows[asked(one.test)] = {
+            policy: f"{section.bracketed(less, 3)} {_side(less)}"
+            for policy, less in one.differences.items()
         }
     heads = [f"`{policy}` less `{baseline}`" for policy in others]
     return (
@@ -95,15 +95,14 @@ def differences(found: StudyResults) -> str:
 
 
 def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | None]]:
-    """Yield label, row and difference of P, each condition once and those with faults not."""
-    labels: dict[str, str] = {}
+    """Yield label, cell and difference of P, each condition once and those with faults not."""
+    known: set[str] = set()
     cells = [one for own in cells_against_baseline(found).values() for one in own]
-    for one in sorted(cells, key=lambda one: one.cell.kind != "size"):
-        setting, key = one.cell.arm.setting, one.cell.arm.condition.key
-        if (setting.kind == "fault" and setting.value) or key in labels:
-            continue
-        labels[key] = f"P, {setting}"
-        yield labels[key], one.cell, one.difference
+    for one in sorted(cells, key=lambda one: one.cell.arm.setting.kind != "size"):
+        setting, key = one.cell.arm.setting, one.cell.arm.case.key
+        if key not in known and not (setting.kind == "fault" and setting.value):
+            known.add(key)
+            yield f"P, {setting}", one.cell, one.difference
 
 
 def _columns(
@@ -124,18 +123,16 @@ def _side(difference: Interval | None) -> str:
 
 def by_size(found: StudyResults) -> str:
     """Return R of every failure mode against N, and its change from the first N to the last."""
-    tests: dict[tuple[str, str], list[Finding]] = {}
-    for test in rows_of(found.indicators):
-        if test.indicator == "R":
-            tests.setdefault((test.policy, test.factor), []).append(test)
-    sizes = [test.n_robots for test in next(iter(tests.values()))]
+    robustness = [test for test in found.verdicts if test.compared.indicator == "R"]
+    tests = grouped(robustness, lambda test: (test.compared.policy, test.after.name))
+    sizes = [test.compared.n_robots for test in next(iter(tests.values()))]
     head = ("policy", "mode", *(f"N = {n}" for n in sizes), f"N = {sizes[-1]} less N = {sizes[0]}")
     body = [
         (
             f"`{policy}`",
             mode,
             *map(with_sign, own),
-            wording.bracketed(difference((found, own[-1]), (found, own[0])), 3),
+            section.bracketed(difference((found, own[-1]), (found, own[0])), 3),
         )
         for (policy, mode), own in tests.items()
     ]
@@ -144,22 +141,16 @@ def by_size(found: StudyResults) -> str:
 
 def performances_by_size(found: StudyResults) -> str:
     """Return P, P for each robot, and S of every policy against N."""
-    cells: dict[str, list[Cell]] = {}
-    for cell in rows_of(found.performance):
-        if cell.kind == "size":
-            cells.setdefault(cell.policy, []).append(cell)
-    sizes = [cell.n_robots for cell in next(iter(cells.values()))]
+    cells = [cell for cell in found.cells if cell.arm.setting.kind == "size"]
+    sizes = dict.fromkeys(cell.arm.setting.value for cell in cells)
     body = []
-    for policy, own in cells.items():
-        body.append((f"P, `{policy}`", *map(wording.mean_p, own)))
-        body.append((f"P / N, `{policy}`", *(f"{c.mean / c.n_robots:.2f}" for c in own)))
-        steps = [
-            with_sign(test)
-            for test in rows_of(found.indicators)
-            if (test.policy, test.indicator) == (policy, "S")
-        ]
-        body.append((f"S up to this N, `{policy}`", "", *steps))
-    return table(("", *(f"N = {n}" for n in sizes)), body)
+    for policy, own in grouped(cells, lambda cell: cell.policy).items():
+        body.append((f"P, `{policy}`", *map(section.mean_p, own)))
+        each = (f"{c.mean.value / c.arm.setting.value:.2f}" for c in own)
+        body.append((f"P / N, `{policy}`", *each))
+        steps = [test for test in found.verdicts if test.compared.family == (policy, "S")]
+        body.append((f"S up to this N, `{policy}`", "", *map(with_sign, steps)))
+    return table(("", *(f"N = {n:g}" for n in sizes)), body)
 
 
 # -- wear and repair ----------------------------------------------------------------------------
@@ -167,16 +158,12 @@ def performances_by_size(found: StudyResults) -> str:
 REPAIRED_AT = 200.0  # [s]: failed at 100 s, for 100 s
 
 
-def repaired_tests(found: StudyResults) -> Iterator[tuple[Finding, Finding]]:
+def repaired_tests(found: StudyResults) -> Iterator[tuple[Verdict, Verdict]]:
     """Yield each fault that stays until the end with the same one that is repaired."""
-    tests = {
-        (test.policy, test.factor, test.table): test
-        for test in rows_of(found.indicators)
-        if test.onset
-    }
-    for (policy, mode, where), repaired in tests.items():
-        if where.startswith("Repaired"):
-            yield tests[policy, mode, "Not repaired"], repaired
+    late = [test for test in found.verdicts if test.after.onset]
+    for pair in grouped(late, lambda test: (test.compared.policy, test.after.name)).values():
+        stays, repaired = sorted(pair, key=lambda test: test.compared.table)
+        yield stays, repaired
 
 
 def repairs(found: StudyResults) -> str:
@@ -184,8 +171,7 @@ def repairs(found: StudyResults) -> str:
     body = []
     for tests in repaired_tests(found):
         gain = spi.relative_change(*(_by_seed(found, one, one.compared.changed) for one in tests))
-        named = f"`{tests[0].policy}`", tests[0].factor
-        body.append((*named, *map(with_sign, tests), _share(gain)))
+        body.append((*_named(tests[0]), *map(with_sign, tests), _share(gain)))
     head = ("policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P [%]")
     return table(head, body)
 
@@ -198,14 +184,16 @@ def after_repairs(found: StudyResults) -> str:
         after = [deliveries_after(found, test.compared.changed) for test in tests]
         left = [spi.relative_change(whole, counts) for counts in after]
         back = spi.equivalence(whole, after[1], margin=found.plan.specification.margin)
-        named = f"`{tests[0].policy}`", tests[0].factor
-        body.append((*named, *map(_share, left), back.verdict))
+        body.append((*_named(tests[0]), *map(_share, left), section.said(back.verdict)))
     return table(("policy", "mode", "not repaired [%]", "repaired [%]", "all back"), body)
 
 
-def _by_seed(found: StudyResults, test: Finding, arm: Arm) -> NDArray[np.float64]:
-    counts: NDArray[np.float64] = found.by_arm[test.policy, test.table, arm].by_seed
-    return counts
+def _named(test: Verdict) -> tuple[str, str]:
+    return f"`{test.compared.policy}`", test.after.name
+
+
+def _by_seed(found: StudyResults, test: Verdict, arm: Arm) -> NDArray[np.float64]:
+    return found.by_place[test.compared.policy, test.compared.table, arm].by_seed
 
 
 def deliveries_after(found: StudyResults, arm: Arm) -> NDArray[np.float64]:
@@ -217,22 +205,19 @@ def deliveries_after(found: StudyResults, arm: Arm) -> NDArray[np.float64]:
 
 def _share(change: Estimate) -> str:
     """Return a relative change in percent."""
-    return wording.bracketed(
-        Interval(*(100 * (x or 0.0) for x in (change.value, change.low, change.high))), 1
-    )
+    limits = (None if x is None else 100 * x for x in (change.low, change.high))
+    return section.bracketed(Interval(100 * change.value, *limits), 1)
 
 
 def wear(found: StudyResults) -> str:
     """Return R and the change of P, of wearing motors and of motors slow from the start."""
     body = []
-    for test in rows_of(found.indicators):
-        if test.table == "Wear":
-            whole, worn = (
-                _by_seed(found, test, arm)
-                for arm in (test.compared.original, test.compared.changed)
-            )
-            change = _share(spi.relative_change(whole, worn))
-            body.append((f"`{test.policy}`", test.comparison, with_sign(test), change))
+    for test in found.verdicts:
+        if test.compared.table == "Wear":
+            arms = test.compared.original, test.compared.changed
+            change = spi.relative_change(*(_by_seed(found, test, arm) for arm in arms))
+            policy, label = test.compared.policy, test.compared.label
+            body.append((f"`{policy}`", label, with_sign(test), _share(change)))
     return table(("policy", "worn robots", "R", "change of P [%]"), body)
 
 
@@ -241,21 +226,17 @@ def wear(found: StudyResults) -> str:
 
 def replacements(found: StudyResults) -> list[tuple[str, ...]]:
     """Return the policies from each pure swarm to the next one, the mixes between them."""
-    policies = judged_policies(found)
-    names = [str(getattr(one, "name", one)) for one in found.plan.specification.policies]
-    pure = [place for place, name in enumerate(names) if "=" not in name]
-    ends = sorted({0, *pure, len(policies) - 1})
-    return [policies[first : last + 1] for first, last in itertools.pairwise(ends)]
+    named = found.plan.specification.policies
+    pure = [place for place, one in enumerate(named) if "=" not in one.name]
+    ends = sorted({0, *pure, len(named) - 1})
+    return [found.policies[first : last + 1] for first, last in itertools.pairwise(ends)]
 
 
 def shares(found: StudyResults) -> str:
     """Return P and R by share, the step from share to share, and what the mix adds to its parts."""
-    p = {
-        cell.policy: cell for cell in rows_of(found.performance) if cell.arm.setting.name == "none"
-    }
-    tests = {(test.policy, test.comparison): test for test in rows_of(found.indicators)}
-    asked = list(dict.fromkeys(comparison for _, comparison in tests))
-    policies = judged_policies(found)
+    p = {cell.policy: cell for cell in found.cells if cell.arm.setting == NO_FAULT}
+    tests = grouped(found.verdicts, lambda test: test.compared.policy)
+    policies = found.policies
     steps = [
         spi.relative_change(p[before].by_seed, p[after].by_seed)
         for before, after in itertools.pairwise(policies)
@@ -270,19 +251,19 @@ def shares(found: StudyResults) -> str:
         for place, policy in enumerate(own[1:-1], 1):
             part = place / (len(own) - 1)
             beyond = p[policy].by_seed - (1 - part) * first - part * last
-            more[policy] = wording.bracketed(t_interval(beyond), 1)
+            more[policy] = section.bracketed(t_interval(beyond), 1)
     body = [
         (
             f"`{policy}`",
-            wording.mean_p(p[policy]),
+            section.mean_p(p[policy]),
             told.get(policy, ""),
             more.get(policy, ""),
-            *(with_sign(tests[policy, comparison]) for comparison in asked),
+            *map(with_sign, tests[policy]),
         )
         for policy in policies
     ]
-    head = ("", "P", "step [%]", "P less the straight line", *(f"R, {one}" for one in asked))
-    return table(head, body)
+    heads = (f"R, {test.compared.label}" for test in tests[policies[0]])
+    return table(("", "P", "step [%]", "P less the straight line", *heads), body)
 
 
 # -- two studies of the same questions ----------------------------------------------------------
@@ -295,22 +276,16 @@ def beside_another_world(found: StudyResults, ideal: StudyResults) -> str:
 
 
 def _lost(found: StudyResults, ideal: StudyResults) -> Iterator[tuple[str, ...]]:
-    before = {
-        (cell.policy, cell.arm.setting): cell
-        for cell in rows_of(ideal.performance)
-        if cell.kind == "size"
-    }
-    for cell in rows_of(found.performance):
+    before = {(cell.policy, cell.arm.setting): cell for cell in ideal.cells}
+    for cell in found.cells:
         known = before.get((cell.policy, cell.arm.setting))
-        if known is not None:
+        if known is not None and cell.arm.setting.kind == "size":
             change = spi.relative_change(known.by_seed, cell.by_seed)
-            means = wording.mean_p(known), wording.mean_p(cell)
-            yield f"`{cell.policy}`", f"P, {cell.cell}", *means, f"{_share(change)} %"
-    asked = {(test.policy, test.compared.question): test for test in rows_of(ideal.indicators)}
-    for test in rows_of(found.indicators):
-        same = asked.get((test.policy, test.compared.question))
-        if same is not None and test.indicator == "R":
-            less = difference((found, test), (ideal, same))
-            label = f"{test.indicator}, {test.comparison}"
-            values = with_sign(same), with_sign(test)
-            yield f"`{test.policy}`", label, *values, wording.bracketed(less, 3)
+            means = section.mean_p(known), section.mean_p(cell)
+            yield f"`{cell.policy}`", f"P, {cell.words}", *means, f"{_share(change)} %"
+    answers = {(test.compared.policy, test.compared.question): test for test in ideal.verdicts}
+    for test in found.verdicts:
+        same = answers.get((test.compared.policy, test.compared.question))
+        if same is not None and test.compared.indicator == "R":
+            less = section.bracketed(difference((found, test), (ideal, same)), 3)
+            yield f"`{test.compared.policy}`", asked(test), *map(with_sign, (same, test)), less

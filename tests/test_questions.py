@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from swarm_logistics_env.studies.performance_table import rows_of
 
-from swarm_logistics_env.report import wording
+from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
@@ -50,7 +49,7 @@ def test_seeds_are_clear_of_those_that_anything_was_fitted_on(file: Path) -> Non
     assert min(plan.seeds) >= 20_000
     assert max(plan.seeds) < FIRST_OF_TRAININGS
     assert len(plan.seeds) >= 10
-    assert plan.conditions
+    assert plan.cases
 
 
 def test_every_question_has_a_page(script: Any) -> None:
@@ -75,10 +74,10 @@ def test_page_quotes_what_was_played(
     script.main([name])
     text = page.read_text(encoding="utf-8")
     found = in_small(name, tmp_path / "out").findings()
-    for test in rows_of(found.indicators):
-        assert wording.ratio(test) in text, test.comparison
-    for cell in rows_of(found.performance):
-        if cell.kind == "size":
-            assert wording.mean_p(cell) in text
+    for test in found.verdicts:
+        assert section.ratio(test) in text, test.compared.label
+    for cell in found.cells:
+        if cell.arm.setting.kind == "size":
+            assert section.mean_p(cell) in text
     assert "<svg" in (tmp_path / "media" / f"{name}.svg").read_text(encoding="utf-8")
     assert "## What this leans on" in text

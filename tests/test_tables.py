@@ -53,7 +53,7 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     monkeypatch.setattr(tables, "PAGE", page)
     monkeypatch.setattr(tables.front_page, "main", lambda: None)
-    monkeypatch.setattr(tables.score_cards, "main", lambda: None)
+    monkeypatch.setattr(tables, "record_scores", lambda out: None)
     monkeypatch.setattr(tables, "OUT", tmp_path / "out")
     monkeypatch.setattr(tables, "BENCHMARK", tmp_path / "benchmark.json")
     monkeypatch.setattr(tables, "PROCESSES", 1)

@@ -229,7 +229,7 @@ def _judge_policy(
     return tally.failed
 
 
-# P of the shipped policies in the study `scorecard`; `docs/score_cards.py` writes it.
+# P of the shipped policies in the study `scorecard`; `docs/play_tables.py` writes it.
 RECORDED = Path(__file__).parents[1] / "report" / "shipped_score_cards.json"
 
 

@@ -198,6 +198,6 @@ def test_recorded_p_is_that_of_the_shipped_policies() -> None:
     plan = Study.preset("scorecard", seeds=60).plan()
     assert recorded["seeds"][0] == plan.seeds[0]
     for name in {"swarm-dt", "homing"} & set(recorded["policies"]):
-        # If this fails, run `python docs/score_cards.py`.
+        # If this fails, run `make tables`.
         first = run_episode(Scenario(restock=True), policies.load(name), seed=plan.seeds[0])
         assert recorded["policies"][name]["p"][0] == first.delivered
