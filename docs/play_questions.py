@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import question_tables as tables
@@ -36,7 +36,7 @@ Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and
 
 def study(name: str, seeds: int | None = None) -> Study:
     """Return the study of a question; `seeds`: None: as many as its file says."""
-    changed = {} if seeds is None else {"seeds": seeds}
+    changed: dict[str, Any] = {} if seeds is None else {"seeds": seeds}
     return Study.from_file(STUDIES / f"{name}.toml", out=OUT / "questions" / name, **changed)
 
 

@@ -43,11 +43,11 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 18_900,
-    "tokens of the package": 170_000,
-    "files of the package": 141,
+    "lines of code of the package": 19_000,
+    "tokens of the package": 171_000,
+    "files of the package": 143,
     "lines of code of studies and report": 4_680,
-    "lines of tests": 20_500,
+    "lines of tests": 21_400,
     "lines of verification, benchmarks, interop and the scripts of docs": 4_850,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }

@@ -164,6 +164,12 @@ class PolicySpec(Record):
         return self.label or called(self.name) + (f" ({given})" if given else "")
 
     @property
+    def is_text(self) -> bool:
+        """Whether a command line can name it: no object, of which a store keeps its class alone."""
+        is_class = self.name.isidentifier() and self.name not in NAMES
+        return self.made is None and not (self.parameters or is_class)
+
+    @property
     def runs_code(self) -> bool:
         """Whether to load it runs code that its name leads to, so that somebody has to trust it."""
         return self.made is None and (":" in self.name or self.name.endswith(SB3_SUFFIX))

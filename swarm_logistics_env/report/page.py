@@ -115,7 +115,7 @@ def watch_command(arm: Arm) -> str | None:
     case = arm.case
     if case.task.name != DEFAULT or case.behaviour:
         return None
-    if case.policy.made is not None or case.policy.parameters:
+    if not case.policy.is_text:
         return None
     words = ["swarm-logistics", "watch", "--policy", case.policy.name]
     default = case.task.default.model_dump(mode="json")

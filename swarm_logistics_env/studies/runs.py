@@ -201,8 +201,9 @@ class Runs:
 
         Returns:
             The columns `run` (key), `policy`, `policy_identity`, `task`, `scenario`, `faults`,
-            `behaviour`, `code`, `seed`, `delivered` and those of `Outcome`; `delivery_times` are
-            lists [s]; the fields of an outcome are None where the run failed.
+            `behaviour`, `code`, `seed`, `delivered` and those of `Outcome`; `scenario` and
+            `faults` are JSON, `delivery_times` lists [s]; the fields of an outcome are None where
+            the run failed.
         """
         import pandas as pd
 
@@ -215,7 +216,9 @@ class Runs:
                     result = json.loads(text) | {"delivered": outcome.delivered}
                     if outcome.error is not None:
                         result = dict.fromkeys(result) | {"error": outcome.error}
-                    found.append({"run": key} | json.loads(run) | result)
+                    case = json.loads(run)
+                    case |= {name: canonical_json(case[name]) for name in ("scenario", "faults")}
+                    found.append({"run": key} | case | result)
         return pd.DataFrame(found, dtype=object)
 
     def note(self, notes: Mapping[str, str]) -> None:
@@ -354,9 +357,8 @@ def export(runs: Runs, path: Path) -> tuple[int, str]:
     if path.suffix != ".csv":
         raise StudyError(f"cannot export to {path}: should end in .csv")
     frame = runs.frame()
-    for name in ("scenario", "faults", "failed_robots") if len(frame) else ():
-        frame[name] = frame[name].map(canonical_json)
     if len(frame):
+        frame["failed_robots"] = frame["failed_robots"].map(canonical_json)
         frame["delivery_times"] = frame["delivery_times"].map(
             lambda times: " ".join(map(repr, times)), na_action="ignore"
         )
