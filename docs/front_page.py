@@ -25,12 +25,12 @@ _VALUE = re.compile(rf"({_NUMBER}) \[({_NUMBER}), ({_NUMBER})\]")
 
 
 class Value(NamedTuple):
-    """A number of a table with the limits of its 95 % interval, and as it stands there."""
+    """A number of a table as it stands there, and with the limits of its 95 % interval."""
 
+    text: str
     value: float
     low: float
     high: float
-    text: str
 
 
 Rows = Mapping[str, Mapping[str, Value]]  # by the row's label and the column's heading
@@ -45,15 +45,11 @@ def rows_of(block: str) -> Rows:
         label, *cells = [cell.strip() for cell in line.split("|")[1:-1]]
         matches = {name: _VALUE.match(cell) for name, cell in zip(columns, cells, strict=True)}
         found[label] = {
-            name: Value(_number(match[1]), _number(match[2]), _number(match[3]), match[0])
+            name: Value(match[0], *(float(part.replace("∞", "inf")) for part in match.groups()))
             for name, match in matches.items()
             if match
         }
     return found
-
-
-def _number(text: str) -> float:
-    return float(text.replace("∞", "inf"))
 
 
 _MODES = {
@@ -206,18 +202,13 @@ def with_address(text: str, address: str | None) -> str:
     return re.sub(r"^(\[[^]]+\]: )(?!https://)", links, text.replace(NOTE, ""), flags=re.MULTILINE)
 
 
-def address_of_the_repository() -> str | None:
-    """Return `Repository` of [project.urls], without a slash at its end; None: there is none."""
-    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    address: str | None = project.get("urls", {}).get("Repository")
-    return address and address.rstrip("/")
-
-
 def written() -> str:
-    """Return the README as the tables have it."""
+    """Return the README as the tables have it, with links to the repository of [project.urls]."""
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    address = project.get("urls", {}).get("Repository")
     page, readme = RESULTS.read_text(encoding="utf-8"), README.read_text(encoding="utf-8")
     blocks = {"findings": findings(page), "speed": speed(page)}
-    return with_address(rewritten(readme, blocks), address_of_the_repository())
+    return with_address(rewritten(readme, blocks), address and address.rstrip("/"))
 
 
 def main() -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import inspect
+import json
+import re
+from collections.abc import Container, Mapping
 from pathlib import Path
 
 import numpy as np
-from tables import fields, rewritten, summary, table
+from pydantic_core import PydanticUndefined
+from tables import rewritten, table
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
@@ -36,13 +40,9 @@ from swarm_logistics_env.train.settings import (
 from swarm_logistics_env.train.training import Training, load_training, preset_names
 
 DOCS = Path(__file__).parent
-FACTORS: dict[str, type[Record]] = {
-    "sizes": Sizes,
-    "faults": Faults,
-    "parameters": Parameter,
-    "ablations": Ablation,
-}
-PARTS: dict[str, type[Record]] = {
+Kinds = Mapping[str, type[Record]]
+FACTORS: Kinds = {"sizes": Sizes, "faults": Faults, "parameters": Parameter, "ablations": Ablation}
+PARTS: Kinds = {
     "[network]": Network,
     "[[worlds]]": WorldKind,
     "[[conditions]]": Conditions,
@@ -146,7 +146,7 @@ def columns_of(known: Columns) -> str:
     return table(("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in known.items()])
 
 
-def sections(kinds: Mapping[str, type[Record]]) -> str:
+def sections(kinds: Kinds) -> str:
     """Return a section with the fields of each record."""
     return "\n\n".join(
         f"## `{name}`\n\n{summary(kind)}\n\n{fields(kind)}" for name, kind in kinds.items()
@@ -164,6 +164,54 @@ def training_files() -> dict[str, str]:
             for name, training in presets.items()
         ),
     }
+
+
+def fields(record: type[Record], leave_out: Container[str] = ()) -> str:
+    """Return a table of a record's fields with their defaults and what its docstring says."""
+    said = meanings(record)
+    rows = [
+        (f"`{name}`", default(record, name), said.get(name, ""))
+        for name in record.model_fields
+        if name not in leave_out
+    ]
+    return table(("field", "default", "meaning"), rows)
+
+
+def default(record: type[Record], name: str) -> str:
+    """Return a field's default as TOML has it; "needed" where there is none."""
+    value = record.model_fields[name].get_default(call_default_factory=True)
+    if value is PydanticUndefined:
+        return "needed"
+    if value is None or value == {} or value == ():
+        return "none"
+    if isinstance(value, Scenario):
+        changed = {k: v for k, v in value.model_dump().items() if v != getattr(Scenario(), k)}
+        return ", ".join(f"`{k} = {json.dumps(v)}`" for k, v in changed.items()) or "the paper's"
+    if isinstance(value, Record):
+        return "see below"
+    if isinstance(value, tuple) and len(value) > 20:
+        return f"all {len(value)}"
+    return f"`{json.dumps(value, default=str)}`"
+
+
+def meanings(record: type[Record]) -> dict[str, str]:
+    """Return what the docstrings of a record and its bases say of each field."""
+    found: dict[str, str] = {}
+    for kind in reversed(record.__mro__):
+        # Python 3.13 takes the indent of a docstring away by itself.
+        _, _, text = inspect.cleandoc(vars(kind).get("__doc__") or "").partition("Args:\n")
+        text, _, _ = text.partition("\n\n")
+        for names, meaning in re.findall(
+            r"^ {4}([\w, ]+): (.*(?:\n {8}.*)*)", text + "\n", flags=re.MULTILINE
+        ):
+            sentence = " ".join(meaning.split())
+            found |= dict.fromkeys(names.split(", "), sentence)
+    return found
+
+
+def summary(documented: object) -> str:
+    """Return the first paragraph of a docstring, on one line."""
+    return " ".join((documented.__doc__ or "").split("\n\n")[0].split())
 
 
 PAGES = {"environment": environment, "study_files": study_files, "training_files": training_files}

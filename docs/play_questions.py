@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 DOCS = ROOT / "docs"
-STUDIES = ROOT / "examples" / "questions"
 Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
 
 
 def study(name: str, seeds: int | None = None) -> Study:
     """Return the study of a question; `seeds`: None: as many as its file says."""
     changed: dict[str, Any] = {} if seeds is None else {"seeds": seeds}
-    return Study.from_file(STUDIES / f"{name}.toml", out=OUT / "questions" / name, **changed)
+    file = ROOT / "examples" / "questions" / f"{name}.toml"
+    return Study.from_file(file, out=OUT / "questions" / name, **changed)
 
 
 def policies_compared(found: StudyResults) -> Answer:

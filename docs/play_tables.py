@@ -17,7 +17,7 @@ from typing import Any
 import front_page
 from tables import rewritten, table
 
-from swarm_logistics_env import policies, spi
+from swarm_logistics_env import policies
 from swarm_logistics_env.cli.judging import RECORDED, STUDY
 from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
@@ -172,8 +172,6 @@ def _ours(cells: list[Cell]) -> tuple[str, str]:
 def _claims(tests: list[Verdict]) -> list[str]:
     """Return how many claims of the paper's text are supported, and which are not."""
     claims = [test for test in tests if test.claim]
-    if not claims:
-        return []
     counted = section.counted(section.counted_as(one, one.claim_verdict_holm) for one in claims)
     text = (
         f"Of {len(claims)} claims (those of the paper's text, and that P falls without taxis), "
@@ -214,33 +212,11 @@ def policies_block(results: StudyResults, skewed: StudyResults) -> str:
             f"\nThe sign{_EXACT} marks what is {section.UNAFFECTED}: equal runs, an exact value, "
             "and no evidence."
         )
-    return "\n".join([table(head, body), "", text, *_beside_homing(results)])
+    return "\n".join([table(head, body), "", text])
 
 
 def _asked(test: Verdict) -> str:
     return f"{test.compared.indicator}, {test.compared.label}"
-
-
-def _beside_homing(results: StudyResults) -> list[str]:
-    """Return a sentence: how much less or more than the script `homing` the networks deliver."""
-    unbroken = {cell.policy: cell for cell in results.cells if cell.arm.setting == NO_FAULT}
-    networks = [name for name in unbroken if name.startswith("ppo-")]
-    if "homing" not in unbroken or not networks:
-        return []
-    homing, told = unbroken["homing"], []
-    for name in networks:
-        change = spi.relative_change(homing.by_seed, unbroken[name].by_seed)
-        sign, word = (-1.0, "less") if change.value < 0.0 else (1.0, "more")
-        limits = ""
-        if change.low is not None and change.high is not None:
-            low, high = sorted((100 * sign * change.low, 100 * sign * change.high))
-            limits = f" [{low:.1f}, {high:.1f}]"
-        told.append(f"`{name}` {100 * abs(change.value):.1f} %{limits} {word}")
-    text = (
-        f"Compared with the script `homing`, at N = {homing.arm.case.scenario.n_robots} without "
-        f"faults and paired by seed, the networks deliver: {', '.join(told)}."
-    )
-    return ["", text]
 
 
 # -- the table of costs -------------------------------------------------------------------------

@@ -87,11 +87,9 @@ def differences(found: StudyResults) -> str:
             policy: f"{section.bracketed(less, 3)} {_side(less)}"
             for policy, less in one.differences.items()
         }
-    heads = [f"`{policy}` less `{baseline}`" for policy in others]
-    return (
-        f"{_columns(rows, others, heads)}\n\n[95 %], paired by seed, unadjusted. An indicator is "
-        "higher or lower if its interval is clear of 0."
-    )
+    shown = _columns(rows, others, [f"`{policy}` less `{baseline}`" for policy in others])
+    told = "An indicator is higher or lower if its interval is clear of 0."
+    return f"{shown}\n\n[95 %], paired by seed, unadjusted. {told}"
 
 
 def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | None]]:
@@ -158,38 +156,34 @@ def performances_by_size(found: StudyResults) -> str:
 REPAIRED_AT = 200.0  # [s]: failed at 100 s, for 100 s
 
 
-def repaired_tests(found: StudyResults) -> Iterator[tuple[Verdict, Verdict]]:
-    """Yield each fault that stays until the end with the same one that is repaired."""
+def repaired_tests(found: StudyResults) -> Iterator[tuple[str, str, tuple[Verdict, Verdict]]]:
+    """Yield policy, mode, and the fault that stays until the end with the one that is repaired."""
     late = [test for test in found.verdicts if test.after.onset]
-    for pair in grouped(late, lambda test: (test.compared.policy, test.after.name)).values():
-        stays, repaired = sorted(pair, key=lambda test: test.compared.table)
-        yield stays, repaired
+    pairs = grouped(late, lambda test: (f"`{test.compared.policy}`", test.after.name))
+    for (policy, mode), (stays, repaired) in pairs.items():
+        yield policy, mode, (stays, repaired)
 
 
 def repairs(found: StudyResults) -> str:
     """Return what a repair brings."""
     body = []
-    for tests in repaired_tests(found):
+    for policy, mode, tests in repaired_tests(found):
         gain = spi.relative_change(*(_by_seed(found, one, one.compared.changed) for one in tests))
-        body.append((*_named(tests[0]), *map(with_sign, tests), _share(gain)))
+        body.append((policy, mode, *map(with_sign, tests), _share(gain)))
     head = ("policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P [%]")
     return table(head, body)
 
 
 def after_repairs(found: StudyResults) -> str:
     """Return whether anything of a fault is left after its repair."""
-    body = []
-    for tests in repaired_tests(found):
+    margin, body = found.plan.specification.margin, []
+    for policy, mode, tests in repaired_tests(found):
         whole = deliveries_after(found, tests[0].compared.original)
         after = [deliveries_after(found, test.compared.changed) for test in tests]
         left = [spi.relative_change(whole, counts) for counts in after]
-        back = spi.equivalence(whole, after[1], margin=found.plan.specification.margin)
-        body.append((*_named(tests[0]), *map(_share, left), section.said(back.verdict)))
+        back = section.said(spi.equivalence(whole, after[1], margin=margin).verdict)
+        body.append((policy, mode, *map(_share, left), back))
     return table(("policy", "mode", "not repaired [%]", "repaired [%]", "all back"), body)
-
-
-def _named(test: Verdict) -> tuple[str, str]:
-    return f"`{test.compared.policy}`", test.after.name
 
 
 def _by_seed(found: StudyResults, test: Verdict, arm: Arm) -> NDArray[np.float64]:
@@ -271,21 +265,19 @@ def shares(found: StudyResults) -> str:
 
 def beside_another_world(found: StudyResults, ideal: StudyResults) -> str:
     """Return what each policy loses from one study's world to the other's, paired by seed."""
-    body = list(_lost(found, ideal))
-    return table(("policy", "", "ideal", "realistic", "realistic less ideal"), body)
-
-
-def _lost(found: StudyResults, ideal: StudyResults) -> Iterator[tuple[str, ...]]:
     before = {(cell.policy, cell.arm.setting): cell for cell in ideal.cells}
+    body: list[tuple[str, ...]] = []
     for cell in found.cells:
         known = before.get((cell.policy, cell.arm.setting))
         if known is not None and cell.arm.setting.kind == "size":
             change = spi.relative_change(known.by_seed, cell.by_seed)
             means = section.mean_p(known), section.mean_p(cell)
-            yield f"`{cell.policy}`", f"P, {cell.words}", *means, f"{_share(change)} %"
+            body.append((f"`{cell.policy}`", f"P, {cell.words}", *means, f"{_share(change)} %"))
     answers = {(test.compared.policy, test.compared.question): test for test in ideal.verdicts}
     for test in found.verdicts:
         same = answers.get((test.compared.policy, test.compared.question))
         if same is not None and test.compared.indicator == "R":
             less = section.bracketed(difference((found, test), (ideal, same)), 3)
-            yield f"`{test.compared.policy}`", asked(test), *map(with_sign, (same, test)), less
+            values = with_sign(same), with_sign(test)
+            body.append((f"`{test.compared.policy}`", asked(test), *values, less))
+    return table(("policy", "", "ideal", "realistic", "realistic less ideal"), body)
