@@ -1,4 +1,4 @@
-"""Value PettingZoo parallel environment as a task."""
+"""Any PettingZoo parallel environment as a task."""
 
 from __future__ import annotations
 
