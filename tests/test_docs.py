@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import json
 import re
@@ -103,6 +104,8 @@ def test_an_interval_that_is_typed_is_seen() -> None:
 def test_site_builds_without_warnings(tmp_path: Path) -> None:
     sphinx = pytest.importorskip("sphinx.application", reason="needs the extra docs")
     pytest.importorskip("furo", reason="needs the extra docs")
+    # What sphinx imports in the place of missing packages must not stay for later tests.
+    importlib.import_module("swarm_logistics_env.adapters.sb3")
     warnings: list[str] = []
 
     class Log:

@@ -271,6 +271,22 @@ def test_an_observation_column(copy: Copy) -> None:
     assert copy.changed == files_of("An observation column", SENSE="sensing")
 
 
+def test_a_reward_term(copy: Copy) -> None:
+    term = """
+def presence(world: Warehouse, before: Before) -> Earned:
+    return np.ones(world.state.n_robots)
+
+"""
+    copy.insert("environment/rewards.py", "REWARD_TERMS: ", term)
+    copy.insert("environment/rewards.py", '    "own_delivery": own', '    "presence": presence,')
+    copy.interpret(
+        'env = swarm_logistics_v0.parallel_env(n_robots=2, rewards={"presence": 0.5})\n'
+        "env.reset_arrays(seed=0)\n"
+        "assert list(env.step_arrays(np.zeros((2, 4)))[1]) == [0.5, 0.5]\n"
+    )
+    assert copy.changed == files_of("A reward term")
+
+
 def test_an_indicator(copy: Copy) -> None:
     copy.insert("spi/indicators.py", "def scalability(", INDICATOR)
     copy.replace("spi/definitions.py", ", relative_change,", ", kept, relative_change,")

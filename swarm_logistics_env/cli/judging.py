@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from swarm_logistics_env.studies.results import StudyResults
 
 STUDY = "scorecard"
-MOST_SEEDS = 60  # of a policy that is judged
+JUDGE_SEEDS = 60  # of a policy that is judged
 
 
 def judge_command(
@@ -47,7 +47,7 @@ def judge_command(
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(min=3, help=f"Seeds of a policy at most; {MOST_SEEDS} if not given."),
+        typer.Option(min=3, help=f"Seeds of a policy at most; {JUDGE_SEEDS} if not given."),
     ] = None,
     until_clear: Annotated[
         bool,
@@ -106,7 +106,7 @@ def judge_command(
             raise StudyError(f"{option} is not for {kind}, and {asked!r} is one")
     if is_policy:
         failed = _judge_policy(
-            asked, out, seeds or MOST_SEEDS, minutes, processes, trust_code,
+            asked, out, seeds or JUDGE_SEEDS, minutes, processes, trust_code,
             until_clear=until_clear, full=full, command=str(context.obj),
         )  # fmt: skip
         raise typer.Exit(1 if failed else 0)
@@ -220,7 +220,7 @@ def _judge_policy(
     if tally.left:
         typer.echo(f"Stopped after {minutes:g} minutes; the same command goes on: {command}")
     elif any(test.conclusion == "inconclusive" for test in results.verdicts):
-        more = max(MOST_SEEDS, 2 * seeds)
+        more = max(JUDGE_SEEDS, 2 * seeds)
         typer.echo(
             "What is open needs more seeds, from the start: swarm-logistics judge "
             f"{shlex.quote(asked)} --seeds {more} --out {shlex.quote(f'{out}-{more}')}"

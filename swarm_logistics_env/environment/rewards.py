@@ -60,7 +60,7 @@ class RewardTerms:
         return total
 
     def _note(self, world: Warehouse) -> None:
-        self._before.note(world, self._follows_carrier, "stocking" in self.weights)
+        self._before.note(world, self._follows_carrier, not _OF_ITEMS.isdisjoint(self.weights))
 
 
 class Before:
@@ -230,6 +230,7 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
 POTENTIALS = frozenset({"carrying", "carried_way"})
 _AT_DELIVERIES = {"delivery", "own_delivery"}
 _OF_CARRIER = {"lift_requested", "approach"} | POTENTIALS
+_OF_ITEMS = {"stocking"}
 
 
 def _discount_of(weights: dict[str, float]) -> float:

@@ -64,7 +64,7 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
             `swarm_logistics_env.policies`, "package.module:Class", or the path of a policy file.
             Naming a class imports, and so executes, its module. A file that `swarm-logistics
             train` wrote (.safetensors) executes nothing; a model that stable-baselines3 saved
-            (.zip) does. "NAME=20,NAME=5" mixes them in one swarm, see `mixed.Mixed`.
+            (.zip) does. "NAME=20,NAME=5" mixes them in one swarm, see `policies.policy.Mixed`.
         trust_code: whether to read a file although that executes the code in it.
         parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
 

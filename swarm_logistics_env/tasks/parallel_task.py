@@ -1,4 +1,4 @@
-"""Any PettingZoo parallel environment as a task."""
+"""A PettingZoo parallel environment as a task."""
 
 from __future__ import annotations
 
