@@ -48,7 +48,7 @@ MOST = {
     "files of the package": 143,
     "lines of code of studies and report": 4_680,
     "lines of tests": 21_400,
-    "lines of verification, benchmarks, interop and the scripts of docs": 4_850,
+    "lines of verification, benchmarks, interop and the scripts of docs": 4_700,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
