@@ -163,7 +163,7 @@ def test_a_task_needs_two_files(tmp_path: Path) -> None:
         check=True,
     )
     page = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    assert "Files: `tasks/NAME_task.py`, `tasks/task.py`" in page
+    assert "Files: two, `tasks/NAME_task.py` and `tasks/task.py`" in page
 
 
 def test_prose_does_not_count() -> None:
