@@ -311,6 +311,8 @@ def _imported(name: str) -> Callable[..., Policy] | None:
     module, colon, attribute = name.partition(":")
     if not colon:
         return None
+    if module.endswith(".py") and Path(module).parent == Path():  # a file of this folder
+        module = Path(module).stem
     if "/" in module or module.endswith(".py"):
         raise PolicyError(
             f"policy {name!r}: should be MODULE:CLASS, as '{Path(module).stem}:{attribute}', with "

@@ -229,6 +229,8 @@ class Study:
         plan = self.plan()
         with self._store(existing=True) as store:
             noted = StoredStudy.of(store)
+            if noted is not None and noted.imported is None:
+                self._own_metadata(store)  # what another study played is not this one's
             return judge(plan, store.outcomes(plan.runs), noted.declared if noted else None)
 
     def results(self) -> pd.DataFrame:

@@ -148,7 +148,7 @@ OWN_FILES = {
         ("own_faulty:Torn", "own_faulty.py, line 6)"),
         ("own_faulty:Short", "TypeError: Short.reset() takes 2 positional arguments but 3 were"),
         ("own_faulty:Unmade", "'own_faulty:Unmade' cannot be made: KeyError: 'gain'"),
-        ("./own_faulty.py:Torn", "should be MODULE:CLASS, as 'own_faulty:Torn'"),
+        ("folder/own_faulty.py:Torn", "should be MODULE:CLASS, as 'own_faulty:Torn'"),
         ("unread:Torn", "'unread:Torn' cannot be imported: SyntaxError"),
         ("own_faulty:Tron", "has no attribute 'Tron': should name its class, 'own_faulty:Torn'"),
         ("mine.py", "should name its class, 'mine:Slow'"),

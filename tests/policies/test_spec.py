@@ -97,3 +97,14 @@ def test_reset_begins_anew_and_is_asked_for_the_number_of_robots(name: str) -> N
     assert name not in SCRIPTS or not np.array_equal(first[0], policy.act(rows))
     with pytest.raises(PolicyError, match="observations of 4 robots: reset was told 3"):
         policy.act(np.ones((4, N_COLUMNS), np.float32))
+
+
+def test_a_class_may_be_named_by_the_file_of_this_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    text = "class Own:\n    def reset(self, n_robots, seed): ...\n    def act(self, rows): ...\n"
+    Path("in_this_folder.py").write_text(text)
+    for name in ("in_this_folder:Own", "in_this_folder.py:Own", "./in_this_folder.py:Own"):
+        assert type(load(name)).__name__ == "Own"

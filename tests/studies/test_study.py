@@ -182,7 +182,7 @@ def test_another_study_does_not_enter_the_directory_of_this_one(
         note(runs, declared, declared.played.code(), {}, covers)
         notes = runs.notes()
     other = Study(out=tmp_path, **{**small, field: value})
-    for ask in (other.run, other.exploratory_because):
+    for ask in (other.run, other.exploratory_because, other.findings):
         with pytest.raises(StudyError, match=words):
             ask()
     with Runs.existing(tmp_path) as runs:
