@@ -47,7 +47,7 @@ MOST = {
     "tokens of the package": 171_000,
     "files of the package": 143,
     "lines of code of studies and report": 4_680,
-    "lines of tests": 21_420,
+    "lines of tests": 21_440,
     "lines of verification, benchmarks, interop and the scripts of docs": 4_700,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }

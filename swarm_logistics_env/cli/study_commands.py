@@ -281,6 +281,7 @@ def study_of(
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
+    from swarm_logistics_env.policies import PolicySpec
     from swarm_logistics_env.policies.files import SB3_SUFFIX
     from swarm_logistics_env.studies import Study
 
@@ -289,7 +290,8 @@ def study_of(
     if first_seed is not None:
         fields["first_seed"] = first_seed
     if policies:
-        fields["policies"] = tuple(policies)
+        named = [PolicySpec.of(name) for name in policies]
+        fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in named)
         for name in policies:
             # What is typed names a class on purpose; a file may look like any other.
             if name.endswith(SB3_SUFFIX) and not trust_code:

@@ -109,6 +109,7 @@ class PolicySpec(Record):
         parameters: handed to the policy; whatever TOML and JSON both hold.
         label: how a report calls it; empty: made from name and parameters.
         made: an object with `act`, where there is no text that makes it.
+        trusted: whether a file may be read that executes the code in it; no file can say so.
     """
 
     error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
@@ -117,6 +118,7 @@ class PolicySpec(Record):
     parameters: dict[str, JsonValue] = Field(default_factory=dict)
     label: str = ""
     made: Any = Field(default=None, exclude=True, repr=False)
+    trusted: bool = Field(default=False, exclude=True, repr=False)
 
     @classmethod
     def of(cls, value: object) -> Self:
@@ -128,6 +130,8 @@ class PolicySpec(Record):
         if isinstance(value, cls):
             return value
         if isinstance(value, dict):
+            for name in {"made", "trusted"}.intersection(value):  # not for a file to say
+                raise ValueError(f"{name!r} is no field of a table")
             return cls(**value)
         if isinstance(value, str):
             card_name = called(value)
@@ -146,7 +150,7 @@ class PolicySpec(Record):
     @classmethod
     def _policys_own(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
         # These are `load`'s: whether to trust code is not for a file to say.
-        for name in ("name", "trust_code"):
+        for name in ("name", "trust_code", "trusted"):
             if name in parameters:
                 raise ValueError(f"{name!r} is no parameter of a policy")
         return parameters
@@ -199,7 +203,7 @@ class PolicySpec(Record):
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         if makers and self.name.endswith(SB3_SUFFIX):
             return copy.deepcopy(_model(self.name))
-        return copy.deepcopy(_loaded(self.name, canonical_json(self.parameters)))
+        return copy.deepcopy(_loaded(self.name, canonical_json(self.parameters), self.trusted))
 
     def identity(self, makers: Makers = NO_MAKERS) -> str:
         """Return text that changes whenever the policy's behaviour may have; `makers` as `load`."""
@@ -218,8 +222,8 @@ def _model(name: str) -> Policy:
 
 
 @functools.lru_cache(maxsize=8)
-def _loaded(name: str, parameters: str) -> Policy:
-    return load(name, **json.loads(parameters))
+def _loaded(name: str, parameters: str, trusted: bool) -> Policy:
+    return load(name, trust_code=trusted, **json.loads(parameters))
 
 
 class KnownPolicy(NamedTuple):

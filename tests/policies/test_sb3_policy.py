@@ -10,7 +10,9 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.cli.study_commands import study_of
 from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.policies import Policy, PolicySpec
 
 pytest.importorskip("stable_baselines3")
 
@@ -54,6 +56,17 @@ def test_the_command_line_asks_too(model: Path, capsys: pytest.CaptureFixture[st
     assert app.run(arguments) == 2
     assert "executes the code in it" in capsys.readouterr().err
     assert app.run([*arguments, "--trust-code"]) == 0
+
+
+def test_a_study_reads_it_where_the_command_trusts_it_and_no_file_says_so(model: Path) -> None:
+    text = str(model)
+    with pytest.raises(PolicyError, match="executes the code in it"):
+        PolicySpec.of(text).load()
+    assert isinstance(PolicySpec.of(text).replace(trusted=True).load(), Policy)
+    study = study_of("quick", None, 1, [text], trust_code=True)
+    assert study.plan().cases[0].policy.trusted
+    with pytest.raises(ValueError, match="'trusted' is no field of a table"):
+        PolicySpec.of({"name": text, "trusted": True})
 
 
 def test_what_is_no_model_is_refused(model: Path, tmp_path: Path) -> None:
