@@ -25,7 +25,7 @@ WORDS = [
     "here", "nowhere/x", "mine.toml", "none.csv", "paper", "quick", "n_robots=0", "n_robots={}",
     "n_robots=[1", "duration=0.2", "duration=1e-300", "duration=null", "n_items=1e9", "local",
     "process", "ray", "1/2", "0/0", "x.csv", "x.parquet", "x.exe", "R < 0", "R <", "FM1", "FM1:0",
-    "FM1:1@1e5", "FM1:9999999999999999999", "FM1@.", "a\0b", "é", "nobody", "nobody:Nothing",
+    "FM1:1@1e5", "FM1:9999999999999999999", "FM1@.", "é", "nobody", "nobody:Nothing",
     "n_robots=" + "[" * 50_000,
 ]  # fmt: skip
 CHEAP = ["--set", "duration=0.2"]
