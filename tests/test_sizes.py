@@ -44,7 +44,7 @@ def test_no_two_modules_have_one_name() -> None:
 ROOT = PACKAGE.parent
 MOST = {
     "lines of code of the package": 19_000,
-    "tokens of the package": 171_000,
+    "tokens of the package": 171_100,
     "files of the package": 143,
     "lines of code of studies and report": 4_680,
     "lines of tests": 21_440,
