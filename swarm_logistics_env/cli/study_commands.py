@@ -163,9 +163,7 @@ def _saturated(asked: Study) -> list[str]:
     if not any(getattr(case.scenario, "n_items", None) for case in whole.values()):
         return []
     seed = plan.seeds[0]
-    return [
-        title for title, case in whole.items() if case.run(plan.code, seed).play().all_delivered
-    ]
+    return [title for title, case in whole.items() if case.run(plan.code, seed).play().capped]
 
 
 @study.command("report")

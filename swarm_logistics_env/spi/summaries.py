@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .inputs import Numbers, between_0_and_1, performance, same_seeds
+from .inputs import IndicatorError, Numbers, between_0_and_1, performance, same_seeds
 
 
 class Interval(NamedTuple):
@@ -60,6 +60,33 @@ def worst_decile(p: ArrayLike) -> float:
     """
     ascending = np.sort(performance("p", p))
     return float(ascending[: math.ceil(ascending.size / 10)].mean())
+
+
+def median_interval(times: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Median of times [s] with its interval by the sign test, which assumes no distribution.
+
+    Args:
+        times: shape (n,), above 0; infinite: the event did not come in time (censored).
+        confidence: in (0, 1); the interval has at least that. Limits are infinite where too few
+            events are known, and None below six times at 95 %, which give no interval.
+
+    Raises:
+        IndicatorError: no times, one of them negative or NaN; confidence outside (0, 1).
+    """
+    from scipy.special import bdtr
+
+    between_0_and_1("confidence", confidence)
+    known = np.asarray(times, dtype=np.float64)
+    if known.ndim != 1 or not known.size or not (known >= 0.0).all():
+        raise IndicatorError(f"times: should be a sequence of times from 0 on, got {times!r}")
+    ascending, n = np.sort(known), known.size
+    middle = ascending[(n - 1) // 2], ascending[n // 2]
+    value = float(middle[0] if middle[0] == middle[1] else sum(middle) / 2)
+    # The k-th time from either end is a limit where at most so few are expected beyond it.
+    k = int(np.count_nonzero(bdtr(np.arange(n // 2), n, 0.5) <= (1.0 - confidence) / 2))
+    if not k:
+        return Interval(value, None, None)
+    return Interval(value, float(ascending[k - 1]), float(ascending[n - k]))
 
 
 def probability_of_improvement(

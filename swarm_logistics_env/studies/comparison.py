@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -209,13 +210,21 @@ class Reference:
         performance: P at each setting [items].
         cells: the settings that count as cells of the tables; a baseline repeated under another
             name is none.
-        claims: whether the text says that the indicator is above the threshold.
+        sentences: each sentence of the text, with the questions that it answers: whether the
+            indicator is above the threshold.
+        whose: what a verdict on these claims can mean, and what not.
     """
 
     source: str
     performance: Mapping[Setting, float]
     cells: tuple[Setting, ...]
-    claims: Mapping[Question, bool]
+    sentences: Mapping[str, Mapping[Question, bool]]
+    whose: str
+
+    @cached_property
+    def claims(self) -> Mapping[Question, bool]:
+        """Whether the text says that the indicator is above the threshold."""
+        return {asked: said for one in self.sentences.values() for asked, said in one.items()}
 
     def estimate(self, comparison: Comparison) -> Estimate | None:
         """Return the published value of an indicator, without interval, where there is one."""

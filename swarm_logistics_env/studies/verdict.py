@@ -105,7 +105,7 @@ class Cell:
     @property
     def saturated(self) -> bool:
         """Whether a run delivered every item, so that P is capped."""
-        return any(outcome.all_delivered for outcome in self.outcomes)
+        return any(outcome.capped for outcome in self.outcomes)
 
     @cached_property
     def mean(self) -> Interval:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import math
 import time
 import traceback
 from collections.abc import Mapping
@@ -53,7 +54,7 @@ class Outcome:
         digest: of the trajectory and the deliveries (`Episode.digest`); None: not known.
         error: traceback; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
-        untimed: P, 0 or more, where no times are known; None: the number of times is P.
+        untimed: P, 0 or more, where it is not the number of times; None: it is.
     """
 
     delivery_times: Times = field(default_factory=lambda: np.empty(0))
@@ -70,6 +71,16 @@ class Outcome:
     def delivered(self) -> float:
         """The paper's P, 0 or more: the number of items delivered, or a task's own measure."""
         return len(self.delivery_times) if self.untimed is None else self.untimed
+
+    @property
+    def capped(self) -> bool:
+        """Whether P would be larger if there had been more to deliver."""
+        return self.all_delivered and self.untimed is None
+
+    @property
+    def time_to_clear(self) -> float:
+        """Time until every item was delivered [s]; infinite: not all were when the time was up."""
+        return self.ended_at if self.all_delivered else math.inf
 
 
 class TaskScenario(Protocol):
@@ -256,6 +267,7 @@ def _digest(*parts: str) -> str:
 DEFAULT = "warehouse"
 NAMES = {
     DEFAULT: "swarm_logistics_env.tasks.warehouse_task:WAREHOUSE",
+    "clearing": "swarm_logistics_env.tasks.warehouse_task:CLEARING",
     "recorded trials": "swarm_logistics_env.tasks.recorded_trials:RECORDED",
 }
 

@@ -1,8 +1,11 @@
-"""The built-in task: robots deliver items in a warehouse."""
+"""The built-in tasks: robots deliver items for a time, or until the warehouse is cleared."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from swarm_logistics_env.episode import Play, run_episode
+from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.policies.policy import code_digest
 from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.scenario import Scenario
@@ -83,9 +86,43 @@ class WarehouseTask:
         )
 
 
+class ClearingTask(WarehouseTask):
+    """Episodes until every item is delivered: P is the rate, which no number of items caps.
+
+    A run that is not done when the time is up counts with its rate until then, which is too high
+    rather than too low, as the last items take longest.
+    """
+
+    name = "clearing"
+    performance = "the items delivered per minute until all are delivered, or until the time is up"
+    default = Scenario(duration=3_000.0)
+
+    def vary(self, base: TaskScenario, fields: Fields) -> Scenario:
+        """Return `base` with `fields` changed; a preset keeps the time of this task.
+
+        Raises:
+            ScenarioError: a field cannot be, or items would come back.
+        """
+        if "preset" in fields:
+            fields = {"duration": self.default.duration, **fields}
+        varied = super().vary(base, fields)
+        if varied.restock:
+            raise ScenarioError(
+                "restock = True: should be False in the task 'clearing', which ends when every "
+                "item is delivered"
+            )
+        return varied
+
+    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
+        """Play one episode; see `Task.play`."""
+        outcome = super().play(case, seed, policy_seed)
+        return replace(outcome, untimed=60.0 * len(outcome.delivery_times) / outcome.ended_at)
+
+
 def _of_the_warehouse(case: Case) -> tuple[Scenario, tuple[Fault, ...]]:
     assert isinstance(case.scenario, Scenario)
     return case.scenario, tuple(fault for fault in case.faults if isinstance(fault, Fault))
 
 
 WAREHOUSE = WarehouseTask()
+CLEARING = ClearingTask()
