@@ -1,0 +1,229 @@
+"""The paper's experiments in docs/results.md: its table, its figures and its sentences.
+
+`make tables` plays and writes all of it with docs/play_tables.py.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from tables import table
+
+from swarm_logistics_env.report import section
+from swarm_logistics_env.report.drawing import images
+from swarm_logistics_env.report.figures import indicator_figures
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparison import Setting
+from swarm_logistics_env.studies.policy_comparison import Agreement, agreement
+from swarm_logistics_env.studies.presets import PAPER, PAPER_SIZES
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
+
+SEEDS, SEEDS_WHERE_SKEWED = 20, 100
+NO_DRIFT = {"heading_drift": 0.0}
+FAULTS = {
+    "removed": "robots removed",
+    "FM1": "FM1 (always tells timer 0)",
+    "FM2": "FM2 (never picks up)",
+    "FM3": "FM3 (neither sends nor hears)",
+    "FM3_send": "FM3_send (sends nothing, but hears; chosen after the tables were seen)",
+    "FM4": "FM4 (delivers nothing)",
+}
+FIGURES = {"S": "paper_S.svg", "FT": "paper_FT_R.svg", "A": "paper_A.svg"}
+
+
+def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
+    """Return the paper's study in parts: the faults, where P is skewed, with more seeds.
+
+    No family of claims is divided: FT and R are asked of faults only, S, A and change of the rest.
+    The third part is the other reading of FM3, the last two are the first two without drift.
+    """
+    rest: dict[str, object] = {"seeds": SEEDS, "faults": ()}
+    faults = {"seeds": SEEDS_WHERE_SKEWED, "sizes": (), "parameters": (), "ablations": ()}
+    send = [{"title": "Table II, another reading of FM3", "modes": ["FM3_send"]}]
+    large = [{"values": list(PAPER_SIZES), "scenario": {"preset": "paper_scalability", **NO_DRIFT}}]
+    parts = {
+        "paper": rest,
+        "paper-faults": faults,
+        "paper-send": {**faults, "faults": send},
+        "paper-no-drift": {**rest, "scenario": NO_DRIFT, "sizes": large, "ablations": ()},
+        "paper-faults-no-drift": {**faults, "scenario": NO_DRIFT},
+    }
+    return tuple(
+        Study.preset("paper", out=out / name, first_seed=first_seed, **fields)
+        for name, fields in parts.items()
+    )
+
+
+def paper_block(parts: Sequence[StudyResults]) -> str:
+    """Return the paper's table: P of the paper beside ours, and how well they agree."""
+    with_drift = _published_cells(parts[:3])
+    found = _agreement(with_drift)
+    send = _agreement(with_drift, reading="FM3_send")
+    exact = _agreement(_published_cells(parts[3:]))
+    missed = {cell.arm.setting for cell in found.misses or ()}
+    rows = [
+        _row(label, [with_drift[level] for level in levels], missed)
+        for label, levels in _paper_rows(with_drift)
+    ]
+    rows += [
+        (f"without taxis, N = {cell.arm.setting.value:g}", "", *_ours([cell]))
+        for cell in parts[0].cells
+        if cell.arm.setting.name == "random-walk"
+    ]
+    lines = [
+        table(("", "paper's P", "ours, mean [95 %]", "seeds"), rows),
+        "",
+        f"Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.",
+        (
+            f"The mean of |ln(ours / paper's)| is {found.mean_log_error or 0.0:.3f} over the "
+            f"{len(found.cells)} published values, and {send.mean_log_error or 0.0:.3f} with FM3_send "
+            "in the place of FM3."
+        ),
+        (
+            f"{len(found.met or ())} of {len(found.cells)} lie inside the 95 % interval of our mean "
+            f"({len(send.met or ())} with FM3_send); {len(found.cells) - len(missed)} lie inside the "
+            "95 % prediction interval of one of our runs, whose mean width is "
+            f"{found.mean_interval_width or 0.0:.1f} items (the others are bold). The second count is "
+            "a weak test: quite different controllers pass it as well."
+        ),
+        (
+            f"With a compass instead of a gyro (heading_drift 0 instead of 0.02 rad/s) the same mean "
+            f"is {exact.mean_log_error or 0.0:.3f}; P changes by "
+            f"{_change(parts):+.1%} on average over these cells."
+        ),
+    ]
+    if any(cell.saturated for cell in with_drift.values()):
+        lines.append(
+            f"{section.SATURATED}: in some run every item was delivered, so this P is capped and "
+            "what rests on it as well."
+        )
+    return "\n".join(lines)
+
+
+def _published_cells(parts: Sequence[StudyResults]) -> dict[Setting, Cell]:
+    """Return the cells with a published value in the order of the paper's tables."""
+    kinds = ["size", "fault", "parameter"]
+    cells = [
+        cell
+        for part in parts
+        for cell in part.cells
+        if cell.counted or (cell.arm.setting.name == "FM3_send")
+    ]
+    cells.sort(key=lambda cell: kinds.index(cell.arm.setting.kind))
+    by_setting = grouped(cells, lambda cell: cell.arm.setting)
+    modes = list(FAULTS)
+
+    def place(setting: Setting) -> int:
+        return modes.index(setting.name) if setting.kind == "fault" and setting.value else -1
+
+    found = {setting: here[0] for setting, here in by_setting.items()}
+    faults = sorted((s for s in found if s.kind == "fault"), key=place)
+    order = [s for kind in kinds for s in (faults if kind == "fault" else found) if s.kind == kind]
+    return {setting: found[setting] for setting in order}
+
+
+def _agreement(cells: Mapping[Setting, Cell], reading: str = "FM3") -> Agreement:
+    left_out = {"FM3", "FM3_send"} - {reading}
+    return agreement("", [cell for s, cell in cells.items() if s.name not in left_out])
+
+
+def _change(parts: Sequence[StudyResults]) -> float:
+    """Return the mean relative change of P without drift, over the cells of both."""
+    drift, exact = _published_cells(parts[:2]), _published_cells(parts[3:])
+    changes = [exact[one].mean.value / drift[one].mean.value - 1.0 for one in exact if one in drift]
+    return sum(changes) / len(changes) if changes else 0.0
+
+
+def _paper_rows(cells: Mapping[Setting, Cell]) -> list[tuple[str, list[Setting]]]:
+    """Return the rows: a label, and the levels that stand side by side in it."""
+    rows = []
+    for levels in grouped(cells, lambda level: level.name).values():
+        width = len(levels) if len(levels) <= 4 else 3
+        for start in range(0, len(levels), width):
+            some = levels[start : start + width]
+            rows.append((_label(some, cells[some[0]]), some))
+    return rows
+
+
+def _label(levels: list[Setting], first: Cell) -> str:
+    values = ", ".join(f"{level.value:g}" for level in levels)
+    kind, name = levels[0].kind, levels[0].name
+    if kind == "size":
+        return f"N = {values} ({first.arm.case.scenario.model_dump()['n_items']} items)"
+    if kind == "parameter":
+        return f"{name} = {values}" + (" m" if name.endswith("_width") else "")
+    return f"{FAULTS[name]}, m = {values}" if levels[0].value else "no fault"
+
+
+def _row(label: str, cells: list[Cell], missed: set[Setting]) -> tuple[str, ...]:
+    published = [
+        f"**{cell.published:g}**" if cell.arm.setting in missed else f"{cell.published:g}"
+        for cell in cells
+    ]
+    return label, ", ".join(published), *_ours(cells)
+
+
+def _ours(cells: list[Cell]) -> tuple[str, str]:
+    seeds = dict.fromkeys(str(cell.n_seeds) for cell in cells)
+    return ", ".join(map(section.mean_p, cells)), ", ".join(seeds)
+
+
+def sentences_block(parts: Sequence[StudyResults]) -> str:
+    """Return each sentence of the paper with the verdicts on the claims that it makes."""
+    tests = [test for part in parts[:2] for test in part.verdicts if test.claim]
+    other = [test for test in parts[2].verdicts if test.claim]
+    refuted = [test for test in tests if _said(test) == "refuted"]
+    of = Counter(_about(test) for test in refuted)
+    about = ", ".join(f"{count} on {what}" for what, count in of.most_common())
+    counted = Counter(map(_said, tests))
+    lines = [
+        (
+            f"Of {len(tests)} claims (those of the paper's text, and that P falls without taxis) this "
+            f"re-implementation supports {counted['supported']} and contradicts {counted['refuted']}"
+            f"{f' ({about})' if about else ''}; {counted['open']} are open. Adjusted after Holm."
+        ),
+        (
+            f"With FM3 read as FM3_send, chosen after the tables were seen: of its {len(other)} claims "
+            f"{section.counted(map(_said, other))}."
+        ),
+        PAPER.whose,
+        "",
+        table(("the paper's text", "claims", "contradicted"), _sentence_rows(tests)),
+    ]
+    return "\n".join(lines)
+
+
+def _sentence_rows(tests: Sequence[Verdict]) -> list[tuple[str, str, str]]:
+    rows = []
+    for sentence, claims in PAPER.sentences.items():
+        here = [test for test in tests if test.compared.question in claims]
+        refuted = [_step(test) for test in here if _said(test) == "refuted"]
+        if here:
+            counted = section.counted(map(_said, here))
+            rows.append((f'"{sentence}"', counted, "; ".join(refuted) or section.NOTHING))
+    return rows
+
+
+def _said(test: Verdict) -> str:
+    return section.counted_as(test, test.claim_verdict_holm)
+
+
+def _about(test: Verdict) -> str:
+    setting = test.compared.changed.setting
+    return "N" if setting.kind == "size" else setting.name
+
+
+def _step(test: Verdict) -> str:
+    return f"{test.compared.label}: {test.compared.indicator} = {section.ratio(test)}"
+
+
+def draw_figures(parts: Sequence[StudyResults], media: Path) -> None:
+    """Draw the paper's figures with its values as crosses and ours with their intervals."""
+    for part in parts[:2]:
+        for figure in indicator_figures(part):
+            name = FIGURES.get(figure.name.partition("-")[0])
+            if name is not None:
+                (media / name).write_text(images(figure.draw, figure.height)[0], encoding="utf-8")
