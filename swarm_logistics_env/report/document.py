@@ -16,7 +16,7 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
-from .fault_sections import fault_sections, look_section
+from .fault_sections import fault_sections
 from .figures import forest_figure, indicator_figures
 from .policies_compared import policy_sections
 from .section import NOTHING, Figure, Section, sentence
@@ -78,7 +78,6 @@ def document(results: StudyResults) -> Document:
         *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
     figures = forest_figure(results, found), *indicator_figures(results)
-    looks = (look_section(results),) if plan.specification.until_clear else ()
     chapters = [
         Chapter("Warnings", "", (Section("", lines=lines),) if lines else ()),
         Chapter(
@@ -98,7 +97,6 @@ def document(results: StudyResults) -> Document:
             'level that the heading gives; "one run" is where a single further run falls.',
             result_tables,
         ),
-        Chapter("Checks", "How far the verdicts hang on the method.", looks),
         Chapter(
             "Policies compared",
             "Side by side, seed by seed; the first policy of the study is the one that the others "
