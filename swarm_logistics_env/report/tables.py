@@ -132,7 +132,6 @@ def _claims(title: str, tests: Sequence[Verdict]) -> Section:
         f"Unadjusted: {plain}.",
         f"Under Holm, family = all comparisons of one indicator: {adjusted}.",
         'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
-        *(f"undefined: {why}." for why in dict.fromkeys(t.no_plan for t in tests) if why),
     )
 
 

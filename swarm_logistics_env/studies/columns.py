@@ -79,8 +79,6 @@ VERDICT_COLUMNS: Columns = {
     "equivalence_holm": (str, "equivalence_holm", "the same after Holm"),
     "detectable": (float, "detectable", "distance that these seeds find with 80 % power"),
     "seeds_for_power_80": (float, "seeds_needed", "seeds for 80 % power at the published value"),
-    "least_power": (float, "least_power", "power of so many seeds in nine pilots of ten"),
-    "no_plan": (str, "no_plan", "why no such number can be named"),
     "problem": (str, "problem", "why the comparison is undefined, e.g. by a failed run"),
 }
 

@@ -198,5 +198,3 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
             )
             curves.append(RateCurve(runs, seconds, *limits.T))
     return tuple(curves)
-
-

@@ -269,20 +269,6 @@ class Verdict:
         return spi.seeds_for_power(self.estimate, self.published, POWER)
 
     @property
-    def no_plan(self) -> str | None:
-        """Why no such number can be named."""
-        if self.estimate is None or self.published is None:
-            return None
-        return spi.no_plan_because(self.estimate, self.published)
-
-    @property
-    def least_power(self) -> float | None:
-        """Power that so many seeds keep in at least nine pilots of ten."""
-        if self.estimate is None or self.published is None or self.seeds_needed is None:
-            return None
-        return spi.lower_decile_of_power(self.estimate, self.published, self.seeds_needed)
-
-    @property
     def detectable(self) -> float | None:
         """Distance from the threshold that these seeds find with 80 % power."""
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
