@@ -18,9 +18,8 @@ from swarm_logistics_env.studies.verdict import grouped
 from .answer import Answer, answer
 from .fault_sections import fault_sections
 from .figures import forest_figure, indicator_figures
-from .policies_compared import policy_sections
 from .section import NOTHING, Figure, Section, sentence
-from .tables import tables, warnings
+from .tables import policy_sections, tables, warnings
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
-from swarm_logistics_env.studies.columns import frame_of_verdicts
-from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.results import StudyResults, frame_of_verdicts
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 
 from . import drawing

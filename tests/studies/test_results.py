@@ -10,16 +10,17 @@ import pytest
 
 from swarm_logistics_env.report.tables import warnings
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.columns import (
-    CELL_COLUMNS,
-    VERDICT_COLUMNS,
-    frame_of_cells,
-    frame_of_verdicts,
-)
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.declaration import Declaration
 from swarm_logistics_env.studies.policy_comparison import agreement, agreements
-from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.results import (
+    CELL_COLUMNS,
+    VERDICT_COLUMNS,
+    StudyResults,
+    frame_of_cells,
+    frame_of_verdicts,
+    judge,
+)
 from swarm_logistics_env.studies.verdict import Cell
 from swarm_logistics_env.tasks.task import Outcome
 from tests.studies.made_up import by_question, judged, paper, published
