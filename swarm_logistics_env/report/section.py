@@ -34,6 +34,20 @@ WORDS = {
     "unaffected": UNAFFECTED,
     "blocked": "undefined",
 }
+FLAGS = {
+    "single_seed": "One seed gives a value, but no interval and no verdict",
+    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
+    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
+    "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
+    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
+    "so it is open",
+    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
+    "the verdict comes from the test",
+    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
+    "ten, or unpaired",
+    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
+    "its level says",
+}
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 Row = TypeVar("Row")
 
@@ -240,17 +254,9 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         yield f"{test.unchanged}? Change {change}: {same}{adjusted}."
     if "inconclusive" in (test.answer, test.answer_holm):
         yield from _what_it_takes(test, estimate)
-    if estimate.pairing_correlation is not None:
-        yield f"Pairing correlation {estimate.pairing_correlation:.2f}."
-    if "assumes_normal" in test.flags:
-        yield "The verdict assumes normal differences."
+    yield from (f"{FLAGS[flag]}." for flag in test.flags)
     if "hidden_stalls" in test.flags:
-        yield (
-            "No verdict, as stalled runs that these seeds did not show could turn it: it needs at "
-            f"least {spi.seeds_against_stalls(estimate)} seeds."
-        )
-    if "skewed" in test.flags:
-        yield "Skewed: at so few seeds the verdict errs more often than its level."
+        yield f"It needs at least {spi.seeds_against_stalls(estimate)} seeds."
     if results.plan.specification.until_clear:
         where = "Open after" if test.stopped_at is None else "Clear at"
         yield f"{where} {estimate.n_seeds} of at most {results.looks[-1]} seeds."

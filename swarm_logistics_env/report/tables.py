@@ -23,22 +23,6 @@ from .section import NOTHING, Section
 
 CellColumn = tuple[str, Callable[[Cell], str]]
 _MOST_MISSES = 8  # more are no list that anybody reads
-_FLAGS = {
-    "single_seed": "One seed gives a value, but no interval and no verdict",
-    "identical": "Both conditions gave the same runs, so the value is exact, but it is no evidence "
-    "and stands outside Holm's family",
-    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
-    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
-    "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
-    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
-    "so it is open",
-    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
-    "the verdict comes from the test",
-    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
-    "ten, or unpaired",
-    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
-    "its level says",
-}
 
 
 def tables(results: StudyResults) -> Iterator[Section]:
@@ -49,9 +33,6 @@ def tables(results: StudyResults) -> Iterator[Section]:
         for table, here in grouped(cells, lambda cell: cell.table).items():
             asked = [test for test in tests if test.compared.table == table]
             yield from _tables(f"{policy}: {table}", here, asked)
-        claims = [test for test in tests if test.claim]
-        if claims:
-            yield _claims(f"{policy}: claims", claims)
         if policy in known:
             yield _agreement(known[policy])
 
@@ -115,38 +96,6 @@ def _answers(indicator: str, tests: Sequence[Verdict], *, published: bool) -> It
 
 def _claimed(test: Verdict) -> str:
     return NOTHING if test.claimed is None else "yes" if test.claimed else "no"
-
-
-def _claims(title: str, tests: Sequence[Verdict]) -> Section:
-    plain, adjusted = (
-        section.counted(section.counted_as(test, verdict) for test, verdict in zip(tests, verdicts))
-        for verdicts in (
-            [test.claim_verdict for test in tests],
-            [test.claim_verdict_holm for test in tests],
-        )
-    )
-    return Section.table(
-        title,
-        tests,
-        [
-            ("indicator", lambda test: f"{test.compared.indicator}, {test.compared.label}"),
-            ("claim", lambda test: str(test.claim)),
-            ("paper", lambda test: section.number(test.published)),
-            ("ours [95 %]", section.ratio),
-            ("claim is", lambda test: section.said(test.claim_verdict)),
-            ("under Holm", lambda test: section.said(test.claim_verdict_holm)),
-            ("seeds for 80 % power at the paper's value", _seeds_needed),
-        ],
-        f"Unadjusted: {plain}.",
-        f"Under Holm, family = all comparisons of one indicator: {adjusted}.",
-        'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
-    )
-
-
-def _seeds_needed(test: Verdict) -> str:
-    if test.estimate is None or test.published is None:
-        return NOTHING
-    return "undefined" if test.seeds_needed is None else f"{test.seeds_needed}"
 
 
 def _agreement(found: Agreement) -> Section:
@@ -219,20 +168,6 @@ def warnings(results: StudyResults) -> Iterator[str]:
             compared = test.compared
             what = f"{compared.policy}, {compared.indicator}, {compared.label}"
             yield f"{what} is undefined: {test.problem}."
-    for flag, meaning in _FLAGS.items():
-        families = "; ".join(_families(results.verdicts, flag))
-        if families:
-            yield f"{meaning}: {families}."
-
-
-def _families(tests: Sequence[Verdict], flag: str) -> Iterator[str]:
-    """Name the comparisons with a flag, those of one policy and indicator together."""
-    for (policy, indicator), family in grouped(tests, lambda test: test.compared.family).items():
-        whole = {test.compared.label for test in family}
-        labels = list(dict.fromkeys(t.compared.label for t in family if flag in t.flags))
-        which = f"all {len(whole)}" if len(labels) == len(whole) > 1 else "; ".join(labels)
-        if labels:
-            yield f"{policy}: {indicator} ({which})"
 
 
 _HOW_TO_READ = (
