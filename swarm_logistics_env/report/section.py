@@ -159,17 +159,16 @@ def mean_p(cell: Cell) -> str:
     """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
         return "no run"
-    return bracketed(cell.mean, digits_of(cell.mean.value)) + mark(cell)
-
-
-def mark(row: Cell | Verdict) -> str:
-    """Return the sign of a P that is capped, or of what rests on it."""
-    return SATURATED if row.saturated else ""
+    return bracketed(cell.mean, digits_of(cell.mean.value)) + SATURATED * cell.saturated
 
 
 def ratio(test: Verdict) -> str:
     """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
-    return NOTHING if test.interval is None else bracketed(test.interval, 3) + mark(test)
+    return (
+        NOTHING
+        if test.interval is None
+        else bracketed(test.interval, 3) + SATURATED * test.saturated
+    )
 
 
 def said(verdict: str | None) -> str:
@@ -238,7 +237,8 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         return
     found = limits(estimate, 3)
     level = f", {percent(estimate.confidence)} interval {found}" if found else " (no interval)"
-    yield f"{indicator}{mark(test)} = {fixed(estimate.value, 3)}{level} over {seeds}."
+    capped = SATURATED * test.saturated
+    yield f"{indicator}{capped} = {fixed(estimate.value, 3)}{level} over {seeds}."
     # One seed gives no p, and Holm's placeholder of 1 says nothing.
     adjusted_p = None if estimate.p_value is None else test.p_holm
     yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"

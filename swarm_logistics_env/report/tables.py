@@ -26,40 +26,29 @@ _MOST_MISSES = 8  # more are no list that anybody reads
 
 
 def tables(results: StudyResults) -> Iterator[Section]:
-    """Yield the tables of a study's results, policy by policy."""
-    known = {one.policy: one for one in agreements(results)}
-    for policy, cells in grouped(results.cells, lambda cell: cell.policy).items():
-        tests = [test for test in results.verdicts if test.compared.policy == policy]
-        for table, here in grouped(cells, lambda cell: cell.table).items():
-            asked = [test for test in tests if test.compared.table == table]
-            yield from _tables(f"{policy}: {table}", here, asked)
-        if policy in known:
-            yield _agreement(known[policy])
+    """Yield the tables of a study's results, policy by policy; then how near each comes.
 
-
-def by_factor(cells: Sequence[Cell]) -> list[Cell]:
-    """Return cells of one failure mode (or other factor) together, in order of appearance."""
-    groups = grouped(cells, lambda cell: cell.arm.setting.name)
-    return [cell for here in groups.values() for cell in here]
-
-
-def _tables(title: str, cells: Sequence[Cell], tests: Sequence[Verdict]) -> Iterator[Section]:
-    """Yield a table of P and the first indicator, then one of each further indicator."""
-    published = any(cell.published is not None for cell in cells)
-    rows = by_factor(cells)
-    setting: CellColumn = ("", lambda cell: str(cell.arm.setting))
-    columns = [setting]
-    if published:
-        columns.append(("P paper", _published))
-    columns.append(("P ours [95 %]" if published else "P [95 %]", section.mean_p))
-    columns.append(("one run [95 %]", _one_run))
-    for indicator, asked in grouped(tests, lambda test: test.compared.indicator).items():
-        answers = _answers(indicator, asked, published=published)
-        yield Section.table(title, rows, [*columns, *answers])
-        # P is printed once: the tables of further indicators hold what was asked alone.
-        changed = {test.compared.changed for test in asked}
-        rows = [cell for cell in rows if cell.arm in changed]
-        columns, title = [setting], title.removesuffix(", continued") + ", continued"
+    Each has a table of P and the first indicator, then one of each further indicator.
+    """
+    for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
+        rows = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
+        tests = [test for test in results.verdicts if test.where == (policy, table)]
+        published = any(cell.published is not None for cell in rows)
+        setting: CellColumn = ("", lambda cell: cell.words)
+        columns = [setting]
+        if published:
+            columns.append(("P paper", _published))
+        columns.append(("P ours [95 %]" if published else "P [95 %]", section.mean_p))
+        columns.append(("one run [95 %]", _one_run))
+        title = f"{policy}: {table}"
+        for indicator, asked in grouped(tests, lambda test: test.compared.indicator).items():
+            answers = _answers(indicator, asked, published=published)
+            yield Section.table(title, rows, [*columns, *answers])
+            # P is printed once: the tables of further indicators hold what was asked alone.
+            changed = {test.compared.changed for test in asked}
+            rows = [cell for cell in rows if cell.arm in changed]
+            columns, title = [setting], f"{policy}: {table}, continued"
+    yield from map(_agreement, agreements(results))
 
 
 def _published(cell: Cell) -> str:

@@ -191,6 +191,11 @@ class Verdict:
         return definition.property_name(self.compared.threshold, claimed_below=below)
 
     @property
+    def where(self) -> tuple[str, str]:
+        """Policy and table that it stands in."""
+        return self.compared.policy, self.compared.table
+
+    @property
     def after(self) -> Setting:
         """The setting of the changed condition."""
         return self.compared.changed.setting
@@ -303,14 +308,15 @@ def judge_one(
         cells: those of the comparison's arms.
     """
     level = level or Level()
-    used = {arm: cells[arm] for arm in comparison.arms}
-    saturated = [arm for arm, one in used.items() if one.saturated]
+    saturated = [arm for arm in comparison.arms if cells[arm].saturated]
     estimate, same = None, None
-    problems = [f"{arm.setting}: {one.problem}" for arm, one in used.items() if one.problem]
+    problems = [
+        f"{arm.setting}: {cells[arm].problem}" for arm in comparison.arms if cells[arm].problem
+    ]
     if not problems:
-        before, after = used[comparison.original], used[comparison.changed]
-        identical = comparison.removed is None and same_runs(before.digests, after.digests)
-        samples = {arm: one.by_seed for arm, one in used.items()}
+        digests = (cells[arm].digests for arm in (comparison.original, comparison.changed))
+        identical = comparison.removed is None and same_runs(*digests)
+        samples = {arm: cells[arm].by_seed for arm in comparison.arms}
         try:
             estimate = comparison.estimate(
                 samples,
@@ -328,7 +334,7 @@ def judge_one(
                 alpha=level.alpha,
             )
         except spi.IndicatorError as error:
-            nothing = not used[comparison.original].by_seed.any()
+            nothing = not samples[comparison.original].any()
             estimate, problems = None, ["it delivers nothing" if nothing else str(error)]
     return Verdict(comparison, estimate, "; ".join(problems) or None, same, bool(saturated), margin)
 

@@ -142,7 +142,10 @@ def test_missing_runs_leave_a_verdict_undefined_with_the_reason(few: StudyResult
 def test_capped_cells_and_the_set_up_are_on_the_page(few: StudyResults, directory: Path) -> None:
     page = (directory / "report.html").read_text().replace("\N{NO-BREAK SPACE}", " ")
     assert "† marks a P that is capped" in page
-    for name, marks in (("A-Table-III-adaptability-to-warehouse-width", 3), ("S-Table-I-scalability", 0)):
+    for name, marks in (
+        ("A-Table-III-adaptability-to-warehouse-width", 3),
+        ("S-Table-I-scalability", 0),
+    ):
         drawing = ElementTree.parse(directory / "figures" / f"{name}.svg")
         assert sum(element.text == "†" for element in drawing.iter()) == marks
     for name in few.plan.specification.scenario.model_dump():
