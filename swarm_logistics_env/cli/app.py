@@ -15,7 +15,6 @@ import typer
 from swarm_logistics_env.errors import SetupError, TrainingError
 from swarm_logistics_env.train.training import preset_names
 
-from . import planning  # noqa: F401 - adds `study plan`
 from .application import (
     Application,
     FaultOption,
@@ -369,7 +368,6 @@ app.command("train")(train_command)
 app.command("judge")(judge_command)
 app.command("attack")(attack_command)
 app.command("list")(list_command)
-study.registered_commands.insert(1, study.registered_commands.pop())  # plan, after run
 app.add_typer(study)
 
 

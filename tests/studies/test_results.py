@@ -8,20 +8,19 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from swarm_logistics_env import spi
 from swarm_logistics_env.report.tables import warnings
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.columns import (
-    CELL_COLUMNS,
-    VERDICT_COLUMNS,
-    frame_of_cells,
-    frame_of_verdicts,
-)
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.declaration import Declaration
-from swarm_logistics_env.studies.fault_measures import fault_budgets
 from swarm_logistics_env.studies.policy_comparison import agreement, agreements
-from swarm_logistics_env.studies.results import StudyResults, demands, judge
+from swarm_logistics_env.studies.results import (
+    CELL_COLUMNS,
+    VERDICT_COLUMNS,
+    StudyResults,
+    frame_of_cells,
+    frame_of_verdicts,
+    judge,
+)
 from swarm_logistics_env.studies.verdict import Cell
 from swarm_logistics_env.tasks.task import Outcome
 from tests.studies.made_up import by_question, judged, paper, published
@@ -103,7 +102,6 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
     power = by_question(found)
     at_threshold = power["FT", "FM4, m = 1", 0.0]
     assert (at_threshold.published, at_threshold.seeds_needed) == (0, None)
-    assert "threshold" in str(at_threshold.no_plan)
     assert power["FT", "FM4, m = 3", 0.0].seeds_needed == 10
 
 
@@ -168,8 +166,6 @@ def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
     assert len(rest) == 9
     smallest = min(t.estimate.p_value for t in rest if t.estimate and t.estimate.p_value)
     assert min(t.p_holm for t in rest if t.p_holm) == pytest.approx(9 * smallest)
-    budgets = {b.compared.changed.setting.name: b.budget for b in fault_budgets(found)}
-    assert budgets["FM2"] == (3, None)
 
 
 def test_one_failed_run_blocks_its_family_under_holm(found: StudyResults) -> None:
@@ -203,31 +199,3 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     assert tests["value"].isna().all()
     assert tests["published"].notna().any()
     assert set(tests["verdict"]) == {None}
-
-
-def test_a_named_effect_decides_the_number_of_seeds_and_the_seen_one_never() -> None:
-    study = Study(seeds=5, sizes=[{"values": [5, 10]}])
-    pilot = judged(
-        study, lambda _, at, seed: Outcome(untimed=at.value + seed ** (at.value // 5) % 5)
-    )
-    (far,), (near,) = demands(pilot, 1.0), demands(pilot, 0.3)
-    assert far.test.estimate is not None
-    assert far.seeds is not None
-    assert near.seeds is not None
-    assert far.seeds < near.seeds
-    assert far.seeds == spi.seeds_for_power(far.test.estimate, 1.0, 0.8)
-    assert far.detectable == spi.minimum_detectable_effect(far.test.estimate, 0.8)
-    (unnamed,) = demands(pilot)
-    assert (unnamed.effect, unnamed.seeds) == (None, None)
-    assert unnamed.problem == "no effect is named"
-    assert unnamed.detectable is not None
-    (useless,) = demands(pilot, effect=0.0)
-    assert (useless.seeds, "lies at the threshold" in str(useless.problem)) == (None, True)
-    (blocked,) = demands(judge(pilot.plan, {}), effect=1.0)
-    assert "5 of 5 runs missing" in str(blocked.problem)
-
-
-def test_a_published_effect_is_taken_where_there_is_one(found: StudyResults) -> None:
-    by_step = {demand.test.compared.label: demand.effect for demand in demands(found)}
-    assert by_step["N 10 -> 20"] == pytest.approx(0.611, abs=1e-3)
-    assert by_step["FM4, m = 2"] is not None
