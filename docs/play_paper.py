@@ -14,6 +14,7 @@ from tables import table
 from swarm_logistics_env.report import section
 from swarm_logistics_env.report.drawing import images
 from swarm_logistics_env.report.figures import indicator_figures
+from swarm_logistics_env.report.tables import sentences
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.policy_comparison import Agreement, agreement
@@ -31,7 +32,6 @@ FAULTS = {
     "FM3_send": "FM3_send (sends nothing, but hears; chosen after the tables were seen)",
     "FM4": "FM4 (delivers nothing)",
 }
-FIGURES = {"S": "paper_S.svg", "FT": "paper_FT_R.svg", "A": "paper_A.svg"}
 
 
 def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
@@ -77,23 +77,10 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
         table(("", "paper's P", "ours, mean [95 %]", "seeds"), rows),
         "",
         f"Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.",
-        (
-            f"The mean of |ln(ours / paper's)| is {found.mean_log_error or 0.0:.3f} over the "
-            f"{len(found.cells)} published values, and {send.mean_log_error or 0.0:.3f} with FM3_send "
-            "in the place of FM3."
-        ),
-        (
-            f"{len(found.met or ())} of {len(found.cells)} lie inside the 95 % interval of our mean "
-            f"({len(send.met or ())} with FM3_send); {len(found.cells) - len(missed)} lie inside the "
-            "95 % prediction interval of one of our runs, whose mean width is "
-            f"{found.mean_interval_width or 0.0:.1f} items (the others are bold). The second count is "
-            "a weak test: quite different controllers pass it as well."
-        ),
-        (
-            f"With a compass instead of a gyro (heading_drift 0 instead of 0.02 rad/s) the same mean "
-            f"is {exact.mean_log_error or 0.0:.3f}; P changes by "
-            f"{_change(parts):+.1%} on average over these cells."
-        ),
+        f"{_near(found)}.",
+        f"With FM3_send in the place of FM3: {_near(send)}.",
+        f"Without drift of headings, which changes P by {_change(parts):+.1%}: {_near(exact)}.",
+        f"{len(missed)} lie outside the 95 % prediction interval of one of our runs (bold).",
     ]
     if any(cell.saturated for cell in with_drift.values()):
         lines.append(
@@ -128,6 +115,14 @@ def _published_cells(parts: Sequence[StudyResults]) -> dict[Setting, Cell]:
 def _agreement(cells: Mapping[Setting, Cell], reading: str = "FM3") -> Agreement:
     left_out = {"FM3", "FM3_send"} - {reading}
     return agreement("", [cell for s, cell in cells.items() if s.name not in left_out])
+
+
+def _near(found: Agreement) -> str:
+    """Return how near the published values are to ours, in words."""
+    return (
+        f"Mean of |ln(ours / paper's)| {found.mean_log_error or 0.0:.3f} over {len(found.cells)} "
+        f"published values, {len(found.met or ())} of them inside the 95 % interval of our mean"
+    )
 
 
 def _change(parts: Sequence[StudyResults]) -> float:
@@ -179,32 +174,17 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
     of = Counter(_about(test) for test in refuted)
     about = ", ".join(f"{count} on {what}" for what, count in of.most_common())
     counted = Counter(map(_said, tests))
+    asked = "claims (those of the paper's text, and that P falls without taxis)"
+    supported, contradicted, still = (counted[one] for one in ("supported", "refuted", "open"))
     lines = [
-        (
-            f"Of {len(tests)} claims (those of the paper's text, and that P falls without taxis) this "
-            f"re-implementation supports {counted['supported']} and contradicts {counted['refuted']}"
-            f"{f' ({about})' if about else ''}; {counted['open']} are open. Adjusted after Holm."
-        ),
-        (
-            f"With FM3 read as FM3_send, chosen after the tables were seen: of its {len(other)} claims "
-            f"{section.counted(map(_said, other))}."
-        ),
+        f"Of {len(tests)} {asked} this re-implementation supports {supported} and contradicts",
+        f"{contradicted}{f' ({about})' if about else ''}; {still} are open. Adjusted after Holm.",
+        f"Of {len(other)} claims on FM3_send {section.counted(map(_said, other))}.",
         PAPER.whose,
         "",
-        table(("the paper's text", "claims", "contradicted"), _sentence_rows(tests)),
+        table(("the paper's text", "claims", "contradicted"), sentences(PAPER, tests)),
     ]
     return "\n".join(lines)
-
-
-def _sentence_rows(tests: Sequence[Verdict]) -> list[tuple[str, str, str]]:
-    rows = []
-    for sentence, claims in PAPER.sentences.items():
-        here = [test for test in tests if test.compared.question in claims]
-        refuted = [_step(test) for test in here if _said(test) == "refuted"]
-        if here:
-            counted = section.counted(map(_said, here))
-            rows.append((f'"{sentence}"', counted, "; ".join(refuted) or section.NOTHING))
-    return rows
 
 
 def _said(test: Verdict) -> str:
@@ -216,14 +196,9 @@ def _about(test: Verdict) -> str:
     return "N" if setting.kind == "size" else setting.name
 
 
-def _step(test: Verdict) -> str:
-    return f"{test.compared.label}: {test.compared.indicator} = {section.ratio(test)}"
-
-
 def draw_figures(parts: Sequence[StudyResults], media: Path) -> None:
     """Draw the paper's figures with its values as crosses and ours with their intervals."""
-    for part in parts[:2]:
-        for figure in indicator_figures(part):
-            name = FIGURES.get(figure.name.partition("-")[0])
-            if name is not None:
-                (media / name).write_text(images(figure.draw, figure.height)[0], encoding="utf-8")
+    for figure in (one for part in parts[:2] for one in indicator_figures(part)):
+        if figure.name.startswith(("S-", "FT-", "A-")):
+            drawn, _ = images(figure.draw, figure.height)
+            (media / f"paper-{figure.name}.svg").write_text(drawn, encoding="utf-8")

@@ -13,7 +13,14 @@ import typer
 from swarm_logistics_env.errors import StudyError
 
 from .application import TrustPolicyOption
-from .study_commands import FullOption, ProcessesOption, run_study, study_of
+from .study_commands import (
+    ClearingOption,
+    FullOption,
+    ProcessesOption,
+    run_study,
+    study_of,
+    until_cleared,
+)
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.results import StudyResults
@@ -51,6 +58,7 @@ def judge_command(
     minutes: Annotated[
         float | None, typer.Option(help="Play for so long; the same command goes on.")
     ] = None,
+    clearing: ClearingOption = False,
     columns: Annotated[
         list[str] | None,
         typer.Option(
@@ -91,7 +99,7 @@ def judge_command(
         "--column": columns, "--ignore": ignore, "--duration": duration, "--decimal": decimal,
         "--setup": setup,
     }  # fmt: skip
-    of_policy = {"--seeds": seeds, "--minutes": minutes}
+    of_policy = {"--seeds": seeds, "--minutes": minutes, "--clearing": clearing}
     is_policy = names_policy(asked)
     for option, given in (of_trials if is_policy else of_policy).items():
         if given:
@@ -100,7 +108,7 @@ def judge_command(
     if is_policy:
         failed = _judge_policy(
             asked, out, seeds or JUDGE_SEEDS, minutes, processes, trust_code,
-            until_clear=until_clear, full=full, command=str(context.obj),
+            until_clear=until_clear, clearing=clearing, full=full, command=str(context.obj),
         )  # fmt: skip
         raise typer.Exit(1 if failed else 0)
     from swarm_logistics_env.studies import Study
@@ -188,6 +196,7 @@ def _judge_policy(
     trust_code: bool,
     *,
     until_clear: bool,
+    clearing: bool,
     full: bool,
     command: str,
 ) -> int:
@@ -203,16 +212,18 @@ def _judge_policy(
     from .terminal_tables import in_one_line
 
     load(asked, trust_code=trust_code)  # what is wrong with it is said before anything is written
-    out = out or Path("results", "judged", slug(called(asked)))
+    out = out or Path("results", "judged", slug(called(asked)) + "-clearing" * clearing)
     looks = until_clear and seeds > FIRST_LOOK
     study = study_of(STUDY, out, seeds, [asked], trust_code, until_clear=looks)
+    if clearing:
+        until_cleared(study)
     typer.echo(f"{study.plan()}, kept in {out}\n")
     count = processes or os.cpu_count() or 1
     engine = engine_named("process" if count > 1 else "local", count, None)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
     _finish(results, out, full=full)
-    if rank := _rank(results):
+    if not clearing and (rank := _rank(results)):
         typer.echo(rank)
     if tally.left:
         typer.echo(f"Stopped after {minutes:g} minutes; the same command goes on: {command}")
@@ -220,7 +231,8 @@ def _judge_policy(
         more = max(JUDGE_SEEDS, 2 * seeds)
         typer.echo(
             "What is open needs more seeds, from the start: swarm-logistics judge "
-            f"{shlex.quote(asked)} --seeds {more} --out {shlex.quote(f'{out}-{more}')}"
+            f"{shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
+            f"--out {shlex.quote(f'{out}-{more}')}"
         )
     typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}"))
     return tally.failed

@@ -51,6 +51,12 @@ ProcessesOption = Annotated[
 FullOption = Annotated[
     bool, typer.Option("--full", help="Print every table, not the answer alone.")
 ]
+ClearingOption = Annotated[
+    bool,
+    typer.Option(
+        "--clearing", help="P is the rate until all items are delivered, so that it has no cap."
+    ),
+]
 
 study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
 
@@ -88,6 +94,7 @@ def run_command(
     restock: Annotated[
         bool, typer.Option("--restock", help="Delivered items come back, so that P has no cap.")
     ] = False,
+    clearing: ClearingOption = False,
     processes: ProcessesOption = None,
     engine: Annotated[
         str | None,
@@ -122,11 +129,14 @@ def run_command(
             )
         looks = {"until_clear": True}
     chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
+    if clearing:
+        until_cleared(chosen)
     if restock:
         task, scenario = chosen.specification.played, chosen.specification.scenario
         restocked = task.vary(scenario, {"restock": True})
         chosen.specification = chosen.specification.replace(scenario=restocked)
-    out = out or Path("results", chosen.specification.name + "-restock" * restock)
+    ending = "-clearing" * clearing + "-restock" * restock
+    out = out or Path("results", chosen.specification.name + ending)
     chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
@@ -136,7 +146,8 @@ def run_command(
     for policy in _saturated(chosen) if policies and not restock else ():
         typer.echo(
             f"{policy} delivers every item before the end, so that P is capped and most verdicts "
-            "will be open. With items that come back nothing is capped: add --restock\n"
+            "will be open. Nothing is capped where items come back, or where P is the rate until "
+            "all are delivered: add --restock or --clearing\n"
         )
     tally = run_study(chosen, player, part)
     if part is None:
@@ -342,6 +353,23 @@ def study_of(
     if asked.endswith(".toml") or Path(asked).is_file():
         return Study.from_file(asked, out=out, trust_code=trust_code, **fields)
     return Study.preset(asked, out=out, **fields)
+
+
+def until_cleared(asked: Study) -> None:
+    """Let P be the rate at which the items of a study's warehouse are cleared.
+
+    Raises:
+        StudyError: the study plays another task.
+    """
+    from swarm_logistics_env.tasks.task import DEFAULT, task_of
+
+    given, task = asked.specification, task_of("clearing")
+    if given.task != DEFAULT:
+        raise StudyError(f"--clearing: should be for the task {DEFAULT!r}, not {given.task!r}")
+    times = {"restock": False, "duration": task.default.duration}
+    scenario = task.vary(given.scenario, times)
+    # What is published is of another P.
+    asked.specification = given.replace(task="clearing", scenario=scenario, reference=None)
 
 
 def run_study(

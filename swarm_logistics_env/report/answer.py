@@ -230,7 +230,9 @@ def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
     failed = f" ({cell.problem})" if cell.problem else ""
     if cell.by_seed.any():
-        return section.mean_p(cell) + failed
+        cleared = any(outcome.all_delivered for outcome in cell.outcomes)
+        time = f", all items after {section.time_to_clear(cell)} s" if cleared else ""
+        return section.mean_p(cell) + failed + time
     return f"0{failed} (at most {-math.log(0.05) / cell.n_seeds:.2f}, as no run delivered anything)"
 
 
@@ -246,7 +248,8 @@ def _last(results: StudyResults) -> str:
         parts.append(f"{section.SATURATED} P is capped, as every item was delivered")
     claims = [said(test.claim_verdict_holm) for test in results.verdicts if test.claim]
     if claims:
-        parts.append(f"of {len(claims)} claims {section.counted(claims)}")
+        where = " in the paper's text" if results.plan.specification.reference else ""
+        parts.append(f"of {len(claims)} claims{where} {section.counted(claims)}")
     return f"{'; '.join(parts)}."
 
 

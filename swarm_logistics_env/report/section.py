@@ -206,6 +206,14 @@ def listed(names: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def time_to_clear(cell: Cell) -> str:
+    """Return the median time until all items were delivered [s], and how many runs were late."""
+    times = [outcome.time_to_clear for outcome in cell.outcomes]
+    late = sum(map(math.isinf, times))
+    found = bracketed(spi.median_interval(times), 0)
+    return f"{found} ({late} of {len(times)})" if late else found
+
+
 def seeds_text(results: StudyResults) -> str:
     """Return over which seeds everything is, e.g. "20 paired seeds (0 to 19)"."""
     seeds = results.plan.seeds

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.comparison import CONFIDENCE
+from swarm_logistics_env.studies.comparison import CONFIDENCE, Reference, load_reference
 from swarm_logistics_env.studies.policy_comparison import (
     Agreement,
     CellAgainstBaseline,
@@ -49,6 +49,8 @@ def tables(results: StudyResults) -> Iterator[Section]:
             rows = [cell for cell in rows if cell.arm in changed]
             columns, title = [setting], f"{policy}: {table}, continued"
     yield from map(_agreement, agreements(results))
+    yield from _sentences(results)
+    yield from _times_to_clear(results)
 
 
 def _published(cell: Cell) -> str:
@@ -85,6 +87,49 @@ def _answers(indicator: str, tests: Sequence[Verdict], *, published: bool) -> It
 
 def _claimed(test: Verdict) -> str:
     return NOTHING if test.claimed is None else "yes" if test.claimed else "no"
+
+
+def _sentences(results: StudyResults) -> Iterator[Section]:
+    """Yield what the reference's text says beside what each policy does."""
+    reference = load_reference(results.plan.specification.reference)
+    for policy in results.policies if reference else ():
+        tests = [test for test in results.verdicts if test.compared.policy == policy]
+        said = sentences(reference, tests) if reference else []
+        if said and reference:
+            columns = ("the text", "its claims", "contradicted")
+            yield Section(f"{policy}: what the text says", columns, tuple(said), (reference.whose,))
+
+
+def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[tuple[str, str, str]]:
+    """Return each sentence that some test asks of, how its claims fare, and which are refuted."""
+    rows = []
+    for sentence, claims in reference.sentences.items():
+        here = [test for test in tests if test.compared.question in claims]
+        verdicts = [section.counted_as(test, test.claim_verdict_holm) for test in here]
+        refuted = [
+            f"{test.compared.label}: {test.compared.indicator} = {section.ratio(test)}"
+            for test, verdict in zip(here, verdicts)
+            if verdict == "refuted"
+        ]
+        if here:
+            rows.append((f'"{sentence}"', section.counted(verdicts), "; ".join(refuted) or NOTHING))
+    return rows
+
+
+def _times_to_clear(results: StudyResults) -> Iterator[Section]:
+    """Yield the time until all items were delivered, where a run delivered all of them."""
+    cells = [c for c in results.cells if any(run.all_delivered for run in c.outcomes)]
+    if cells:
+        yield Section.table(
+            "Time until all items are delivered",
+            cells,
+            [
+                ("", lambda cell: f"{cell.policy}: {cell.words}"),
+                ("median [s], 95 %", section.time_to_clear),
+            ],
+            'No number of items caps it. "x of y": so many runs were not done when the time was '
+            "up; ∞: nor was the median.",
+        )
 
 
 def _agreement(found: Agreement) -> Section:
