@@ -31,24 +31,37 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     page = tmp_path / "page.md"
     page.write_text(
         "Before.\n\n<!-- tables: paper -->\n<!-- end of tables -->\n\nBetween.\n\n"
+        "<!-- tables: clearing -->\n<!-- end of tables -->\n"
+        "<!-- tables: sentences -->\n<!-- end of tables -->\n"
         "<!-- tables: policies -->\nold\n<!-- end of tables -->\nAfter.\n"
     )
     short: dict[str, Any] = {"seeds": 2, "first_seed": 3, "scenario": {"duration": 40.0}}
 
-    def paper_studies(out: Path) -> tuple[Study, ...]:
+    def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
         paper: dict[str, Any] = {**short, "name": "paper", "reference": "paper"}
         widths = {"name": "delivery_width", "values": [2.0, 1.5]}
-        return (
-            Study(out=out / "1", sizes=[{"values": [5, 10]}], parameters=[widths], **paper),
-            Study(out=out / "2", faults=[{"modes": ["FM4"], "robots": [1, 2]}], **paper),
+        rest: dict[str, Any] = {"sizes": [{"values": [5, 10]}], "parameters": [widths]}
+        faults = [{"modes": ["FM4"], "robots": [1, 2]}]
+        parts: tuple[dict[str, Any], ...]
+        parts = rest, {"faults": faults}, {"faults": [{"modes": ["FM3_send"]}]}, rest
+        return tuple(Study(out=out / f"{i}", **fields, **paper) for i, fields in enumerate(parts))
+
+    def clearing_study(out: Path) -> Study:
+        return Study(
+            out=out / "clearing",
+            task="clearing",
+            policies=["homing", "ppo-delivery"],
+            seeds=2,
+            scenario={"n_items": 4, "duration": 200.0},
+            sizes=[{"values": [10, 25]}],
         )
 
     def policy_studies(out: Path) -> tuple[Study, ...]:
         small: dict[str, Any] = {**short, "faults": [{"modes": ["FM4"], "robots": [2]}]}
         policies = ["swarm-dt", "homing", "ppo-delivery"]
         return (
-            Study(out=out / "3", policies=policies, sizes=[{"values": [5, 25]}], **small),
-            Study(out=out / "4", policies=policies[:1], **{**small, "seeds": 3}),
+            Study(out=out / "of policies", policies=policies, sizes=[{"values": [5, 25]}], **small),
+            Study(out=out / "skewed", policies=policies[:1], **{**small, "seeds": 3}),
         )
 
     monkeypatch.setattr(tables, "PAGE", page)
@@ -59,6 +72,8 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(tables, "PROCESSES", 1)
     monkeypatch.setattr(tables, "paper_studies", paper_studies)
     monkeypatch.setattr(tables, "policy_studies", policy_studies)
+    monkeypatch.setattr(tables, "clearing_study", clearing_study)
+    monkeypatch.setattr(tables, "MEDIA", tmp_path)
     return page
 
 
@@ -83,7 +98,9 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     monkeypatch.setattr(Study, "run", watched)
     tables.main()
     assert small.read_text() == first
-    assert played == [0, 0, 0, 0]
+    drawn = {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")}
+    assert drawn == {"S", "FT", "A"}
+    assert played == [0] * 7
     # Nor does what is played anew change a digit.
     monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
     tables.main()
@@ -92,17 +109,26 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
 
 
 def test_its_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> None:
-    studies = (*tables.paper_studies(Path("a")), *tables.policy_studies(Path("a")))
+    out = Path("a")
+    first = tables.FIRST_SEED
+    paper = tables.paper_studies(out, first)
+    studies = (*paper, *tables.policy_studies(out), tables.clearing_study(out))
     for study in studies:
         seeds = study.plan().seeds
         assert min(seeds) >= 20_000
         assert max(seeds) < FIRST_OF_TRAININGS
-    assert [len(study.plan().seeds) for study in studies] == [20, 100, 20, 100]
+    assert [len(one.plan().seeds) for one in studies] == [20, 100, 100, 20, 100, 20, 100, 30]
 
 
 @pytest.mark.parametrize("page", [PAGE, README], ids=["results.md", "README.md"])
 def test_no_table_is_typed_by_hand(page: str) -> None:
-    assert [name for name, _ in BLOCK.findall(PAGE)] == ["paper", "policies", "costs"]
+    assert [name for name, _ in BLOCK.findall(PAGE)] == [
+        "clearing",
+        "paper",
+        "sentences",
+        "policies",
+        "costs",
+    ]
     rest = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
     assert not [line for line in rest.splitlines() if line.startswith("|")]
     # Nor is a value with its interval: "9.2 [8.3, 10.1]".

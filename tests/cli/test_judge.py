@@ -201,3 +201,17 @@ def test_recorded_p_is_that_of_the_shipped_policies() -> None:
         # If this fails, run `make tables`.
         first = run_episode(Scenario(restock=True), policies.load(name), seed=plan.seeds[0])
         assert recorded["policies"][name]["p"][0] == first.delivered
+
+
+def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert app.run(["judge", "homing", "--clearing", "--seeds", "3", "--processes", "1"]) == 0
+    told = capsys.readouterr().out
+    assert " s, all items after " not in told
+    assert ", all items after " in told
+    assert "†" not in told
+    report = (folder / "results" / "judged" / "homing-clearing" / "report.md").read_text()
+    assert "Time until all items are delivered" in report
+    assert "items delivered per minute" in report
+    assert app.run(["judge", "lab.csv", "--clearing"]) == 2

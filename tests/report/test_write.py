@@ -13,12 +13,14 @@ import pytest
 
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import Section, counted_as, sentence
+from swarm_logistics_env.report.tables import sentences, tables
 from swarm_logistics_env.report.write import (
     latex_tables,
     markdown,
     section_markdown,
     write_report,
 )
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults, judge
 from tests.studies.made_up import paper
 
@@ -169,3 +171,22 @@ def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_al
     assert "Unadjusted: open; Holm-adjusted: open." in text
     with (tmp_path / "claims.csv").open(newline="") as file:
         assert {row["verdict"] for row in csv.DictReader(file)} == {"inconclusive"}
+
+
+def test_every_sentence_of_the_paper_stands_beside_its_claims(few: StudyResults) -> None:
+    tests = few.verdicts
+    rows = sentences(PAPER, tests)
+    assert len(rows) == len(PAPER.sentences) == 9
+    counts = [int(n) for _, counted, _ in rows for n in re.findall(r"(\d+) \w+", counted)]
+    assert sum(counts) == sum(1 for test in tests if test.compared.question in PAPER.claims) == 41
+    (text,) = [section for section in tables(few) if section.title.endswith("what the text says")]
+    assert text.rows == tuple(rows)
+    assert "re-implementation" in text.lines[0]
+    tough = paper(lambda _, at: 39.0 if at.name == "FM4" else 20.0)
+    against = {row[0]: row[2] for row in sentences(PAPER, tough.verdicts)}
+    assert "FM4, m = 3: R = " in next(v for k, v in against.items() if "robust (R > 0)" in k)
+
+
+def test_the_time_to_clear_stands_where_a_run_delivered_everything(few: StudyResults) -> None:
+    (times,) = [section for section in tables(few) if section.title.startswith("Time until")]
+    assert [row[0] for row in times.rows] == ["swarm-dt: warehouse_width = 5"]

@@ -116,3 +116,23 @@ def test_no_interval_of_p_reaches_below_0() -> None:
     assert (mean.low, run.low) == (0.0, 0.0)
     assert mean.high is not None
     assert mean.high == pytest.approx(3.25 + 3.1824 * np.std(few, ddof=1) / 2, rel=1e-4)
+
+
+def test_median_interval_covers_the_median_of_skewed_times() -> None:
+    rng = np.random.default_rng(0)
+    times = rng.exponential(1.0, (2000, 25))
+    found = [spi.median_interval(row) for row in times]
+    covered = np.mean([one.low <= np.log(2.0) <= one.high for one in found if one.low is not None])
+    assert 0.94 <= covered <= 0.975  # at least .95, up to the noise of 2,000 draws
+    assert spi.median_interval([3.0, 1.0, 2.0]) == (2.0, None, None)
+    assert spi.median_interval([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]) == (3.5, 1.0, 6.0)
+
+
+def test_median_interval_bears_times_that_never_came() -> None:
+    late = [10.0, 20.0, 30.0, 40.0, *[np.inf] * 4]
+    value, low, high = spi.median_interval(late)
+    assert (value, low, high) == (np.inf, 10.0, np.inf)
+    with pytest.raises(IndicatorError, match="times: should be"):
+        spi.median_interval([1.0, np.nan])
+    with pytest.raises(IndicatorError, match="times: should be"):
+        spi.median_interval([])

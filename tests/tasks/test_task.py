@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import subprocess
@@ -195,3 +196,29 @@ def test_covers_all_that_an_episode_loads() -> None:
         "errors.py", "records.py", "environment/__init__.py", "environment/registration.py"
     }  # fmt: skip
     assert {"warehouse/physics.py", "policies/policy.py", "kernels.py"} <= covered <= loaded
+
+
+def test_clearing_is_a_rate_that_no_number_of_items_caps(tmp_path: Path) -> None:
+    small = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0, "n_items": 6}
+    size = {"sizes": [{"values": [2, 4]}], "policies": ["homing"], "seeds": 3}
+    study = Study(out=tmp_path, task="clearing", scenario={**small, "n_robots": 4}, **size)
+    assert study.run(processes=1).failed == 0
+    results = study.findings()
+    for cell in results.cells:
+        assert not cell.saturated
+        for p, outcome in zip(cell.by_seed, cell.outcomes):
+            assert outcome.all_delivered
+            assert len(outcome.delivery_times) == 6
+            assert outcome.time_to_clear == outcome.ended_at
+            assert outcome.ended_at == pytest.approx(outcome.delivery_times[-1])
+            assert p == pytest.approx(60.0 * 6 / outcome.ended_at)
+    # A run that is not done in time has the rate until then, and no time.
+    short = Study(out=None, task="clearing", scenario={**small, "duration": 1.0}, **size)
+    case = short.plan().cases[0]
+    assert case.task.play(case, 0, 0).time_to_clear == math.inf
+    assert case.task.play(case, 0, 0).delivered == 0.0
+    with pytest.raises(StudyError, match="restock = True: should be False"):
+        Study(task="clearing", scenario={"restock": True})
+    assert (
+        Study(task="clearing", scenario={"preset": "paper"}).specification.scenario.duration > 500
+    )
