@@ -350,7 +350,7 @@ def list_command(
             )
             for name, plan in plans
         ]
-        line = "swarm-logistics study plan NAME says how long one takes; study run NAME plays it."
+        line = "swarm-logistics study plan NAME prints its conditions; study run NAME plays it."
         show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)
 
 

@@ -184,11 +184,10 @@ def plan_command(
     ] = None,
     trust_code: TrustCodeOption = False,
 ) -> None:
-    """Print the conditions and what they take; of a study that was run, the seeds that it needs."""
+    """Print the conditions and count the runs; of a study that was run, the seeds that it needs."""
     from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.play import expected_seconds
 
-    from .terminal_tables import duration, show_power, show_table
+    from .terminal_tables import show_power, show_table
 
     if Path(asked).is_dir():
         if policies:
@@ -205,7 +204,6 @@ def plan_command(
     )
     show_table("Conditions", ("policy", "N", "stands in"), rows)
     typer.echo(plan)
-    typer.echo(f"On one process of this machine at most {duration(expected_seconds(plan))}")
 
 
 @study.command("report")

@@ -66,7 +66,7 @@ def show_answer(found: Answer, *, whole: bool = False) -> None:
     """Print the answer of a study on one screen, or with every line of it."""
     console = Console(highlight=False)
     width = console.width if console.is_terminal else _PLAIN_WIDTH
-    lines = digest(found, width, None, None if whole else MOST_LINES).split("\n")
+    lines = digest(found, width, None if whole else MOST_LINES).split("\n")
     shown = Text("\n".join(map(plain, lines)))
     for word in _VERDICTS.finditer(shown.plain):
         shown.stylize(_COLOURS[word[1]], *word.span())
@@ -114,14 +114,6 @@ def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
         number(test.detectable),
         NOTHING if same is None else number(spi.seeds_for_equivalence(same, POWER), 0),
     )
-
-
-def duration(seconds: float) -> str:
-    """Return a time in words, e.g. "2 h 10 min"."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    hours, minutes = divmod(round(seconds / 60), 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
 
 
 def in_one_line(tally: Tally, players: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.policy_comparison import (
     Agreement,
@@ -22,7 +21,6 @@ from . import section
 from .section import NOTHING, Section
 
 CellColumn = tuple[str, Callable[[Cell], str]]
-_MOST_MISSES = 8  # more are no list that anybody reads
 
 
 def tables(results: StudyResults) -> Iterator[Section]:
@@ -89,39 +87,20 @@ def _claimed(test: Verdict) -> str:
 
 def _agreement(found: Agreement) -> Section:
     total = len(found.cells)
-    lines = []
-    if found.misses is None or found.met is None or found.mean_interval_width is None:
-        lines.append("Cells inside the 95 % prediction interval: one seed gives no interval.")
-    else:
-        lines += [
+    lines = ["Cells inside the 95 % prediction interval: one seed gives no interval."]
+    if found.misses is not None and found.met is not None:
+        lines = [
             (
                 f"Cells whose published P lies inside the 95 % prediction interval of one of our "
                 f"runs: {total - len(found.misses)} of {total}; inside that of our mean: "
                 f"{len(found.met)} of {total}."
             ),
             f"Mean width of those intervals: {found.mean_interval_width:.1f} items.",
-            f"Misses: {_misses(found.misses)}.",
+            f"Misses: {'; '.join(cell.words for cell in found.misses) or 'none'}.",
         ]
-    lines.append(f"Mean relative error of our mean P: {found.mean_relative_error:.1%}.")
     if found.mean_log_error is not None:
         lines.append(f"Mean |log error| of our mean P: {found.mean_log_error:.3f}.")
-    pairs = [f"{a.arm.setting} and {b.arm.setting}" for a, b in found.disorder]
-    lines.append(
-        f"Swarm sizes up to {found.largest_ordered} in the opposite order to the published one, "
-        f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
-    )
     return Section(f"{found.policy}: agreement with the published values", lines=tuple(lines))
-
-
-def _misses(cells: Sequence[Cell]) -> str:
-    told = [
-        f"{cell.arm.setting} ({_published(cell)} published, "
-        f"{section.bracketed(Interval(*cell.one_run), 1)} ours)"
-        for cell in cells[:_MOST_MISSES]
-    ]
-    if len(cells) > _MOST_MISSES:
-        told.append(f"and {len(cells) - _MOST_MISSES} more, in cells.csv")
-    return ", ".join(told) or "none"
 
 
 def warnings(results: StudyResults) -> Iterator[str]:
