@@ -11,7 +11,7 @@ import typer
 import swarm_logistics_env
 from swarm_logistics_env import SCENARIO_PRESETS, Scenario, policies
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.cli.terminal_tables import show
+from swarm_logistics_env.cli.application import show
 from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.train import preset_names
