@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
@@ -86,19 +84,14 @@ def attack_command(
     try:
         found = attack(asked, engine, place)
     except KeyboardInterrupt:
-        _stopped(place)
+        typer.echo(
+            f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
+        )
+        raise typer.Exit(130) from None
     _show_attack(found, policy, robots, fresh)
 
 
-def _stopped(place: Path) -> None:
-    typer.echo(
-        f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
-    )
-    raise typer.Exit(130) from None
-
-
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
-
     rows = [
         (
             found.by,
@@ -171,9 +164,13 @@ def _train(
     from swarm_logistics_env.train.training import load_training
 
     training = load_training(asked, **fields)
-    with _explained():
+    try:
         import_module("tensorboard")  # missed before anything is written
         from swarm_logistics_env.train.trainer import train
+    except ModuleNotFoundError as error:
+        raise TrainingError(
+            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
+        ) from error
     out = out or Path("results/train", training.name)
     log = shlex.quote(str(out / "tensorboard"))
     typer.echo(f"To follow it: tensorboard --logdir {log}")
@@ -205,16 +202,6 @@ def _show_training(path: Path) -> None:
         )
     typer.echo(f"Curve: {path.parent / PICTURE}")
     typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
-
-
-@contextmanager
-def _explained() -> Iterator[None]:
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise TrainingError(
-            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
-        ) from error
 
 
 def run_command(

@@ -14,7 +14,7 @@ import sys
 import traceback
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -23,7 +23,8 @@ from rich.table import Table
 from rich.text import Text
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.errors import FaultError, ScenarioError
+from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
+from swarm_logistics_env.policies import policy
 from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.report.answer import MOST_LINES, Answer, answer, digest
 from swarm_logistics_env.report.document import document
@@ -39,9 +40,8 @@ from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.play import Tally
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, Verdict
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.warehouse.fault_text import fault_of
+from swarm_logistics_env.warehouse.faults import Fault
 
 # A disk, a quota or a file that is full; a pipe that nobody reads.
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EPIPE)
@@ -105,10 +105,7 @@ def _sentence(error: Exception) -> str | None:
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
         return str(format_message())
-    from swarm_logistics_env.errors import SwarmLogisticsError
-    from swarm_logistics_env.spi import IndicatorError
-
-    if isinstance(error, SwarmLogisticsError | IndicatorError):
+    if isinstance(error, SwarmLogisticsError | spi.IndicatorError):
         return str(error)
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
@@ -119,8 +116,6 @@ def _sentence(error: Exception) -> str | None:
 
 def _of_a_policy(error: Exception) -> str | None:
     """Return what a user's own policy raised, and where; None if the error came from elsewhere."""
-    from swarm_logistics_env.policies import policy
-
     frames = traceback.extract_tb(error.__traceback__)
     calls = [number for number, frame in enumerate(frames) if frame.filename == policy.__file__]
     if not calls:
@@ -138,8 +133,6 @@ def _of_a_policy(error: Exception) -> str | None:
 
 
 def _complain(sentence: str, code: int) -> int:
-    from swarm_logistics_env.records import plain
-
     sys.stderr.write(f"swarm-logistics: {plain(sentence)}\n")  # it may repeat what was typed
     return code
 
@@ -204,8 +197,6 @@ def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
     Raises:
         FaultError: a text does not read so, there is no such fault, or the episode ends before.
     """
-    from swarm_logistics_env.warehouse.fault_text import fault_of
-
     faults = [fault_of(text) for text in texts or []]
     for fault, text in zip(faults, texts or []):
         if fault.onset >= scenario.duration:

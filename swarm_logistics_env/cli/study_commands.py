@@ -13,10 +13,9 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
 from swarm_logistics_env.report.section import bracketed, said
-from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
-from swarm_logistics_env.studies.gate import Gate, GateAnswer, answers, match
+from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.play import Engine, Tally, engine_named
 from swarm_logistics_env.studies.runs import Runs, export
@@ -25,7 +24,6 @@ from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
 from .application import in_one_line, show_power, show_report, show_table
 
-SYMBOLS = tuple(DEFINITIONS)
 StudyArgument = Annotated[
     str,
     typer.Argument(
@@ -60,11 +58,6 @@ FullOption = Annotated[
 ]
 
 study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
-
-
-@study.callback()
-def group() -> None:
-    """Judge a swarm by its indicators."""
 
 
 @study.command("run")
@@ -147,9 +140,8 @@ def run_command(
             f"When all {part.count} shards are done: swarm-logistics study merge "
             f"{out}/shard-*-of-{part.count} --out {out}"
         )
-    players = {"local": "1 process", "ray": "Ray"}.get(
-        engine, f"{processes or os.cpu_count() or 1} processes"
-    )
+    count = f"{processes or os.cpu_count() or 1} processes"
+    players = {"local": "1 process", "ray": "Ray"}.get(engine, count)
     # The last line: where it is looked for after a report of many pages.
     typer.echo(in_one_line(tally, players))
     raise typer.Exit(1 if tally.failed else 0)
@@ -226,7 +218,7 @@ def compare_command(
         list[str] | None,
         typer.Option(
             metavar="GATE",
-            help=f"[possibly] {'|'.join(SYMBOLS)} <|> NUMBER [at TEXT]; may be "
+            help=f"[possibly] {SUBJECTS} <|> NUMBER [at TEXT]; may be "
             "repeated. change is "
             "(P_new - P_old) / P_old; the others are NEW's. Plain: fails where it is so beyond "
             "chance; possibly: where that is not ruled out.",
@@ -253,7 +245,6 @@ def compare_command(
 
 
 def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str, ...]) -> None:
-
     rows = []
     for answer in found:
         estimate = answer.estimate

@@ -148,7 +148,6 @@ def write_film_of(
 
 
 def _short(policy: str) -> str:
-
     policy = called(policy)
     # A long path of a user's own policy is cut at its beginning.
     return policy if len(policy) <= 24 else f"…{policy[-23:]}"
