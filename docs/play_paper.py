@@ -17,7 +17,7 @@ from swarm_logistics_env.report.figures import indicator_figures
 from swarm_logistics_env.report.tables import sentences
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
-from swarm_logistics_env.studies.policy_comparison import Agreement, agreement
+from swarm_logistics_env.studies.measures import Agreement, agreement
 from swarm_logistics_env.studies.presets import PAPER, PAPER_SIZES
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped

@@ -14,7 +14,7 @@ from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.specification import seeds_in_words
-from swarm_logistics_env.studies.verdict import POWER, Cell, Verdict
+from swarm_logistics_env.studies.verdict import Cell, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -150,11 +150,6 @@ def percent(confidence: float) -> str:
     return "> 99.99 %" if confidence > 0.9999 else f"{100 * confidence:.4g} %"
 
 
-def p_text(p: float) -> str:
-    """Return a p-value, e.g. "0.013" or "< 0.001"."""
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"
-
-
 def mean_p(cell: Cell) -> str:
     """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
@@ -260,8 +255,6 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         adjusted = "" if same == holm else f" ({holm} under Holm)"
         change = bracketed(test.equivalence.change, 3)
         yield f"{test.unchanged}? Change {change}: {same}{adjusted}."
-    if "inconclusive" in (test.answer, test.answer_holm):
-        yield from _what_it_takes(test, estimate)
     yield from (f"{FLAGS[flag]}." for flag in test.flags)
     if "hidden_stalls" in test.flags:
         yield f"It needs at least {spi.seeds_against_stalls(estimate)} seeds."
@@ -287,17 +280,7 @@ def _conditions(test: Verdict) -> str:
 
 
 def _p(p: float | None) -> str:
+    """Return a p-value in brackets, e.g. " (p = 0.013)"; empty: there is none."""
     if p is None:
         return ""
-    text = p_text(p)
-    return f" (p {text})" if text.startswith("<") else f" (p = {text})"
-
-
-def _what_it_takes(test: Verdict, estimate: Estimate) -> Iterator[str]:
-    if test.detectable is not None:
-        yield (
-            f"{estimate.n_seeds} seeds find an effect {test.detectable:.3f} away from "
-            f"{test.compared.threshold:.3g} with {100 * POWER:.0f} % power, unadjusted."
-        )
-    if test.seeds_needed is not None:
-        yield f"The published value {test.published:.3f} needs {test.seeds_needed} seeds."
+    return " (p < 0.001)" if p < 0.001 else f" (p = {p:.3f})"

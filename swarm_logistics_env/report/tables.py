@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.studies.comparison import CONFIDENCE, Reference, load_reference
-from swarm_logistics_env.studies.policy_comparison import (
+from swarm_logistics_env.studies.comparison import CONFIDENCE
+from swarm_logistics_env.studies.measures import (
     Agreement,
     CellAgainstBaseline,
     IndicatorAgainstBaseline,
@@ -15,6 +14,7 @@ from swarm_logistics_env.studies.policy_comparison import (
     cells_against_baseline,
     indicators_against_baseline,
 )
+from swarm_logistics_env.studies.presets import Reference, load_reference
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
@@ -22,7 +22,6 @@ from . import section
 from .section import NOTHING, Section
 
 CellColumn = tuple[str, Callable[[Cell], str]]
-_MOST_MISSES = 8  # more are no list that anybody reads
 
 
 def tables(results: StudyResults) -> Iterator[Section]:
@@ -134,39 +133,20 @@ def _times_to_clear(results: StudyResults) -> Iterator[Section]:
 
 def _agreement(found: Agreement) -> Section:
     total = len(found.cells)
-    lines = []
-    if found.misses is None or found.met is None or found.mean_interval_width is None:
-        lines.append("Cells inside the 95 % prediction interval: one seed gives no interval.")
-    else:
-        lines += [
+    lines = ["Cells inside the 95 % prediction interval: one seed gives no interval."]
+    if found.misses is not None and found.met is not None:
+        lines = [
             (
                 f"Cells whose published P lies inside the 95 % prediction interval of one of our "
                 f"runs: {total - len(found.misses)} of {total}; inside that of our mean: "
                 f"{len(found.met)} of {total}."
             ),
             f"Mean width of those intervals: {found.mean_interval_width:.1f} items.",
-            f"Misses: {_misses(found.misses)}.",
+            f"Misses: {'; '.join(cell.words for cell in found.misses) or 'none'}.",
         ]
-    lines.append(f"Mean relative error of our mean P: {found.mean_relative_error:.1%}.")
     if found.mean_log_error is not None:
         lines.append(f"Mean |log error| of our mean P: {found.mean_log_error:.3f}.")
-    pairs = [f"{a.arm.setting} and {b.arm.setting}" for a, b in found.disorder]
-    lines.append(
-        f"Swarm sizes up to {found.largest_ordered} in the opposite order to the published one, "
-        f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
-    )
     return Section(f"{found.policy}: agreement with the published values", lines=tuple(lines))
-
-
-def _misses(cells: Sequence[Cell]) -> str:
-    told = [
-        f"{cell.arm.setting} ({_published(cell)} published, "
-        f"{section.bracketed(Interval(*cell.one_run), 1)} ours)"
-        for cell in cells[:_MOST_MISSES]
-    ]
-    if len(cells) > _MOST_MISSES:
-        told.append(f"and {len(cells) - _MOST_MISSES} more, in cells.csv")
-    return ", ".join(told) or "none"
 
 
 def warnings(results: StudyResults) -> Iterator[str]:
@@ -205,16 +185,9 @@ def warnings(results: StudyResults) -> Iterator[str]:
 
 
 _HOW_TO_READ = (
-    (
-        "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
-        "differences are paired by seed, their intervals jackknifed."
-    ),
-    (
-        "P: IQM is the mean without the lowest and the highest quarter of the seeds, worst tenth "
-        "the mean of the lowest tenth, rounded up to whole seeds. Differences are paired by seed "
-        "(t-interval), and so are ratios of mean P (Fieller); the last column is the share of "
-        "seeds with more deliveries, ties counting half (Wilson)."
-    ),
+    "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
+    "differences are paired by seed, their intervals jackknifed. Differences of P are paired by "
+    "seed (t-interval), and so are ratios of mean P (Fieller)."
 )
 
 
@@ -222,7 +195,7 @@ def policy_sections(results: StudyResults) -> Iterator[Section]:
     """Yield policy x indicator: values with differences, then P cell by cell."""
     if len(results.policies) < 2:
         return
-    yield Section("", lines=(*_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
+    yield Section("", lines=(_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
     questions = list(indicators_against_baseline(results))
     by_table = grouped(questions, lambda one: one.test.compared.table)
     for table, here in by_table.items():
@@ -258,13 +231,7 @@ def _cells_beside(table: str, cells: Sequence[CellAgainstBaseline], baseline: st
             ("condition", lambda one: str(one.cell.arm.setting)),
             ("policy", lambda one: one.cell.policy),
             ("mean P [95 %]", lambda one: section.mean_p(one.cell)),
-            ("IQM of P", lambda one: f"{one.interquartile_mean:.1f}"),
-            ("worst tenth", lambda one: f"{one.worst_decile:.1f}"),
             (f"P - {baseline}'s [95 %]", lambda one: section.bracketed(one.difference, 1)),
             (f"P / {baseline}'s [95 %]", lambda one: section.bracketed(one.ratio, 2)),
-            (
-                f"delivers more than {baseline} [95 %]",
-                lambda one: section.bracketed(one.improvement, 2),
-            ),
         ],
     )

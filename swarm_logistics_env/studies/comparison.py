@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
 from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
@@ -197,55 +195,3 @@ class Comparison:
             saturated=[name for name, arm in named.items() if arm in saturated],
             identical=identical and not self.removed,
         )
-
-
-@dataclass(frozen=True)
-class Reference:
-    """Performances and yes/no claims that somebody published, without a number of runs.
-
-    Each performance is treated as one run.
-
-    Attributes:
-        source: whose they are, for the report.
-        performance: P at each setting [items].
-        cells: the settings that count as cells of the tables; a baseline repeated under another
-            name is none.
-        sentences: each sentence of the text, with the questions that it answers: whether the
-            indicator is above the threshold.
-        whose: what a verdict on these claims can mean, and what not.
-    """
-
-    source: str
-    performance: Mapping[Setting, float]
-    cells: tuple[Setting, ...]
-    sentences: Mapping[str, Mapping[Question, bool]]
-    whose: str
-
-    @cached_property
-    def claims(self) -> Mapping[Question, bool]:
-        """Whether the text says that the indicator is above the threshold."""
-        return {asked: said for one in self.sentences.values() for asked, said in one.items()}
-
-    def estimate(self, comparison: Comparison) -> Estimate | None:
-        """Return the published value of an indicator, without interval, where there is one."""
-        if any(arm.setting not in self.performance for arm in comparison.arms):
-            return None
-        return comparison.estimate(
-            {arm: np.array([self.performance[arm.setting]]) for arm in comparison.arms}
-        )
-
-
-def load_reference(name: str | None) -> Reference | None:
-    """Return the reference of that name; None for none.
-
-    Raises:
-        StudyError: there is none of that name.
-    """
-    if name is None:
-        return None
-    from .presets import PAPER
-
-    known = {"paper": PAPER}
-    if name not in known:
-        raise StudyError(f"no reference {name!r}{suggest(name, known)}")
-    return known[name]

@@ -110,17 +110,12 @@ def test_a_small_performance_is_not_rounded_away(
         (["lab.csv"], "has no column 'performance'"),
         (["lab.cvs"], "cannot read lab.cvs"),
         (["lab.csv", "--setup", "nowhere.toml"], "--setup nowhere.toml: should be NAME=VALUE, or"),
-        (["lab.csv", "--setup", "lab.csv"], "--setup lab.csv is not TOML"),
         (["lab.csv", "--seeds", "5"], "--seeds is not for a file of trials, and 'lab.csv' is one"),
         (["nowhere_at_all:Mine"], "No module named 'nowhere_at_all': should lie in this folder"),
         (["judged_policy:NoAct"], "is no policy: it should have the methods reset and act"),
-        (["judged_policy:Nine"], "should name its class, 'judged_policy:Mine'"),
-        (["judged_policy.py"], "should name its class, 'judged_policy:Mine'"),
-        (["homng"], "did you mean 'homing'?"),
         (["model.zip"], "executes the code"),
         (["homing", "--column", "N=robots"], "--column is not for a policy, and 'homing' is one"),
         (["homing", "--seeds", "2"], "--seeds"),
-        (["trials.xlsx"], "cannot read trials.xlsx"),
     ],
 )
 def test_what_cannot_be_judged_ends_in_one_sentence_before_anything_is_written(

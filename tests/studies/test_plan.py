@@ -97,8 +97,6 @@ def test_policy_parameters_make_another_condition() -> None:
         ({"seeds": 0}, "Specification.seeds = 0: should be greater than 0"),
         ({"first_seed": -1}, "first_seed = -1: should be greater than or equal to 0"),
         ({"first_seed": 2**31}, "first_seed = 2147483648: should be less than or equal to"),
-        ({"scenario": {"n_robot": 3}}, "did you mean 'n_robots'?"),
-        ({"scenario": {"preset": "papr"}}, "did you mean 'paper'?"),
         ({"sizes": [{"values": [5, 5]}]}, "ascending"),
         ({"sizes": [{"values": [5, 9], "superlinear": [[5, 8]]}]}, "neighbouring sizes"),
         ({"faults": [{"modes": ["FM9"]}]}, "no failure mode 'FM9'; did you mean"),
@@ -118,7 +116,6 @@ def test_policy_parameters_make_another_condition() -> None:
         ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
         ({"policies": [3]}, "an object with act"),
         ({"faults": {"modes": ["FM1"]}}, "list of tables: [[faults]] in a TOML file"),
-        ({"parameters": {"name": "x"}}, "list of tables: [[parameters]] in a TOML file"),
         ({"faults": [{"modes": ["FM1"]}], "reference": "papr"}, "did you mean 'paper'?"),
         (
             {
@@ -273,11 +270,8 @@ def test_robots_may_fail_and_be_repaired_at_random_lose_parts_of_a_mode_or_a_fac
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[[faults]]\nmode = ['FM1']", "Faults has no field 'mode'; did you mean 'modes'?"),
-        ("[[faults]]\nmodes = ['FM1']\nrobots = [1, 1]", "each value once"),
         ("[faults]\nmodes = ['FM1']", "Specification.faults = {'modes': ['FM1']}"),
         ("indicators = ['Q']", "Specification.indicators = ['Q']: no indicator 'Q'"),
-        ("scenario = 3", "Specification.scenario = 3"),
         ("seeds = ", "is not TOML: Invalid value"),
         ("\udc00", "is not TOML"),
     ],
