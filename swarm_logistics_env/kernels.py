@@ -229,7 +229,7 @@ class _Report(event.Listener):
         if not _Report.is_told:
             _Report.is_told = True
             left = self.seconds / self.n_done * (total - self.n_done)
-            sys.stderr.write(f"Compiling for this processor, once: about {left:.0f} s.\n")
+            sys.stderr.write(f"Compiling, which later runs reuse: at most {left:.0f} s.\n")
         if self._bar is None and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import Progress

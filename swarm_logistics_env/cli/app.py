@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swarm_logistics_env.episode import run_episode
-from swarm_logistics_env.errors import SetupError, TrainingError
+from swarm_logistics_env.errors import SetupError, TrainingError, suggest
 from swarm_logistics_env.policies import called, known_policies, load, read_card
 from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.scenario import SOURCES
@@ -275,17 +274,11 @@ def run_command(
     typer.echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")
 
 
-class Listed(StrEnum):
-    """What `list` can list."""
-
-    policies = "policies"
-    faults = "faults"
-    studies = "studies"
-    scenario = "scenario"
+LISTED = ("policies", "faults", "studies", "scenario")
 
 
 def list_command(
-    what: Annotated[Listed, typer.Argument(help="What to list.")],
+    what: Annotated[str, typer.Argument(metavar="|".join(LISTED), help="What to list.")],
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
@@ -294,7 +287,9 @@ def list_command(
     ] = False,
 ) -> None:
     """List policies, faults (failure modes), studies, or every condition of a scenario."""
-    if what is Listed.scenario:
+    if what not in LISTED:
+        raise SetupError(f"list {what}: should be {', '.join(LISTED)}{suggest(what, LISTED)}")
+    if what == "scenario":
         chosen = scenario_of(preset, scenario_file, changes)
         if as_json:
             typer.echo(chosen.to_json())
@@ -306,10 +301,10 @@ def list_command(
         sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
         columns = ("condition", "value", "unit, meaning; source")
         show_table(f"Preset {preset}", columns, chosen.conditions(), marks, sources)
-    elif what is Listed.policies:
+    elif what == "policies":
         line = "Your own is package.module:Class, or the path of a file that `train` wrote."
         show_table("Policies", ("name", "kind", "about"), known_policies(), line)
-    elif what is Listed.faults:
+    elif what == "faults":
         rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
         line = "As --fault takes one: MODE:ROBOTS@ONSET, e.g. FM4:2@200"
         show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)

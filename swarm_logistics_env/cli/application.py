@@ -26,7 +26,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
 from swarm_logistics_env.policies import policy
 from swarm_logistics_env.records import plain, read_table
-from swarm_logistics_env.report.answer import MOST_LINES, Answer, answer, digest
+from swarm_logistics_env.report.answer import MOST_LINES, Answer, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import NOTHING, WORDS, Section, number
 from swarm_logistics_env.report.write import (
@@ -251,7 +251,11 @@ def show_answer(found: Answer, *, whole: bool = False) -> None:
 
 
 def show_report(results: StudyResults, out: Path | None, *, full: bool = False) -> None:
-    """Print the answer of a study, the tables too if `full`, and write its report into `out`."""
+    """Print the answer of a study and a sentence for a paper, and write its report into `out`.
+
+    Args:
+        full: print every table, and a line a question.
+    """
     whole = document(results)
     for section in whole.summary if full else ():
         show(section)
@@ -261,6 +265,12 @@ def show_report(results: StudyResults, out: Path | None, *, full: bool = False) 
         typer.echo(f"Report: {write_report(results, out, whole)[0]}")
         if missing := missing_packages():
             typer.echo(how_to_get_figures(missing))
+        else:
+            typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
+        if not full:
+            again = f"swarm-logistics study report {shlex.quote(str(out))} --full"
+            typer.echo(f"Each question on a line of its own: {again}")
+    typer.echo(f"For a paper: {plain(in_a_sentence(results))}")
 
 
 def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
@@ -293,11 +303,13 @@ def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
     )
 
 
-def in_one_line(tally: Tally, players: str) -> str:
-    """Return how many runs `players` have played, in which time."""
+def in_one_line(tally: Tally, players: str, out: Path) -> str:
+    """Return how many runs `players` have played, in which time; they are kept in `out`."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     error = plain(tally.error or "")
-    why = f", the first with {error}; study export has each traceback" if error else ""
+    place, to = shlex.quote(str(out)), shlex.quote(str(out / "runs.csv"))
+    export = f"swarm-logistics study export {place} --to {to}"
+    why = f", the first with {error}. Each traceback: {export}" if error else ""
     return (
         f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
         f"were kept from before; {tally.failed} failed{why}"

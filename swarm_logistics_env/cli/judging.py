@@ -13,8 +13,7 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, called, load
 from swarm_logistics_env.records import read_table
-from swarm_logistics_env.report.answer import in_a_sentence
-from swarm_logistics_env.report.section import slug
+from swarm_logistics_env.report.section import plural, slug
 from swarm_logistics_env.spi import mean_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
@@ -45,7 +44,7 @@ def judge_command(
         typer.Argument(
             metavar="TRIALS.csv|POLICY",
             help="CSV file, one trial or delivery a row; or a policy: name, path of a policy file, "
-            "or package.module:Class.",
+            "package.module:Class, or my.py:Class.",
         ),
     ],
     out: Annotated[
@@ -133,7 +132,7 @@ def judge_command(
     )
     imported = StoredStudy.existing(directory).imported
     typer.echo("\n".join([f"{count} runs in {asked}", *(imported.notes if imported else ()), ""]))
-    _finish(Study.stored(directory).findings(), directory, full=full)
+    show_report(Study.stored(directory).findings(), directory, full=full)
 
 
 def _free(directory: Path) -> Path:
@@ -143,13 +142,6 @@ def _free(directory: Path) -> Path:
         number += 1
         free = directory.with_name(f"{directory.name}-{number}")
     return free
-
-
-def _finish(results: StudyResults, out: Path, *, full: bool) -> None:
-    """Print the answer, a sentence for a paper, and what was written."""
-    show_report(results, out, full=full)
-    typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
-    typer.echo(f"For a paper: {in_a_sentence(results)}")
 
 
 def _stated(texts: list[str]) -> dict[str, str]:
@@ -211,7 +203,7 @@ def _judge_policy(
     engine = engine_named("process" if count > 1 else "local", count, None)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
-    _finish(results, out, full=full)
+    show_report(results, out, full=full)
     if not clearing and (rank := _rank(results)):
         typer.echo(rank)
     if tally.left:
@@ -223,7 +215,7 @@ def _judge_policy(
             f"{shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
             f"--out {shlex.quote(f'{out}-{more}')}"
         )
-    typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}"))
+    typer.echo(in_one_line(tally, plural(count, "worker"), out))
     return tally.failed
 
 

@@ -72,8 +72,9 @@ class Line:
         """The verdicts in words, and what an open one takes."""
         words = [said(test.conclusion) for test in self.tests]
         test, problems = self.tests[0], {test.problem for test in self.tests}
-        if test.estimate is None and (len(self.tests) == 1 or len(problems) == 1):
-            return f"undefined: {test.problem}"
+        if not any(one.estimate for one in self.tests):
+            others = f", and {len(problems) - 1} more reasons" if len(problems) > 1 else ""
+            return f"undefined: {test.problem}{others}"
         if len(self.tests) > 1:
             return words[0] if len(set(words)) == 1 else section.counted(words)
         assert test.estimate is not None
@@ -195,11 +196,11 @@ def _seeds_more(estimate: Estimate) -> int | None:
 
 
 def _asked(results: StudyResults) -> str:
-    count, policies = len(results.verdicts), results.policies
+    policies = results.policies
     whose = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
     seeds = section.seeds_text(results).split(" (")[0]
     name = results.plan.specification.name
-    return f"{name}: {count} question{'' if count == 1 else 's'}, {whose}, {seeds}."
+    return f"{name}: {section.plural(len(results.verdicts), 'question')}, {whose}, {seeds}."
 
 
 def _performance(results: StudyResults) -> str:
@@ -227,29 +228,40 @@ def _performance(results: StudyResults) -> str:
 
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
-    failed = f" ({cell.problem})" if cell.problem else ""
+    failed = f" ({cell.problem}, which do not count)" if cell.problem else ""
     if cell.by_seed.any():
         cleared = any(outcome.all_delivered for outcome in cell.outcomes)
         time = f", all items after {section.time_to_clear(cell)} s" if cleared else ""
         return section.mean_p(cell) + failed + time
-    return f"0{failed} (at most {-math.log(0.05) / cell.n_seeds:.2f}, as no run delivered anything)"
+    most = -math.log(0.05) / cell.n_seeds
+    return f"0{failed} (at most {most:.2f}, as none of {cell.n_seeds} runs delivered anything)"
 
 
 def _last(results: StudyResults) -> str:
-    """Return how to read the verdicts, in one line."""
-    parts = ["Verdicts are Holm-adjusted"]
-    if any("assumes_normal" in test.flags for test in results.verdicts):
+    """Return what the symbols mean, how to read the verdicts, and what limits them, in one line."""
+    tests, reference = results.verdicts, results.plan.specification.reference
+    asked = {test.compared.indicator for test in tests} - {"change"}
+    named = [one.heading for symbol, one in DEFINITIONS.items() if symbol in asked]
+    parts = [f"{', '.join(named)}: good above 0"] if named else []
+    parts.append("verdicts are Holm-adjusted")
+    if any("assumes_normal" in test.flags for test in tests):
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normal differences)")
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared")
-    if any(test.saturated for test in results.verdicts):
-        parts.append(f"{section.SATURATED} P is capped, as every item was delivered")
-    claims = [said(test.claim_verdict_holm) for test in results.verdicts if test.claim]
+    if any(test.saturated for test in tests):
+        parts.append(
+            f"{section.SATURATED} P is capped, as every item was delivered: more seeds tell "
+            "nothing there, but --clearing or --restock does"
+        )
+    if any(cell.stalled for cell in results.cells):
+        parts.append("some runs stalled, see the report")
+    claims = [said(test.claim_verdict_holm) for test in tests if test.claim]
     if claims:
-        where = " in the paper's text" if results.plan.specification.reference else ""
-        parts.append(f"of {len(claims)} claims{where} {section.counted(claims)}")
-    return f"{'; '.join(parts)}."
+        where = " in the paper's text" if reference else ""
+        parts.append(f"of {section.plural(len(claims), 'claim')}{where} {section.counted(claims)}")
+    told = "; ".join(parts)
+    return f"{told[0].upper()}{told[1:]}."
 
 
 def in_a_sentence(results: StudyResults) -> str:
@@ -257,7 +269,8 @@ def in_a_sentence(results: StudyResults) -> str:
     known = [test for test in results.verdicts if test.interval]
     words = section.counted(said(test.conclusion) for test in results.verdicts)
     told = f"{_performance(results)[:-1]} over {section.seeds_text(results)}"
-    told += f"; of {len(results.verdicts)} questions {words} (Holm)"
+    asked = section.plural(len(results.verdicts), "question")
+    told += f"; of {asked} {words} (Holm)"
     if known:
         worst = min(known, key=lambda test: test.value or 0.0)
         line = _line([worst], (0,))

@@ -201,6 +201,11 @@ def listed(names: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def plural(count: int, noun: str) -> str:
+    """Return a number of things, e.g. "1 claim" or "2 claims"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def time_to_clear(cell: Cell) -> str:
     """Return the median time until all items were delivered [s], and how many runs were late."""
     times = [outcome.time_to_clear for outcome in cell.outcomes]

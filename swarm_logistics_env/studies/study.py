@@ -166,7 +166,11 @@ class Study:
             left = 0
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
-                outcomes, took = play(missing, engine, store, self.specification.name, end)
+                title = self.specification.name
+                if self.specification.until_clear:
+                    seeds = max(run.seed for run in missing) - self.specification.first_seed + 1
+                    title += f", up to {seeds} seeds"
+                outcomes, took = play(missing, engine, store, title, end)
                 left = len(missing) - len(outcomes)
                 played += len(outcomes)
                 tried |= {run.key for run in missing}

@@ -76,7 +76,10 @@ def fault_of(text: str) -> Fault:
     """
     match = _FAULT.fullmatch(text)
     if match is None:
-        raise FaultError(f"fault {text!r}: should be {FORM}, e.g. FM1:2@200")
+        raise FaultError(
+            f"fault {text!r}: should be {FORM}, e.g. FM1:2@200, with ROBOTS a whole number and "
+            "ONSET and DURATION in seconds"
+        )
     return Fault(
         match["mode"],
         int(match["robots"] or 1),
