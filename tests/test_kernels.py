@@ -76,7 +76,7 @@ kernels.uniform(1, 2), kernels.gaussian(1, 2)
 def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -> None:
     quiet = started(LONG, tmp_path / "worker", **{kernels.QUIET: "1"})
     told = finished(started(LONG, tmp_path))[-1]
-    assert re.fullmatch(r"Compiling for this processor, once: about \d+ s\.\n", told)
+    assert re.fullmatch(r"Compiling, which later runs reuse: at most \d+ s\.\n", told)
     assert finished(started(LONG, tmp_path))[-1] == ""  # loaded
     assert finished(quiet)[-1] == ""
 

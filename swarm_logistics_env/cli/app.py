@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swarm_logistics_env.episode import run_episode
-from swarm_logistics_env.errors import SetupError, TrainingError, suggest
+from swarm_logistics_env.errors import SetupError, TrainingError
 from swarm_logistics_env.policies import called, known_policies, load, read_card
 from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.scenario import SOURCES
@@ -288,7 +288,7 @@ def list_command(
 ) -> None:
     """List policies, faults (failure modes), studies, or every condition of a scenario."""
     if what not in LISTED:
-        raise SetupError(f"list {what}: should be {', '.join(LISTED)}{suggest(what, LISTED)}")
+        raise SetupError(f"list {what}: should be {', '.join(LISTED[:-1])} or {LISTED[-1]}")
     if what == "scenario":
         chosen = scenario_of(preset, scenario_file, changes)
         if as_json:

@@ -13,7 +13,7 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, called, load
 from swarm_logistics_env.records import read_table
-from swarm_logistics_env.report.section import plural, slug
+from swarm_logistics_env.report.section import slug
 from swarm_logistics_env.spi import mean_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
@@ -215,7 +215,7 @@ def _judge_policy(
             f"{shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
             f"--out {shlex.quote(f'{out}-{more}')}"
         )
-    typer.echo(in_one_line(tally, plural(count, "worker"), out))
+    typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}", out))
     return tally.failed
 
 

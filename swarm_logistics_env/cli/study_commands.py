@@ -12,7 +12,7 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
-from swarm_logistics_env.report.section import bracketed, plural, said
+from swarm_logistics_env.report.section import bracketed, said
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
@@ -151,8 +151,8 @@ def run_command(
             f"When all {part.count} shards are done: swarm-logistics study merge "
             f"{out}/shard-*-of-{part.count} --out {out}"
         )
-    count = plural(processes or os.cpu_count() or 1, "worker")
-    players = {"local": "this process", "ray": "Ray"}.get(engine, count)
+    count = f"{processes or os.cpu_count() or 1} processes"
+    players = {"local": "1 process", "ray": "Ray"}.get(engine, count)
     # The last line: where it is looked for after a report of many pages.
     typer.echo(in_one_line(tally, players, chosen.out))
     raise typer.Exit(1 if tally.failed else 0)

@@ -111,7 +111,7 @@ class Declaration(BaseModel):
             f"This study declared {declared} before its first run: over {_counted(plan.seeds)} "
             "every verdict is exploratory. For verdicts that stand, run a new study in another "
             f"directory, on fresh seeds, until it is clear: --first-seed {fresh} --until-clear "
-            f"--out DIRECTORY (in a file: first_seed = {fresh}, until_clear = true, seeds = 200)."
+            "--out DIRECTORY."
         )
 
 

@@ -58,7 +58,7 @@ SMALL = [
         (["study", "run", "quick", "--out", "x", "--shard", "0/2"], "i/n with i from 1 to n"),
         (["study", "run", "quick", "--out", "x", "--engine", "slurm"], "no engine 'slurm'"),
         (["study", "compare", "nowhere", "nowhere", "--fail-if", "R"], "should be [possibly]"),
-        (["list", "robots"], "'robots' is not one of"),
+        (["list", "robots"], "list robots: should be policies, faults, studies"),
         (["study", "plan", "quick", "--policy", "nobody"], "'nobody'"),
         (["study", "report", "nowhere"], "no study in nowhere"),
         (["fly"], "fly"),

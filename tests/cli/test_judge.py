@@ -166,7 +166,7 @@ def test_a_policy_is_played_until_it_is_clear(
     printed = capsys.readouterr().out
     assert Study.stored("clear").specification.until_clear
     # Nobody delivers: there is no ratio, and every question stops at the first look.
-    assert "P at N = 4, no fault: 0 (at most 0.15, as no run delivered anything)." in printed
+    assert "no fault: 0 (at most 0.15, as none of 20 runs delivered anything)." in printed
     assert "undefined: it delivers nothing" in printed
     assert "80 runs played" in printed.splitlines()[-1]
     assert app.run([*given, "all", "--all-seeds"]) == 0

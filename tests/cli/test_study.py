@@ -168,13 +168,11 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     assert "holds the study 'mine'" in capsys.readouterr().err
 
     # What it proposes is a study that can be run, and whose verdicts stand.
-    (proposed,) = re.findall(r"(first_seed = \d+), (seeds = \d+), (until_clear = true)\.", printed)
-    assert proposed == ("first_seed = 4", "seeds = 200", "until_clear = true")
-    file.write_text("\n".join([proposed[0], proposed[2], FILE.replace("seeds = 2", "seeds = 30")]))
-    new = ["study", "run", "mine.toml", "--processes", "1", "--out", "new"]
-    assert app.run(new) == 0
+    (proposed,) = re.findall(r"(--first-seed 4 --until-clear) --out DIRECTORY\.", printed)
+    new = ["study", "run", "mine.toml", "--most", "30", "--processes", "1", "--out", "new"]
+    assert app.run([*new, *proposed.split()]) == 0
     assert "xploratory" not in capsys.readouterr().out
-    assert app.run([*new, "--first-seed", "24"]) == 0
+    assert app.run([*new, "--first-seed", "24", "--until-clear"]) == 0
     printed = capsys.readouterr().out
     assert "declared looks at 20, 30 seeds from 4 on before its first run" in printed
     assert "over 30 seeds (24 to 53) every verdict is exploratory." in printed
@@ -201,7 +199,7 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     )
     broken = ["--policy", "broken_policy:Broken", "--restock", "--out", "broken"]
     assert app.run([*local, *broken]) == 1
-    told = "4 failed, the first with RuntimeError: a wheel came off; "
+    told = "4 failed, the first with RuntimeError: a wheel came off. Each traceback: "
     assert told in capsys.readouterr().out
     assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
 
