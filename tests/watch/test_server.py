@@ -191,8 +191,9 @@ def test_orders_are_obeyed(served: Served) -> None:
         {"do": "toggle", "robot": 3},
         {"do": "widen", "width": 2},
         {"do": "pause"},
+        {"do": "no such order"},  # its refusal tells that the others are done
     ]
-    messages(served, [json.dumps(order) for order in orders], 3)
+    assert "problem" in messages(served, [json.dumps(order) for order in orders], 99)[-1]
     session = served.server.session
     assert session.run.world.state.failure_modes[3] == ("FM1",)
     assert not session.beside.world.state.failed.any()
