@@ -17,7 +17,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
@@ -26,9 +26,6 @@ from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
-
-if TYPE_CHECKING:
-    from rich.progress import Progress
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -194,14 +191,13 @@ def _code_of(source: bytes) -> bytes:
 
 
 class _Report(event.Listener):
-    """Tells a person once that kernels are being compiled and for how long, with a bar."""
+    """Tells a person once that kernels are being compiled and for how long."""
 
     current: _Report | None = None
     is_told = False
     seconds, n_done = 0.0, 0  # of compiling, and kernels that are compiled, in this process
 
     def __enter__(self) -> None:
-        self._bar: Progress | None = None
         self._last = time.monotonic()
         _Report.current = self
         _events.register("numba:compile", self)
@@ -209,8 +205,6 @@ class _Report(event.Listener):
     def __exit__(self, *_: object) -> None:
         _Report.current = None
         _events.unregister("numba:compile", self)
-        if self._bar is not None:
-            self._bar.stop()
 
     def on_start(self, event: Any) -> None:
         """Begin to count the time, as nothing could be loaded."""
@@ -225,20 +219,10 @@ class _Report(event.Listener):
         is_worker = QUIET in os.environ or multiprocessing.parent_process() is not None
         if is_worker or _Report.seconds < _SILENCE or not self.n_done:
             return
-        total = max(len(_all_kernels), self.n_done)
         if not _Report.is_told:
             _Report.is_told = True
-            left = self.seconds / self.n_done * (total - self.n_done)
+            left = self.seconds / self.n_done * max(len(_all_kernels) - self.n_done, 0)
             sys.stderr.write(f"Compiling for this processor, once: about {left:.0f} s.\n")
-        if self._bar is None and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import Progress
-
-            self._bar = Progress(console=Console(stderr=True), transient=True)
-            self._task = self._bar.add_task("Compiling", total=total)
-            self._bar.start()
-        if self._bar is not None:
-            self._bar.update(self._task, completed=self.n_done)
 
 
 @functools.cache

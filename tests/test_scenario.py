@@ -121,12 +121,11 @@ def test_an_episode_has_enough_steps_for_its_duration(
     assert Scenario(duration=duration, control_period=control_period).n_steps == steps
 
 
-def test_the_sheet_lists_every_field_with_its_value_unit_and_source() -> None:
-    sheet = Scenario(n_robots=7, max_speed=1.25).sheet()
-    rows = {line.split(" | ")[0].removeprefix("| "): line for line in sheet.splitlines()}
+def test_conditions_list_every_field_with_its_value_unit_and_source() -> None:
+    rows = {row[0]: row for row in Scenario(n_robots=7, max_speed=1.25).conditions()}
     for name, field in Scenario.model_fields.items():
         meaning = field.description or ""
-        assert meaning in rows[name]
+        assert rows[name][2] == meaning
         # A length, a time and the like has its unit; the source comes last.
         value = field.default
         assert not isinstance(value, float) or "[" in meaning, name
@@ -134,9 +133,9 @@ def test_the_sheet_lists_every_field_with_its_value_unit_and_source() -> None:
         kind, _, sources = origin.partition(": ")
         assert kind in ("source", "fitted", "chosen", "off"), name
         assert set(sources.split(", ")) <= (SOURCES.keys() if kind == "source" else {""}), name
-    assert "| 7 (default 25) |" in rows["n_robots"]
-    assert "| 1.25 (default 2) |" in rows["max_speed"]
-    assert "| 60 |" in rows["n_items"]
+    assert rows["n_robots"][1] == "7 (default 25)"
+    assert rows["max_speed"][1] == "1.25 (default 2)"
+    assert rows["n_items"][1] == "60"
 
 
 def test_presets() -> None:
