@@ -4,7 +4,6 @@ import json
 import math
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,25 +89,11 @@ def test_as_many_as_it_says_fit_do_fit(field: str, count: int) -> None:
         smallest.replace(**{field: 652})
 
 
-@pytest.mark.parametrize(
-    "text", ["{", "", "[]", "7", '{"n_robots": 0}', '{"n_robot": 5}', '{"duration": NaN}']
-)
-def test_json_of_no_scenario_is_refused(text: str) -> None:
-    with pytest.raises(ScenarioError, match="Scenario"):
-        Scenario.from_json(text)
-
-
 def test_a_scenario_cannot_be_changed_in_place() -> None:
     scenario = Scenario()
     with pytest.raises((SwarmLogisticsError, ValueError), match="frozen"):
         scenario.n_robots = 3  # type: ignore[misc]
     assert scenario.n_robots == 25
-
-
-def test_replace_changes_the_named_fields_only() -> None:
-    changed = Scenario(n_items=70).replace(n_robots=40)
-    assert (changed.n_robots, changed.n_items) == (40, 70)
-    assert changed.replace(n_robots=25, n_items=60) == Scenario()
 
 
 @pytest.mark.parametrize(
@@ -149,11 +134,3 @@ def test_presets() -> None:
     assert Scenario.preset("dots") == Scenario(max_speed=1.0, max_acceleration=2.0)
     with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
         Scenario.preset("papr")
-
-
-@pytest.mark.parametrize("name", SCENARIO_PRESETS)
-def test_every_preset_runs(name: str) -> None:
-    world = Warehouse(Scenario.preset(name))
-    world.reset(0)
-    rows = world.step(np.zeros((world.scenario.n_robots, 4)))
-    assert np.isfinite(rows).all()
