@@ -46,7 +46,7 @@ DARK_COLOURS: dict[str, RGB] = {
 }  # fmt: skip
 
 # Curves of runs side by side, and how thick they are [px].
-RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5), ("TIMER", 4.0), ("LINK", 2.0))
+RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5))
 
 # The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.
 MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}

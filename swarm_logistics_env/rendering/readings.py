@@ -14,7 +14,6 @@ from swarm_logistics_env.warehouse.surroundings import Pose, scan_disc, scan_wal
 
 from .palette import MARKS
 
-LEAST_SIZE, LARGEST_SIZE = 100, 8000  # of a picture's longer side [px]
 _MARGIN = 0.025  # a part of the picture's size, on each side
 
 

@@ -25,12 +25,12 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
 from .palette import film_colours
-from .readings import LARGEST_SIZE, LEAST_SIZE
 
 if TYPE_CHECKING:
     import pygame
 
 RenderMode = Literal["rgb_array", "human"]
+LEAST_SIZE, LARGEST_SIZE = 100, 8000  # of a picture's longer side [px]
 
 
 class Renderer:

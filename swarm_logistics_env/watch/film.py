@@ -14,7 +14,6 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering.palette import INK, SURROUNDINGS
 from swarm_logistics_env.rendering.picture import Picture
-from swarm_logistics_env.rendering.readings import LARGEST_SIZE, LEAST_SIZE
 from swarm_logistics_env.rendering.sprites import new_canvas, to_array, words
 
 MOST_TAKES = 4
@@ -65,10 +64,6 @@ class Film:
             raise SetupError(f"until = {until:g} s: should be above 0")
         if not 0.01 <= speed <= 1000.0:
             raise SetupError(f"speed = {speed:g}: should be 0.01 to 1000 times real time")
-        if not 1.0 <= frame_rate <= 60.0:
-            raise SetupError(f"frame rate = {frame_rate:g}: should be 1 to 60 a second")
-        if not LEAST_SIZE <= size <= LARGEST_SIZE:
-            raise SetupError(f"size = {size}: should be {LEAST_SIZE} to {LARGEST_SIZE} [px]")
         self._takes = tuple(takes)
         self._until = min(until, max(take.play.world.scenario.duration for take in takes))
         self._period, self._frame_rate = speed / frame_rate, frame_rate

@@ -78,8 +78,6 @@ def test_ends_when_everything_is_delivered() -> None:
         ({"until": 0.0}, "until = 0 s"),
         ({"until": float("nan")}, "until = nan"),
         ({"speed": 0.0}, "speed = 0"),
-        ({"frame_rate": 100.0}, "frame rate = 100"),
-        ({"size": 20}, "size = 20"),
     ],
 )
 def test_wrong_arguments(changed: dict[str, Any], words: str) -> None:

@@ -157,7 +157,7 @@ function paint() {
   sprites = new Map();
   drawn = null;
   showLegend(element("legend"));
-  fixed.curves.slice(0, 2).forEach(([name], number) => { element(`swatch${number}`).style.background = colours[name]; });
+  fixed.curves.forEach(([name], number) => { element(`swatch${number}`).style.background = colours[name]; });
   showWords();
 }
 
