@@ -27,14 +27,13 @@ def scene(
     faults: tuple[Fault, ...] = (),
     scenario: Scenario = SMALL,
     name: str = "swarm-dt",
-    show_beams_of: int | None = 3,
 ) -> NDArray[np.uint8]:
     """Return a picture of a policy's swarm after some time."""
     world = Warehouse(scenario)
     observations = world.reset(seed=4, faults=faults)
     policy = policies.load(name)
     start(policy, scenario, 4)
-    renderer = Renderer(scenario, "rgb_array", SIZE, trails=True, show_beams_of=show_beams_of)
+    renderer = Renderer(scenario, "rgb_array", SIZE)
     while world.state.time < seconds:
         observations = world.step(decide(policy, observations, world.state))
         picture = renderer.frame(world.state, scenario)
@@ -73,6 +72,6 @@ if __name__ == "__main__":
     MEDIA.mkdir(exist_ok=True)
     save(scene(30.0), "warehouse.png")
     save(scene(60.0, (Fault("FM1", 2), Fault("FM4", [0, 5]))), "faults.png")
-    learned = scene(300.0, scenario=Scenario(restock=True), name="ppo-delivery", show_beams_of=None)
+    learned = scene(300.0, scenario=Scenario(restock=True), name="ppo-delivery")
     save(learned, "stock.png")
     browser_view("watch.png")

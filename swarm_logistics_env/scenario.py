@@ -270,12 +270,6 @@ class Scenario(Record):
             raise ScenarioError(f"no scenario preset {name!r}{suggest(name, SCENARIO_PRESETS)}")
         return SCENARIO_PRESETS[name]
 
-    def sheet(self) -> str:
-        """Return the set-up sheet: one Markdown table of every condition, unit and source."""
-        head = ["| condition | value | unit, meaning; source |", "|---|---|---|"]
-        rows = (f"| {' | '.join(row)} |" for row in self.conditions())
-        return "\n".join([*head, *rows]) + "\n"
-
     def conditions(self) -> list[tuple[str, str, str]]:
         """Return name, value and description (unit, meaning; source) of every condition."""
         rows = []

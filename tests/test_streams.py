@@ -36,10 +36,6 @@ def test_what_is_no_integer_is_no_seed(seed: Any) -> None:
         key(seed, "places")
 
 
-def test_a_seed_of_numpys_kind_is_the_same_seed() -> None:
-    assert key(int(np.int64(5)), "a") == key(np.int64(5), "a")  # type: ignore[arg-type]
-
-
 @given(st.integers(0, 2**63), st.integers(1, 50), st.integers(1, 50))
 def test_a_rows_key_does_not_depend_on_how_many_rows_there_are(seed: int, n: int, m: int) -> None:
     shared = min(n, m)

@@ -10,8 +10,8 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import as_array, checked_seed
-from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.environment.requests import checked_seed, numbers_of
+from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies.policy import mask_unreachable_commands
 from swarm_logistics_env.wrappers import FixedAgents, Wrapper
 
@@ -104,13 +104,8 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             SetupError: there was no reset, or the episode is over.
         """
         state = self.env.warehouse.state
-        commands = np.array(as_array(action, "action"))
-        if commands.shape != self.action_space.shape or commands.dtype.kind not in "fiub":
-            raise CommandError(
-                f"action of shape {commands.shape} and type {commands.dtype}: should be "
-                f"{self.action_space.shape} numbers"
-            )
-        commands = commands.reshape(self._commands_shape)
+        given = numbers_of(action, "action", self.action_space.shape or ())
+        commands = given.reshape(self._commands_shape).copy()
         n_present = np.count_nonzero(state.robot_present)
         commands[: state.n_robots] = mask_unreachable_commands(commands[: state.n_robots], state)
         observations, rewards, terminations, truncations = self._rows.step_arrays(commands)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import as_array
+from swarm_logistics_env.environment.requests import numbers_of
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.logistics import first_not_finite
@@ -163,11 +163,7 @@ class Worlds:
         """
         if not any(self._n_robots):
             raise SetupError("step before reset: call reset() first")
-        given, wanted = as_array(commands, "actions"), self._commands.shape
-        if given.shape != wanted or given.dtype.kind not in "fiub":
-            raise CommandError(
-                f"actions of shape {given.shape} and type {given.dtype}: should be {wanted} numbers"
-            )
+        given = numbers_of(commands, "actions", self._commands.shape)
         self._commands[:] = given
         row = first_not_finite(self._commands.reshape(self.n_rows, -1))
         if row != NOBODY:

@@ -40,6 +40,20 @@ def as_array(given: ArrayLike, name: str) -> NDArray[Any]:
         ) from error
 
 
+def numbers_of(given: ArrayLike, name: str, wanted: tuple[int, ...]) -> NDArray[Any]:
+    """Return `given` as an array of numbers of that shape; see `as_array`.
+
+    Raises:
+        CommandError: it cannot be read, has another shape, or is not of real numbers.
+    """
+    array = as_array(given, name)
+    if array.shape != wanted or array.dtype.kind not in "fiub":
+        raise CommandError(
+            f"{name} of shape {array.shape} and type {array.dtype}: should be {wanted} numbers"
+        )
+    return array
+
+
 def gathered(
     actions: Mapping[str, ArrayLike],
     agents: Sequence[str],

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.steering import clear_the_way, steer
+from swarm_logistics_env.motion.memory import clear_the_way, steer
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids

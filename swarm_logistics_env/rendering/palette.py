@@ -46,10 +46,7 @@ DARK_COLOURS: dict[str, RGB] = {
 }  # fmt: skip
 
 # Curves of runs side by side, and how thick they are [px].
-RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5), ("TIMER", 4.0), ("LINK", 2.0))
-RUNS: tuple[tuple[RGB, float], ...] = tuple(
-    (COLOURS[name], thickness) for name, thickness in RUN_NAMES
-)
+RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5))
 
 # The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.
 MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
@@ -66,7 +63,7 @@ _EDGES = (
 def film_colours() -> list[RGB]:
     """Return the colours of pictures that may have only a few: under 128, each once."""
     smooth = [
-        mixed(one, other, (step + 1) / (steps + 1))
+        _mixed(one, other, (step + 1) / (steps + 1))
         for one, other, steps in _EDGES
         for step in range(steps)
     ]
@@ -78,7 +75,7 @@ def mark(modes: tuple[str, ...]) -> str:
     return "+".join(MARKS.get(mode, mode) for mode in modes)
 
 
-def mixed(colour: RGB, other: RGB, share: float) -> RGB:
+def _mixed(colour: RGB, other: RGB, share: float) -> RGB:
     """Return `colour` with a `share` in [0, 1] of `other`."""
     red, green, blue = (round(a + (b - a) * share) for a, b in zip(colour, other, strict=True))
     return red, green, blue

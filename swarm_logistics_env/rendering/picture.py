@@ -1,9 +1,11 @@
-"""The warehouse as a picture, with its lines over the floor: trails, radio links, sensor beams."""
+"""The warehouse as a picture, and the lines below it that tell what cannot be seen in it."""
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections import Counter
+from collections.abc import Sequence
+from functools import lru_cache
 from operator import attrgetter
 
 import numpy as np
@@ -13,9 +15,8 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
-from .caption import Caption
-from .readings import N_BEAMS, Projection, Trails, activity, followed, ranges
-from .sprites import Point, draw_line, new_canvas, stamp, words
+from .readings import Projection, activity, followed
+from .sprites import Point, badge, blank, draw_line, new_canvas, stamp, words
 
 # What decides the picture's layout.
 _shape = attrgetter(
@@ -28,20 +29,11 @@ class Picture:
     """Draws states of a warehouse; see `Renderer` for the arguments.
 
     Attributes:
-        trails: the robots' paths so far, or None; each state that is noted or drawn is added.
         projection: the place of the warehouse on the picture.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        size: int,
-        show_beams_of: int | None,
-        trails: bool,
-        all_links: bool,
-    ) -> None:
-        self._size, self._show_beams_of, self._all_links = size, show_beams_of, all_links
-        self.trails = Trails() if trails else None
+    def __init__(self, scenario: Scenario, size: int) -> None:
+        self._size = size
         self._lay_out(scenario)
 
     @property
@@ -54,11 +46,6 @@ class Picture:
         """Height of the picture [px], caption included."""
         return self._canvas.get_height()
 
-    def note(self, state: WarehouseState) -> None:
-        """Let trails lead through a state that is not drawn."""
-        if self.trails is not None:
-            self.trails.note(state)
-
     def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
         """Return the picture of `state`, which stays as it is until the next call."""
         if self._shape != _shape(scenario):
@@ -67,21 +54,17 @@ class Picture:
         canvas.blit(self._background, (0, 0))
         robots = projection.points(state.robot_position)
         items = projection.points(state.item_position)
-        # Glow and beams stop at the walls.
+        # Glow stops at the walls.
         canvas.set_clip(self._floor)
-        if self.trails is not None:
-            self.trails.note(state)
-            draw_trails(canvas, projection, self.trails)
         obstacle = sprites.obstacle(self._obstacle_radius)
         stamp(canvas, ((obstacle, at) for at in projection.points(state.obstacle_position)))
         self._draw_halos(state, scenario, robots)
         item = sprites.item(self._item_half, False)
         stored = np.flatnonzero(state.item_status == STORED).tolist()
         stamp(canvas, ((item, items[number]) for number in stored))
-        draw_links(canvas, state, scenario, robots, self._robot_radius, all_links=self._all_links)
-        watched = self._show_beams_of
-        if watched is not None and watched < state.n_robots and state.robot_present[watched]:
-            draw_beams(canvas, state, scenario, robots[watched], watched, projection)
+        carrier = state.carrier
+        if carrier != NOBODY and (leader := followed(state, scenario, carrier)) != NOBODY:
+            _draw_arrow(canvas, robots[carrier], robots[leader], self._robot_radius)
         canvas.set_clip(None)
         self._draw_robots(state, robots)
         self._draw_requested(state, items)
@@ -203,80 +186,8 @@ def _hatched(
     return np.rint(colour).astype(np.uint8)
 
 
-_TRAIL_SHADES = 5
-
-
-def draw_trails(canvas: pygame.Surface, projection: Projection, trails: Trails) -> None:
-    """Draw the paths of the robots; older parts are paler."""
-    past = trails.positions()
-    times, n_robots, _ = past.shape
-    pixels = np.array(projection.points(past.reshape(-1, 2))).reshape(times, n_robots, 2)
-    borders = np.linspace(0, times - 1, _TRAIL_SHADES + 1).round().astype(int).tolist()
-    for shade, (first, last) in enumerate(itertools.pairwise(borders)):
-        colour = palette.mixed(palette.FLOOR, palette.TRAIL, (shade + 1) / _TRAIL_SHADES)
-        for robot in range(n_robots):
-            run = pixels[first : last + 1, robot]
-            if len(run) > 1 and not np.isnan(run).any():
-                pygame.draw.aalines(canvas, colour, False, run.tolist())
-
-
-def draw_links(
-    canvas: pygame.Surface,
-    state: WarehouseState,
-    scenario: Scenario,
-    robots: list[Point],
-    radius: float,
-    *,
-    all_links: bool,
-) -> None:
-    """Draw an arrow from the requested item's carrier to the neighbour it follows.
-
-    Args:
-        robots: the places of the robots on the picture [px].
-        radius: the radius of a robot [px].
-        all_links: whether to draw thin arrows from all other robots as well.
-    """
-    carrier = state.carrier
-    if all_links:
-        for robot in range(state.n_robots):
-            leader = followed(state, scenario, robot)
-            if robot != carrier and leader != NOBODY:
-                _draw_arrow(canvas, robots[robot], robots[leader], radius, 1.0)
-    if carrier != NOBODY:
-        leader = followed(state, scenario, carrier)
-        if leader != NOBODY:
-            _draw_arrow(canvas, robots[carrier], robots[leader], radius, max(2.0, radius / 3.5))
-
-
-def draw_beams(
-    canvas: pygame.Surface,
-    state: WarehouseState,
-    scenario: Scenario,
-    at: Point,
-    robot: int,
-    projection: Projection,
-) -> None:
-    """Draw how far each beam of a robot, which is at `at` [px], reaches, and its view range."""
-    reach = float(state.ranger_range[robot])
-    nearest = ranges(state, scenario, robot).min(axis=0)
-    dot = sprites.dot(max(2.0, projection.length(scenario.robot_radius) / 4.0), palette.BEAM)
-    hits = []
-    for beam, distance in enumerate(nearest.tolist()):
-        angle = float(state.robot_heading[robot]) + 2.0 * math.pi * beam / N_BEAMS
-        far = projection.length(distance)
-        end = (at[0] + far * math.cos(angle), at[1] - far * math.sin(angle))
-        draw_line(canvas, palette.BEAM, at, end, 1.0)
-        if distance < reach:
-            hits.append((dot, end))
-    stamp(canvas, hits)
-    view = projection.length(float(state.view_range[robot]))
-    if view > 0.0:
-        stamp(canvas, [(sprites.circle(view, 1.5, palette.BEAM), at)])
-
-
-def _draw_arrow(
-    canvas: pygame.Surface, start: Point, end: Point, radius: float, width: float
-) -> None:
+def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float) -> None:
+    width = max(2.0, radius / 3.5)
     length = math.hypot(end[0] - start[0], end[1] - start[1])
     head = 4.0 + 2.5 * width
     # The tip stops short of the robot; robots that touch leave no room for an arrow.
@@ -289,3 +200,139 @@ def _draw_arrow(
     draw_line(canvas, palette.LINK, start, base, width)
     step = sprites.heading_step(math.atan2(-y_part, x_part))
     stamp(canvas, [(sprites.arrowhead(head, step, palette.LINK), tip)])
+
+
+# The widest texts there may be, so that a picture's size does not change with what happens.
+_WIDEST = ("time 0000.0 s", "N = 000", "P = 000 of 000", "requested: item 000")
+_MOST_LEGEND_LINES = 2
+
+
+class Caption:
+    """Writes what cannot be seen in the warehouse itself.
+
+    Args:
+        left, top: its upper left corner [px].
+        width: the longest line that fits [px].
+        text_height: the height of letters [px].
+    """
+
+    def __init__(self, left: int, top: int, width: int, text_height: int) -> None:
+        self._left, self._top = left, top
+        self._width, self._text_height = width, text_height
+        self._line = round(1.35 * text_height)
+        self._places = self._flow([self._words(text) for text in _WIDEST])
+        self._legend = _legend(text_height)
+        self._legend_places = self._flow(self._legend)
+        self._failures_line = self._places[-1][1] + 1
+        self._legend_line = self._failures_line + 1
+        lines = self._legend_line
+        legend_lines = self._legend_places[-1][1] + 1
+        if legend_lines <= _MOST_LEGEND_LINES:
+            lines += legend_lines
+        else:
+            self._legend = ()
+        self.height = lines * self._line
+
+    @staticmethod
+    def least_width(text_height: int) -> int:
+        """Return the width [px] below which words would be cut."""
+        return max(words(text, text_height, palette.INK).get_width() for text in _WIDEST)
+
+    def draw_legend(self, canvas: pygame.Surface) -> None:
+        """Draw what the colours mean, which never changes, where there is room for it."""
+        for entry, (x, line) in zip(self._legend, self._legend_places):
+            self._put(canvas, entry, x, self._legend_line + line)
+
+    def draw(self, canvas: pygame.Surface, state: WarehouseState, scenario: Scenario) -> None:
+        """Write the scores and the failures of `state`."""
+        for text, (x, line) in zip(_scores(state, scenario), self._places, strict=True):
+            self._put(canvas, self._words(text), x, line)
+        self._draw_failures(canvas, state)
+
+    def _draw_failures(self, canvas: pygame.Surface, state: WarehouseState) -> None:
+        failed = int(state.failed.sum())
+        chips = [self._words(f"failed: {failed}" if failed else "no failures")]
+        counts = Counter(mode for modes in state.failure_modes for mode in modes)
+        chips += [_failure(mode, count, self._text_height) for mode, count in counts.items()]
+        more, gap = self._words("…"), self._text_height // 2
+        x = 0
+        for place, chip in enumerate(chips):
+            room = 0 if place == len(chips) - 1 else gap + more.get_width()
+            if x + chip.get_width() + room > self._width:
+                self._put(canvas, more, x, self._failures_line)
+                return
+            self._put(canvas, chip, x, self._failures_line)
+            x += chip.get_width() + gap
+
+    def _put(self, canvas: pygame.Surface, chip: pygame.Surface, x: int, line: int) -> None:
+        middle = self._top + line * self._line + self._text_height // 2
+        canvas.blit(chip, (self._left + x, middle - chip.get_height() // 2))
+
+    def _flow(self, chips: Sequence[pygame.Surface]) -> list[tuple[int, int]]:
+        """Return where these go: x [px] and number of the line."""
+        places, x, line = [], 0, 0
+        for width in [chip.get_width() for chip in chips]:
+            if x and x + width > self._width:
+                x, line = 0, line + 1
+            places.append((x, line))
+            x += width + self._text_height
+        return places
+
+    def _words(self, text: str) -> pygame.Surface:
+        return words(text, self._text_height, palette.INK)
+
+
+@lru_cache(maxsize=128)
+def _failure(mode: str, count: int, text_height: int) -> pygame.Surface:
+    name = words(f"{mode} ×{count}", text_height, palette.INK)
+    if mode not in palette.MARKS:
+        return name
+    return _row(
+        [(badge(palette.MARKS[mode], round(0.7 * text_height)),), (name,)], text_height // 5
+    )
+
+
+def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
+    radius = 0.42 * text_height
+    load, asked_for = sprites.item(0.45 * radius, False), sprites.item(0.5 * radius, True)
+    entries: list[pygame.Surface] = []
+    for name, pictures in {
+        "searching": (sprites.robot(radius, palette.SEARCHING, 0, False),),
+        "shuffling": (sprites.robot(radius, palette.SHUFFLING, 0, False), load),
+        "delivering": (sprites.robot(radius, palette.DELIVERING, 0, False), asked_for),
+        "requested item": (sprites.item(0.9 * radius, True),),
+        "timer": (
+            sprites.halo(0.6 * radius, 0),
+            sprites.robot(0.6 * radius, palette.SEARCHING, 0, False),
+        ),
+    }.items():
+        entries.append(_row([pictures, (words(name, text_height, palette.INK),)], text_height // 4))
+    return tuple(entries)
+
+
+def _row(stacks: Sequence[tuple[pygame.Surface, ...]], gap: int) -> pygame.Surface:
+    """Return stacks of pictures side by side, each centred on the one it lies on."""
+    width = sum(stack[0].get_width() for stack in stacks) + gap * (len(stacks) - 1)
+    height = max(stack[0].get_height() for stack in stacks)
+    row = blank(width, height)
+    x = 0
+    for stack in stacks:
+        middle = (x + stack[0].get_width() // 2, height // 2)
+        for picture in stack:
+            row.blit(picture, picture.get_rect(center=middle))
+        x += stack[0].get_width() + gap
+    return row
+
+
+def _scores(state: WarehouseState, scenario: Scenario) -> tuple[str, ...]:
+    if state.requested == NOBODY:
+        requested = "all delivered"
+    else:
+        requested = f"requested: item {state.requested}"
+    total = "" if scenario.restock else f" of {scenario.n_items}"
+    return (
+        f"time {state.time:.1f} s",
+        f"N = {state.n_robots}",
+        f"P = {state.delivered}{total}",
+        requested,
+    )

@@ -1,10 +1,8 @@
-"""What a picture tells of a world: places, beams, who follows whom, trails, curves."""
+"""What a picture tells of a world: places, beams, who follows whom, events."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +14,6 @@ from swarm_logistics_env.warehouse.surroundings import Pose, scan_disc, scan_wal
 
 from .palette import MARKS
 
-LEAST_SIZE, LARGEST_SIZE = 100, 8000  # of a picture's longer side [px]
 _MARGIN = 0.025  # a part of the picture's size, on each side
 
 
@@ -125,48 +122,6 @@ def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
         return NOBODY
     order = np.lexsort((square[candidates], state.robot_told[candidates]))
     return int(candidates[order[0]])
-
-
-TRAIL_SECONDS = 2.5
-
-
-class Trails:
-    """Remembers the robots' positions over the last `TRAIL_SECONDS` of one episode."""
-
-    def __init__(self) -> None:
-        self._past: deque[tuple[float, NDArray[np.float64]]] = deque()
-
-    def note(self, state: WarehouseState) -> None:
-        """Remember where robots are; a time or a swarm that doesn't continue starts afresh."""
-        past = self._past
-        if past and (state.time < past[-1][0] or state.n_robots != len(past[-1][1])):
-            past.clear()
-        if not past or state.time > past[-1][0]:
-            present = state.robot_present[:, np.newaxis]
-            past.append((state.time, np.where(present, state.robot_position, np.nan)))
-        while past[0][0] < state.time - TRAIL_SECONDS - 1e-9:
-            past.popleft()
-
-    def positions(self) -> NDArray[np.float64]:
-        """Return what is remembered, oldest first: (T, N, 2) [m], NaN where a robot was absent."""
-        return np.array([positions for _, positions in self._past])
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Deliveries of one run.
-
-    Attributes:
-        name: the name of the run.
-        times: the times of its deliveries [s], ascending.
-        until: the time that the run has reached [s].
-        style: an index of `palette.RUNS`; runs differ by thickness and lightness as well.
-    """
-
-    name: str
-    times: Sequence[float]
-    until: float
-    style: int
 
 
 @dataclass(frozen=True)

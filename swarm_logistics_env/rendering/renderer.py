@@ -6,7 +6,6 @@ pygame is loaded by the first Renderer; imageio-ffmpeg brings the ffmpeg for fil
 from __future__ import annotations
 
 import contextlib
-import functools
 import importlib
 import itertools
 import os
@@ -26,29 +25,25 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
 from .palette import film_colours
-from .readings import LARGEST_SIZE, LEAST_SIZE
 
 if TYPE_CHECKING:
     import pygame
 
 RenderMode = Literal["rgb_array", "human"]
+LEAST_SIZE, LARGEST_SIZE = 100, 8000  # of a picture's longer side [px]
 
 
 class Renderer:
     """Draws states of a warehouse.
 
-    A frame depends on the state and the arguments alone; with `trails` also on the states before
-    it. A renderer can be pickled and copied; a copy opens a window of its own.
+    A frame depends on the state and the arguments alone. A renderer can be pickled and copied; a
+    copy opens a window of its own.
 
     Args:
         scenario: the conditions; another one may come with each frame, and the picture's size
             changes only with the shape of the warehouse.
         mode: "rgb_array" needs no display; "human" opens a window with the first `show`.
         size: longer side of the warehouse, margins included [px]; the caption comes below it.
-        show_beams_of: a robot whose sensor beams and view range are drawn.
-        trails: whether robots leave their paths of the last 2.5 seconds.
-        all_links: whether every robot is linked to the neighbour with the lowest timer it hears,
-            rather than only the one that carries the requested item.
 
     Raises:
         SetupError: pygame is not installed, or an argument is not allowed.
@@ -67,29 +62,17 @@ class Renderer:
         scenario: Scenario,
         mode: RenderMode,
         size: int = 800,
-        *,
-        show_beams_of: int | None = None,
-        trails: bool = False,
-        all_links: bool = False,
     ) -> None:
         if mode not in get_args(RenderMode):
             raise SetupError(f"mode = {mode!r}: should be one of {list(get_args(RenderMode))}")
         if not LEAST_SIZE <= size <= LARGEST_SIZE:
             raise SetupError(f"size = {size}: should be {LEAST_SIZE} to {LARGEST_SIZE} [px]")
-        if show_beams_of is not None and not 0 <= show_beams_of < scenario.n_robots:
-            raise SetupError(
-                f"show_beams_of = {show_beams_of}: should be None or a robot, "
-                f"0 to {scenario.n_robots - 1}"
-            )
         load_pygame()
         from .picture import Picture
 
         self.mode = mode
-        self._make_copy = functools.partial(
-            Renderer, scenario, mode, size,
-            show_beams_of=show_beams_of, trails=trails, all_links=all_links,
-        )  # fmt: skip
-        self._picture = Picture(scenario, size, show_beams_of, trails, all_links)
+        self._arguments = scenario, mode, size
+        self._picture = Picture(scenario, size)
         self._window: _Window | None = None
         self._was_closed_by_user = False
 
@@ -124,7 +107,7 @@ class Renderer:
             self._window = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return self._make_copy, ()
+        return Renderer, self._arguments
 
 
 def load_pygame() -> None:

@@ -220,20 +220,6 @@ def obstacle(radius: float) -> NDArray[np.uint8]:
 
 
 @_sprite
-def circle(radius: float, width: float, colour: palette.RGB) -> NDArray[np.uint8]:
-    """Return a thin circle; all lengths in pixels."""
-    x, y = pixels(radius + width)
-    return painted((ring(x, y, radius, width), colour, 1.0))
-
-
-@_sprite
-def dot(radius: float, colour: palette.RGB) -> NDArray[np.uint8]:
-    """Return a plain disc of that radius [px]."""
-    x, y = pixels(radius)
-    return painted((disc(x, y, radius), colour, 1.0))
-
-
-@_sprite
 def arrowhead(length: float, heading: int, colour: palette.RGB) -> NDArray[np.uint8]:
     """Return a triangle of that length [px] with its tip in the middle of the picture."""
     x, y = pixels(1.2 * length)

@@ -1,4 +1,4 @@
-"""Films of runs, side by side on one clock, with their deliveries below."""
+"""Films of runs, side by side on one clock."""
 
 from __future__ import annotations
 
@@ -12,16 +12,12 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering.caption import draw_strip
 from swarm_logistics_env.rendering.palette import INK, SURROUNDINGS
 from swarm_logistics_env.rendering.picture import Picture
-from swarm_logistics_env.rendering.readings import LARGEST_SIZE, LEAST_SIZE, Curve, Event
 from swarm_logistics_env.rendering.sprites import new_canvas, to_array, words
-from swarm_logistics_env.warehouse.faults import failed_robots
 
 MOST_TAKES = 4
 LAST_FRAME = 2.0  # [s] it stays so long, so that a looping film can be read
-_STRIP_HEIGHT = 0.3  # a part of a picture's longer side
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,6 @@ class Film:
         speed: how many times real time it plays.
         frame_rate: the number of frames per second of film [1/s].
         size: the longer side of each warehouse [px].
-        trails, all_links: as in `Renderer`.
 
     Attributes:
         n_frames: the number of frames, if the runs last until the end.
@@ -62,9 +57,6 @@ class Film:
         speed: float,
         frame_rate: float = 25.0,
         size: int = 480,
-        *,
-        trails: bool = False,
-        all_links: bool = False,
     ) -> None:
         if not 1 <= len(takes) <= MOST_TAKES:
             raise SetupError(f"{len(takes)} runs: should be 1 to {MOST_TAKES} side by side")
@@ -72,22 +64,14 @@ class Film:
             raise SetupError(f"until = {until:g} s: should be above 0")
         if not 0.01 <= speed <= 1000.0:
             raise SetupError(f"speed = {speed:g}: should be 0.01 to 1000 times real time")
-        if not 1.0 <= frame_rate <= 60.0:
-            raise SetupError(f"frame rate = {frame_rate:g}: should be 1 to 60 a second")
-        if not LEAST_SIZE <= size <= LARGEST_SIZE:
-            raise SetupError(f"size = {size}: should be {LEAST_SIZE} to {LARGEST_SIZE} [px]")
         self._takes = tuple(takes)
         self._until = min(until, max(take.play.world.scenario.duration for take in takes))
         self._period, self._frame_rate = speed / frame_rate, frame_rate
-        self._pictures = [
-            Picture(take.play.world.scenario, size, None, trails, all_links) for take in takes
-        ]
+        self._pictures = [Picture(take.play.world.scenario, size) for take in takes]
         self._text_height = max(13, round(size / 26))
         self._head = 2 * self._text_height
         self._tall = max(picture.height for picture in self._pictures)
-        self._strip = 2 * round(_STRIP_HEIGHT * size / 2)
         self._width = sum(picture.width for picture in self._pictures)
-        self._events = _events(self._takes, self._until)
         self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
@@ -101,11 +85,9 @@ class Film:
         while time < self._until and not all(take.play.is_over for take in self._takes):
             count += 1
             time = min(count * self._period, self._until)
-            for take, picture in zip(self._takes, self._pictures, strict=True):
-                world = take.play.world
-                while not take.play.is_over and world.state.time < time - 5e-7:
+            for take in self._takes:
+                while not take.play.is_over and take.play.world.state.time < time - 5e-7:
                     take.play.step()
-                    picture.note(world.state)
             frame = self._draw()
             yield frame
         for _ in range(self._n_last):
@@ -116,7 +98,7 @@ class Film:
         return round(LAST_FRAME * self._frame_rate)
 
     def _draw(self) -> NDArray[np.uint8]:
-        canvas = new_canvas(self._width, self._head + self._tall + self._strip)
+        canvas = new_canvas(self._width, self._head + self._tall)
         canvas.fill(SURROUNDINGS)
         x = 0
         for take, picture in zip(self._takes, self._pictures, strict=True):
@@ -126,26 +108,4 @@ class Film:
             canvas.blit(name, place.clamp(pygame.Rect(x, 0, picture.width, self._head)))
             canvas.blit(picture.draw(world.state, world.scenario), (x, self._head))
             x += picture.width
-        curves = [
-            Curve(take.name, take.play.world.state.delivery_times, take.play.world.state.time, nth)
-            for nth, take in enumerate(self._takes)
-        ]
-        strip = draw_strip(
-            (self._width, self._strip), curves, self._events, self._until, self._text_height
-        )
-        canvas.blit(strip, (0, self._head + self._tall))
         return to_array(canvas)
-
-
-def _events(takes: Sequence[Take], until: float) -> list[Event]:
-    """Return when robots of any of the runs fail, after the start."""
-    events = {
-        (fault.onset, robot, fault.mode)
-        for take in takes
-        for fault in take.play.world.faults
-        if 0.0 < fault.onset < until
-        for robot in failed_robots(
-            fault, take.play.seed, take.play.world.scenario.n_robots
-        ).tolist()
-    }
-    return [Event(*event) for event in sorted(events)]

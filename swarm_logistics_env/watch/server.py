@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError
 from swarm_logistics_env.watch.messages import Recording, changes, encode, fixed_data, frame, obey
-from swarm_logistics_env.watch.replicas import Replicas
 from swarm_logistics_env.watch.session import Session
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ class WatchServer:
         self._web = web
         self.session, self.port, self.host = session, port, host
         self.token = token or secrets.token_urlsafe(18)
-        self.recording, self.replicas = Recording(session), Replicas()
+        self.recording = Recording(session)
         self.address = ""
         self._pages: dict[web.WebSocketResponse, dict[str, Any]] = {}
 
@@ -134,17 +133,13 @@ class WatchServer:
                 now = time.monotonic()
                 elapsed, before = now - before, now
                 if self._pages:
-                    self.replicas.ask(self.session)
                     self.session.play(elapsed, _FRAME_PERIOD, self.recording.note)
                     await self._tell()
-                else:
-                    self.replicas.ask(None)
         finally:
-            self.replicas.ask(None)
             await self._runner.cleanup()
 
     async def _tell(self) -> None:
-        now = {**frame(self.session), "indicators": self.replicas.results()}
+        now = frame(self.session)
         for page, known in list(self._pages.items()):
             message = changes(known, now)
             if message:

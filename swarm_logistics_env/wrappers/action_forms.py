@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete
@@ -13,18 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from swarm_logistics_env import motion
 from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import as_array
+from swarm_logistics_env.environment.requests import as_array, numbers_of
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
 from swarm_logistics_env.streams import row_keys
 
 from .wrapper import Wrapper
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
-
-    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
 class MotionFrame(Wrapper):
@@ -163,12 +157,7 @@ class DiscreteActions(Wrapper):
             CommandError: no whole numbers from 0 to 12, one for each robot.
             SetupError: there was no reset.
         """
-        given, n_robots = as_array(commands, "actions"), self.n_rows
-        if given.shape != (n_robots,) or given.dtype.kind not in "fiu":
-            raise CommandError(
-                f"actions of shape {given.shape} and type {given.dtype}: should be ({n_robots},) "
-                "whole numbers"
-            )
+        given = numbers_of(commands, "actions", (self.n_rows,))
         is_action = np.isin(given, np.arange(len(ACTIONS)))
         if not is_action.all():
             robot = int(np.argmin(is_action))

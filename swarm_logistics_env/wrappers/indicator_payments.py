@@ -139,7 +139,7 @@ class Payment:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Ratio:
     """An indicator as one ratio, scale (P - P_against) / P_o + offset; P is the tested episode's.
 
     `against` is the condition of P_o itself, but for FT, where it is that of P_S.
@@ -161,7 +161,7 @@ class EpisodeIndicator(Payment):
     performances: Mapping[str, tuple[Condition, float]] = field(default_factory=dict)
 
 
-def comparison(name: str, tested: Condition, own: Scenario) -> Comparison | None:
+def comparison(name: str, tested: Condition, own: Scenario) -> Ratio | None:
     """Return what the indicator compares episodes of `tested` with; None: it does not test them.
 
     Everything that the indicator does not vary is the same in its references.
@@ -176,7 +176,7 @@ def comparison(name: str, tested: Condition, own: Scenario) -> Comparison | None
     n, m = tested.n_robots, tested.n_failed
     unbroken = dataclasses.replace(tested, modes=(), n_failed=0)
     if name == "R" and m:
-        return Comparison(1.0, m / n, unbroken, unbroken)
+        return Ratio(1.0, m / n, unbroken, unbroken)
     if name == "FT" and m:
         n_removed = tested.n_removed + m
         if n_removed >= n:
@@ -185,7 +185,7 @@ def comparison(name: str, tested: Condition, own: Scenario) -> Comparison | None
                 "P_S (m < N)"
             )
         removed = dataclasses.replace(unbroken, n_removed=n_removed)
-        return Comparison(1.0, 0.0, unbroken, removed)
+        return Ratio(1.0, 0.0, unbroken, removed)
     if name == "S" and n != own.n_robots:
         if n < own.n_robots:
             raise SetupError(
@@ -193,10 +193,10 @@ def comparison(name: str, tested: Condition, own: Scenario) -> Comparison | None
                 "environment's own n_robots"
             )
         smaller = dataclasses.replace(tested, n_robots=own.n_robots)
-        return Comparison(own.n_robots / (n - own.n_robots), 0.0, smaller, smaller)
+        return Ratio(own.n_robots / (n - own.n_robots), 0.0, smaller, smaller)
     if name == "A" and tested.changes:
         original = dataclasses.replace(tested, changes=())
-        return Comparison(1.0 / _relative_change(tested.changes, own), 1.0, original, original)
+        return Ratio(1.0 / _relative_change(tested.changes, own), 1.0, original, original)
     return None
 
 
@@ -243,7 +243,7 @@ def derivative_of(name: str, condition: Condition, own: Scenario, means: Running
 
 
 def _derivative(
-    compared: Comparison, condition: Condition, p_tested: float, means: RunningMeans
+    compared: Ratio, condition: Condition, p_tested: float, means: RunningMeans
 ) -> float:
     p_o = means.divisor(compared.reference)
     if condition != compared.reference:

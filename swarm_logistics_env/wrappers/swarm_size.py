@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.dict_view import ArrayStep, Infos, agent_names
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import as_array, faults_among, scenario_fields
-from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.environment.requests import faults_among, numbers_of, scenario_fields
+from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
@@ -73,10 +73,8 @@ class FixedAgents(Wrapper):
             CommandError: wrong shape, not readable or not finite; nothing has happened then.
             SetupError: there was no reset, or the episode is over.
         """
-        given = as_array(commands, "commands")
-        wanted = (self.n_rows, *self.action_space("robot_0").shape)
-        if given.shape != wanted:
-            raise CommandError(f"commands of shape {given.shape}: should be {wanted}")
+        wanted = (self.n_rows, *(self.action_space("robot_0").shape or ()))
+        given = numbers_of(commands, "commands", wanted)
         observations, rewards, _, truncations = super().step_arrays(
             given[: self.warehouse.state.n_robots]
         )

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env import Fault
-from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.wrappers import (
     FaultInjection,
@@ -81,16 +79,3 @@ def test_those_that_are_written_into_share_nothing(make: Callable[[], Any]) -> N
         actions = {agent: np.zeros(4) for agent in first.agents}
         answers = [env.step(actions)[-1] for env in (first, second)]
         assert not any("mine" in info for infos in answers for info in infos.values())
-
-
-def test_one_controller_is_told_the_same_of_all_robots() -> None:
-    faults = [Fault("FM2", (1,), onset=0.2), Fault("removed", (0,), onset=0.3)]
-    env = CentralEnv(n_robots=2, max_robots=3, faults=faults)
-    _, info = env.reset(seed=0)
-    failed = []
-    for _ in range(4):
-        assert info.keys() == {"failed", "delivered"}
-        failed.append(info["failed"].tolist())
-        info["failed"][:] = 5
-        info = env.step(np.zeros((3, 4)))[-1]
-    assert failed == [[0, 0, 0], [0, 0, 0], [0, 1, 0], [1, 1, 0]]

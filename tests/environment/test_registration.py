@@ -11,7 +11,6 @@ import numpy as np
 import pettingzoo
 import pytest
 
-import swarm_logistics_env
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 
@@ -80,9 +79,3 @@ def test_pettingzoo_makes_both_forms_by_name() -> None:
     aec = pettingzoo.make("aec", "swarm_logistics_v0", n_robots=3)
     assert isinstance(aec, pettingzoo.AECEnv)
     assert aec.possible_agents == ["robot_0", "robot_1", "robot_2"]
-
-
-def test_registering_twice_is_harmless() -> None:
-    before = gymnasium.registry[swarm_logistics_env.GYMNASIUM_ID]
-    swarm_logistics_env._register()
-    assert gymnasium.registry[swarm_logistics_env.GYMNASIUM_ID] is before

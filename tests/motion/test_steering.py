@@ -7,7 +7,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.steering import steer
+from swarm_logistics_env.motion.memory import steer
 
 
 @pytest.mark.parametrize("direction", [0.0, 0.3, 1.5, -0.6, 3.0, -2.0])

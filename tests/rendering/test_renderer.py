@@ -16,7 +16,6 @@ from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import (
-    BEAM,
     DELIVERING,
     LINK,
     MARKS,
@@ -43,10 +42,9 @@ def dummy_display(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     pygame.display.quit()
 
 
-def frame(situation: Situation, size: int = 400, **options: bool | int) -> Frame:
+def frame(situation: Situation, size: int = 400) -> Frame:
     state, scenario = situation
-    renderer = Renderer(scenario, "rgb_array", size, **options)  # type: ignore[arg-type]
-    return renderer.frame(state, scenario)
+    return Renderer(scenario, "rgb_array", size).frame(state, scenario)
 
 
 def count(picture: Frame, colour: RGB) -> int:
@@ -66,9 +64,9 @@ def give(state: WarehouseState, robot: int, item: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("width", "height", "expected"), [(10, 10, 800), (5, 10, 420), (20, 10, 800), (10, 20, 420)]
+    ("width", "height", "expected", "n_robots"),
+    [(10, 10, 800, 1), (5, 10, 420, 5), (20, 10, 800, 100), (10, 20, 420, 5)],
 )
-@pytest.mark.parametrize("n_robots", [1, 5, 100])
 def test_frame_is_an_rgb_array_as_large_as_asked_for(
     width: float, height: float, expected: int, n_robots: int
 ) -> None:
@@ -94,8 +92,7 @@ def digest() -> str:
     """Return what all frames of a run hash to."""
     world = Warehouse(Scenario(n_robots=12, n_items=20, n_obstacles=2))
     world.reset(3, [Fault("FM1", 2), Fault("dead", 1)])
-    options = {"show_beams_of": 0, "trails": True, "all_links": True}
-    renderer = Renderer(world.scenario, "rgb_array", 400, **options)  # type: ignore[arg-type]
+    renderer = Renderer(world.scenario, "rgb_array", 400)
     found = hashlib.sha256()
     for _ in range(15):
         world.step(np.tile([1.0, 0.0, 0.3, 1.0], (12, 1)))
@@ -120,9 +117,11 @@ def test_frame_depends_on_the_state_alone(situation: Callable[..., Situation]) -
     import pygame
 
     state, scenario = situation([[2, 2], [4, 4]], [[6, 6]])
-    renderer = Renderer(scenario, "rgb_array", 400, show_beams_of=0)
+    renderer = Renderer(scenario, "rgb_array", 400)
     pygame.display.quit()
+    untouched = pickle.dumps(state)
     before = renderer.frame(state, scenario)
+    assert pickle.dumps(state) == untouched
     assert not pygame.display.get_init()
     kept = before.copy()
     for twin in (pickle.loads(pickle.dumps(renderer)), copy.deepcopy(renderer)):
@@ -137,15 +136,6 @@ def test_frame_depends_on_the_state_alone(situation: Callable[..., Situation]) -
     renderer.close()
     state.time = 271.8  # words that were not written before
     assert not np.array_equal(renderer.frame(state, scenario), before)
-
-
-def test_drawing_changes_nothing() -> None:
-    world = Warehouse(Scenario(n_robots=5))
-    world.reset(0, [Fault("FM3", 1)])
-    before = pickle.dumps(world.state)
-    renderer = Renderer(world.scenario, "rgb_array", 300, show_beams_of=1, trails=True)
-    renderer.frame(world.state, world.scenario)
-    assert pickle.dumps(world.state) == before
 
 
 def test_requested_item_is_plain_to_see(situation: Callable[..., Situation]) -> None:
@@ -231,41 +221,21 @@ def test_every_failure_mode_has_a_mark_of_its_own(situation: Callable[..., Situa
         assert not changed[260:, :140].any()  # the healthy one looks as before
     assert len({np.rint(picture).tobytes() for picture in pictures}) == len(MARKS) + 2
     state.robot_present[:] = False
-    floor = arena(frame((state, scenario), show_beams_of=1), scenario)
-    assert count(floor, SEARCHING) == count(floor, BEAM) == 0
+    assert count(arena(frame((state, scenario)), scenario), SEARCHING) == 0
 
 
 def test_link_of_the_carrier(situation: Callable[..., Situation]) -> None:
     state, scenario = situation([[2, 2], [4, 4], [5, 2]], [[7, 7]])
     state.robot_told[:] = [np.nan, 3.0, 1.0]
 
-    def linked(**options: bool) -> int:
-        return count(arena(frame((state, scenario), **options), scenario), LINK)
+    def linked() -> int:
+        return count(arena(frame((state, scenario)), scenario), LINK)
 
     assert linked() == 0
-    assert linked(all_links=True) > 10
     give(state, 0, 0)
     assert linked() > 100
     state.hears[0] = False
     assert linked() == 0
-
-
-def test_beams_and_trails_are_drawn_when_asked_for() -> None:
-    world = Warehouse(Scenario(n_robots=4))
-    world.reset(0)
-    plain = Renderer(world.scenario, "rgb_array", 400)
-    beams = Renderer(world.scenario, "rgb_array", 400, show_beams_of=2)
-    trails = Renderer(world.scenario, "rgb_array", 400, trails=True)
-    for _ in range(5):
-        expected = plain.frame(world.state, world.scenario)
-        trailing = trails.frame(world.state, world.scenario)
-        world.step(np.tile([1.0, 0.0, 0.0, 0.0], (4, 1)))
-    assert not np.array_equal(trailing, expected)
-    assert count(arena(beams.frame(world.state, world.scenario), world.scenario), BEAM) > 100
-    # An episode that begins anew has no trail yet.
-    world.reset(0)
-    again = trails.frame(world.state, world.scenario)
-    assert np.array_equal(again, plain.frame(world.state, world.scenario))
 
 
 @pytest.mark.usefixtures("dummy_display")
@@ -306,18 +276,16 @@ def test_no_display_is_a_typed_error(
 
 
 @pytest.mark.parametrize(
-    ("mode", "size", "beams", "message"),
+    ("mode", "size", "message"),
     [
-        ("ansi", 800, None, r"mode = 'ansi': should be one of \['rgb_array', 'human'\]"),
-        ("rgb_array", 3, None, r"size = 3: should be 100 to 8000 \[px\]"),
-        ("rgb_array", 9000, None, "size = 9000"),
-        ("rgb_array", 800, 5, "show_beams_of = 5: should be None or a robot, 0 to 4"),
-        ("rgb_array", 800, -1, "show_beams_of = -1"),
+        ("ansi", 800, r"mode = 'ansi': should be one of \['rgb_array', 'human'\]"),
+        ("rgb_array", 3, r"size = 3: should be 100 to 8000 \[px\]"),
+        ("rgb_array", 9000, "size = 9000"),
     ],
 )
-def test_wrong_arguments(mode: str, size: int, beams: int | None, message: str) -> None:
+def test_wrong_arguments(mode: str, size: int, message: str) -> None:
     with pytest.raises(SetupError, match=message):
-        Renderer(Scenario(n_robots=5), mode, size, show_beams_of=beams)  # type: ignore[arg-type]
+        Renderer(Scenario(n_robots=5), mode, size)  # type: ignore[arg-type]
 
 
 def test_missing_pygame_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

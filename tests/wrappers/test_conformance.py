@@ -39,23 +39,20 @@ def test_a_step_after_the_end_is_refused(make: Make, stack: str) -> None:
         env.step_arrays(np.zeros((env.n_rows, *env.action_space("robot_0").shape)))
 
 
-@each_size
 @each_stack
-def test_aec_api(conformance: ModuleType, make: Make, stack: str, n_robots: int) -> None:
-    env = parallel_to_aec(make(stack, n_robots, duration=2.0))
+def test_aec_api(conformance: ModuleType, make: Make, stack: str) -> None:
+    env = parallel_to_aec(make(stack, duration=2.0))
     conformance.api_test(env, num_cycles=25)
 
 
-@each_size
 @each_stack
-def test_seeds(conformance: ModuleType, make: Make, stack: str, n_robots: int) -> None:
-    conformance.parallel_seed_test(lambda: make(stack, n_robots), num_cycles=20)
+def test_seeds(conformance: ModuleType, make: Make, stack: str) -> None:
+    conformance.parallel_seed_test(lambda: make(stack), num_cycles=20)
 
 
-@each_size
 @each_stack
-def test_state(conformance: ModuleType, make: Make, stack: str, n_robots: int) -> None:
-    env = make(stack, n_robots)
+def test_state(conformance: ModuleType, make: Make, stack: str) -> None:
+    env = make(stack)
     conformance.state_test(parallel_to_aec(env), env, num_cycles=20)
 
 

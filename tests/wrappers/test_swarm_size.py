@@ -139,7 +139,7 @@ def test_rows_are_those_of_the_wrapped_environment_and_zeros() -> None:
             assert env.agents == env.possible_agents
             commands = rng.uniform(-1, 1, (6, 4))
             actions = dict(zip(env.agents, commands))
-            with pytest.raises(CommandError, match=r"of shape \(1, 4\): should be \(6, 4\)"):
+            with pytest.raises(CommandError, match=r"of shape \(1, 4\) .*: should be \(6, 4\)"):
                 env.step_arrays(np.zeros((1, 4)))
             observations, paid, ended, cut, infos = env.step(actions)
             rows, rewards, _, _ = inner.step_arrays(commands[:n])

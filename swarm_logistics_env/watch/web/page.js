@@ -144,10 +144,6 @@ function showWords() {
   element("meaning").textContent = fixed.modes.find(({ name }) => name === latest.mode).meaning;
   element("robot").textContent = selected ? `Robot ${selected.robot}` : "Tap a robot";
   for (const id of ["break", "repair"]) element(id).disabled = !selected;
-  const entries = latest.indicators ?? [];
-  element("indicators").hidden = Boolean(recorded) && !entries.length;
-  drawForest(element("forest"), entries, (policy) => colours[fixed.curves[policy === latest.policy ? 0 : 1][0]]);
-  element("told").textContent = toldOf(entries);
   element("senses").hidden = !selected;
   if (selected) {
     element("sensed").textContent = `Robot ${selected.robot}: ${selected.activity}, ${selected.modes.join(" ") || "sound"}`;
@@ -161,7 +157,7 @@ function paint() {
   sprites = new Map();
   drawn = null;
   showLegend(element("legend"));
-  fixed.curves.slice(0, 2).forEach(([name], number) => { element(`swatch${number}`).style.background = colours[name]; });
+  fixed.curves.forEach(([name], number) => { element(`swatch${number}`).style.background = colours[name]; });
   showWords();
 }
 

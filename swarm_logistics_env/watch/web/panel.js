@@ -1,6 +1,6 @@
 "use strict";
 
-// Draws the panels: deliveries over time, R and FT with their intervals, what a robot senses.
+// Draws the panels: deliveries over time, what a robot senses.
 
 function drawStrip(canvas, now, time, end, curves) {
   const { pen, width, height } = prepared(canvas), [left, right, bottom, top] = [30, width - 16, height - 20, 6];
@@ -47,50 +47,6 @@ function drawEvents(pen, events, at, most, top) {
     last = x;
     badge(pen, x, top + 10 + 17 * row, 15, count > 1 ? `${label} ×${count}` : label);
   }
-}
-
-// A row for each indicator and policy: dot and interval on an axis from -1 to 1, zero marked.
-function drawForest(canvas, entries, colourOf) {
-  const wanted = `${Math.max(2, entries.length) * 24 + 18}px`;
-  if (canvas.style.height !== wanted) canvas.style.height = wanted;
-  const { pen, width } = prepared(canvas), [left, right] = [38, width - 92];
-  const at = (value) => left + ((right - left) * (1 + Math.max(-1, Math.min(1, value)))) / 2;
-  const bottom = Math.max(2, entries.length) * 24;
-  pen.textBaseline = "middle";
-  for (const value of [-1, 0, 1]) {
-    line(pen, [[at(value), 0], [at(value), bottom]], value ? 1 : 1.5, value ? colours.TRAIL : colours.INK);
-    pen.font = "11px system-ui, sans-serif";
-    pen.textAlign = "center";
-    pen.fillStyle = colours.INK;
-    pen.fillText(value, at(value), bottom + 9);
-  }
-  const symbols = entries.length ? entries : [{ symbol: "R" }, { symbol: "FT" }];
-  symbols.forEach(({ symbol, value, interval, verdict, policy }, nth) => {
-    const y = 24 * nth + 12, colour = policy ? colourOf(policy) : colours.TRAIL;
-    pen.font = "600 13px system-ui, sans-serif";
-    pen.textAlign = "left";
-    pen.fillStyle = colours.INK;
-    pen.fillText(symbol, 2, y);
-    if (value === undefined) return;
-    if (interval) line(pen, [[at(interval[0]), y], [at(interval[1]), y]], 5, colour);
-    disc(pen, at(value), y, 6, colours.INK);
-    disc(pen, at(value), y, 4.5, colour);
-    pen.fillStyle = colours.INK;
-    pen.font = "12px system-ui, sans-serif";
-    pen.fillText(verdict === "inconclusive" ? "open" : verdict, right + 10, y);
-  });
-}
-
-function toldOf(entries, names) {
-  if (!entries.length) return "Break a robot: the same faults are then played on other seeds, to their ends.";
-  const seeds = Math.max(...entries.map((entry) => entry.seeds));
-  const parts = entries.map(({ symbol, value, interval, needed, policy }) => {
-    const who = new Set(entries.map((entry) => entry.policy)).size > 1 ? ` of ${policy}` : "";
-    const range = interval ? ` [${interval.map((limit) => limit.toFixed(2)).join(", ")}]` : "";
-    const plan = needed ? `; about ${needed} seeds would tell 0.1 from 0` : "";
-    return `${symbol}${who} = ${value.toFixed(2)}${range}${plan}`;
-  });
-  return `${parts.join(". ")}. From ${seeds} other seed${seeds > 1 ? "s" : ""}.`;
 }
 
 // A row for each part of the observation: its name and a bar for each of its values.
