@@ -93,7 +93,7 @@ class Watch:
             asked = state.open_requests[state.open_requests != NOBODY]
             self._demand(bool(((asked >= 0) & (asked < scenario.n_items)).all()), f"{asked} asked")
             is_there = np.isin(state.item_status[asked], (STORED, CARRIED))
-            self._demand(bool(is_there.all()), "a requested item is delivered")
+            self._demand(bool(is_there.all()), "the requested item is delivered")
             first = state.open_requests[: len(asked)]
             self._demand(np.array_equal(first, asked), "there is a gap among the requests")
         gaps = np.diff(np.array(state.delivery_times))
