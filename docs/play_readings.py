@@ -2,12 +2,12 @@
 
     python docs/play_readings.py 40  # seeds a cell
 
-A reading changes what a failed robot has lost, what it takes for true, or what every robot does,
-which changes all other cells too. docs/research says what came of it.
+A reading that changes what sound robots do changes all other cells, too.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
 import sys
 from collections.abc import Callable
@@ -54,9 +54,8 @@ def choose(pick: Callable[[Any], Any]) -> Change:
         told = np.where(is_heard, state.robot_told, np.nan)
         ties = np.flatnonzero(told == np.nanmin(told))
         x, y = away[ties[pick(distance[ties])]]
-        cosine, sine = math.cos(state.robot_heading[me]), math.sin(state.robot_heading[me])
-        rows[me, row.LOWEST_TIMER + 1] = x * cosine + y * sine
-        rows[me, row.LOWEST_TIMER + 2] = y * cosine - x * sine
+        seen = complex(x, y) * cmath.exp(-1j * float(state.robot_heading[me]))
+        rows[me, row.LOWEST_TIMER + 1 : row.LOWEST_TIMER + 3] = seen.real, seen.imag
 
     return change
 
@@ -66,33 +65,31 @@ class Reading(NamedTuple):
 
     of: str
     words: str
-    mode: FailureMode
+    mode: str
     change: Change | None = None
     relay: Literal["none", "gossip"] = "none"
 
 
-FM1, FM3 = FAILURE_MODES["FM1"], FAILURE_MODES["FM3"]
-THERE = FailureMode("tells 0, and hears nobody", honest=False, hears=False)
+FAILURE_MODES["there"] = FailureMode("tells 0, and hears nobody", honest=False, hears=False)
 READINGS = (
-    Reading("FM1", "tells 0; of equals the nearest is followed (shipped)", FM1),
-    Reading("FM1", "all pass on the lowest timer, aged", FM1, None, "gossip"),
-    Reading("FM1", "as if it were there: follows nobody", THERE),
-    Reading("FM1", "as if it were there: puts the requested item down", FM1, lets_go),
-    Reading("FM1", "of equals the farthest is followed", FM1, choose(np.argmax)),
-    Reading("FM1", "of equals the lowest number is followed", FM1, choose(lambda _: 0)),
-    Reading("FM1", "only timers below its own are followed", FM1, only_lower),
-    Reading("FM3", "neither sends nor hears (shipped)", FM3),
-    Reading("FM3", "does not send", FAILURE_MODES["FM3_send"]),
-    Reading("FM3", "does not hear", FAILURE_MODES["FM3_hear"]),
+    Reading("FM1", "tells 0; of equals the nearest is followed (shipped)", "FM1"),
+    Reading("FM1", "all pass on the lowest timer, aged", "FM1", None, "gossip"),
+    Reading("FM1", "as if it were there: follows nobody", "there"),
+    Reading("FM1", "as if it were there: puts the requested item down", "FM1", lets_go),
+    Reading("FM1", "of equals the farthest is followed", "FM1", choose(np.argmax)),
+    Reading("FM1", "of equals the lowest number is followed", "FM1", choose(lambda _: 0)),
+    Reading("FM1", "only timers below its own are followed", "FM1", only_lower),
+    Reading("FM3", "neither sends nor hears (shipped)", "FM3"),
+    Reading("FM3", "does not send", "FM3_send"),
+    Reading("FM3", "does not hear", "FM3_hear"),
 )
 
 
 def delivered(number: int, n: int, n_items: int, m: int, seed: int) -> int:
     """Return how many items a swarm delivers of which `m` robots have failed."""
     _, _, mode, change, relay = READINGS[number]
-    FAILURE_MODES["reading"] = mode
     world, policy = Warehouse(Scenario(n_robots=n, n_items=n_items, relay=relay)), SwarmDT()
-    rows = world.reset(seed, [Fault("reading", m)] if m else [])
+    rows = world.reset(seed, [Fault(mode, m)] if m else [])
     start(policy, world.scenario, seed)
     while not (world.is_over_time or world.all_delivered):
         if change is not None:
@@ -103,7 +100,7 @@ def delivered(number: int, n: int, n_items: int, m: int, seed: int) -> int:
 
 def main() -> None:
     """Play and print."""
-    n_seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    n_seeds = int(sys.argv[1])
     print("| mode | reading | m = 1 | m = 2 | m = 3 | mean abs ln | other cells |")
     print("|---" * 7 + "|")
     for number, (of, words, _, change, relay) in enumerate(READINGS):
@@ -118,8 +115,8 @@ def main() -> None:
                 shown.append(f"{mean:.1f} ({paper})")
                 errors.append(abs(math.log(mean / paper)))
         price = f"{np.mean(errors[3:]):.2f}" if is_for_all else "as shipped"
-        told = [of, words, *shown[:3], f"{np.mean(errors[:3]):.2f}", price]
-        print(f"| {' | '.join(told)} |", flush=True)
+        told = " | ".join([of, words, *shown[:3], f"{np.mean(errors[:3]):.2f}", price])
+        print(f"| {told} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -91,7 +91,8 @@ class Watch:
             self._demand(bool((state.item_status == DELIVERED).all()), "nothing is asked for")
         else:
             asked = state.open_requests[state.open_requests != NOBODY]
-            self._demand(bool(((asked >= 0) & (asked < scenario.n_items)).all()), f"{asked} is asked")
+            is_known = (asked >= 0) & (asked < scenario.n_items)
+            self._demand(bool(is_known.all()), f"{asked} is asked")
             is_there = np.isin(state.item_status[asked], (STORED, CARRIED))
             self._demand(bool(is_there.all()), "the requested item is delivered")
             first = state.open_requests[: len(asked)]
