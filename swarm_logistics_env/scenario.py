@@ -350,7 +350,8 @@ SCENARIO_PRESETS: dict[str, Scenario] = {
     # Table I delivers 74 of its items, so it cannot have held 60.
     "paper_scalability": Scenario(n_items=100),
     "dots": Scenario(max_speed=1.0, max_acceleration=2.0),
-    # What robots of that kind have to cope with; the noise is chosen here, nobody published it.
+    # What robots of that kind have to cope with; the noise and the handling time are chosen here,
+    # as nobody published them.
     "realistic": Scenario(
         drive="differential",
         max_acceleration=2.0,
@@ -358,5 +359,6 @@ SCENARIO_PRESETS: dict[str, Scenario] = {
         position_noise=0.05,
         radio_loss=0.1,
         heading_drift=0.05,
+        handling_time=1.0,
     ),
 }

@@ -187,6 +187,11 @@ def test_what_cannot_be_is_refused(fields: dict[str, Any], complaint: str) -> No
         Scenario(**fields)
 
 
+def test_robots_of_the_preset_realistic_take_their_time() -> None:
+    assert Scenario.preset("realistic").handling_steps == 10
+    assert Scenario().handling_steps == 0
+
+
 def requests_of(demand: str, seed: int, n_items: int, count: int) -> list[int]:
     """Return the first requests of a world whose items come back, by a plain computation."""
     if demand == "closed":
