@@ -36,6 +36,9 @@ SOURCES = {
     "DOTS": "https://arxiv.org/abs/2203.13809",
 }
 
+# Where `demand` is "zipf", item i is asked for with a weight of 1 / (i + 1) ** ZIPF_EXPONENT.
+ZIPF_EXPONENT = 1.0
+
 Probability = Annotated[float, Field(ge=0, le=1)]
 Mix = Annotated[tuple[Annotated[float, Field(gt=0, le=1)], ...], Field(min_length=1)]
 
@@ -60,6 +63,8 @@ CHANGES_DURING_RUN = frozenset(
         "position_noise",
         "sensor_dropout",
         "radio_loss",
+        "demand",
+        "dock_capacity",
     }
 )
 
@@ -91,6 +96,23 @@ class Scenario(Record):
     duration: PositiveFloat = Field(500.0, description="episode [s]; source: paper")
     restock: bool = Field(
         False, description="a delivered item returns to storage and requests never end; off"
+    )
+    n_requests: PositiveInt = Field(
+        1, description="items asked for at a time, delivered in any order; source: paper"
+    )
+    demand: Literal["closed", "independent", "zipf"] = Field(
+        "closed",
+        description="closed: every item once in a random order, then anew; independent: each "
+        "request is a uniform draw of its own; zipf: as that, but item i is (i + 1) times as rare "
+        "as item 0; source: simulator",
+    )
+    dock_capacity: PositiveFloat | None = Field(
+        None,
+        description="deliveries that the delivery area takes [1/s], the oldest request first; the "
+        "others wait; none: any number at once; off",
+    )
+    handling_time: NonNegativeFloat = Field(
+        0.0, description="a robot stands so long to lift, to put down and to deliver [s]; off"
     )
     n_obstacles: NonNegativeInt = Field(0, description="static discs; off")
     obstacle_radius: PositiveFloat = Field(0.3, description="[m], if there are any; off")
@@ -171,6 +193,26 @@ class Scenario(Record):
         return round(self.control_period / self.physics_period)
 
     @property
+    def handling_steps(self) -> int:
+        """Control steps in `handling_time`."""
+        return math.ceil(self.handling_time / self.control_period - 1e-9)
+
+    @property
+    def dock_period(self) -> float:
+        """The least time between two deliveries [s]; 0: none."""
+        return 0.0 if self.dock_capacity is None else 1.0 / self.dock_capacity
+
+    @property
+    def is_independent(self) -> bool:
+        """Whether each request is drawn for itself."""
+        return self.demand != "closed"
+
+    @property
+    def popularity_exponent(self) -> float:
+        """How fast the items' popularity falls with their numbers, where it is drawn."""
+        return ZIPF_EXPONENT if self.demand == "zipf" else 0.0
+
+    @property
     def is_gossip(self) -> bool:
         """Whether robots tell on what they heard."""
         return self.relay == "gossip"
@@ -185,6 +227,7 @@ class Scenario(Record):
         self._check_sizes()
         self._check_periods()
         self._check_storage()
+        self._check_requests()
         area = self.storage_width * self.warehouse_height
         obstacles = self.n_obstacles * self.obstacle_radius**2
         for count, name, radius in (
@@ -259,6 +302,18 @@ class Scenario(Record):
                     f"least {2 * widest:g} m"
                 )
 
+    def _check_requests(self) -> None:
+        if self.n_requests > self.n_items:
+            raise ValueError(
+                f"n_requests = {self.n_requests}: should be at most n_items = {self.n_items}"
+            )
+        most = 1.0 / self.control_period
+        if self.dock_capacity is not None and self.dock_capacity > most * (1.0 + 1e-9):
+            raise ValueError(
+                f"dock_capacity = {self.dock_capacity}: should be at most one in a control_period, "
+                f"{most:g} per second, or None"
+            )
+
     @classmethod
     def preset(cls, name: str) -> Scenario:
         """Return the scenario of that name in `SCENARIO_PRESETS`.
@@ -289,7 +344,8 @@ SCENARIO_PRESETS: dict[str, Scenario] = {
     # Table I delivers 74 of its items, so it cannot have held 60.
     "paper_scalability": Scenario(n_items=100),
     "dots": Scenario(max_speed=1.0, max_acceleration=2.0),
-    # What robots of that kind have to cope with; the noise is chosen here, nobody published it.
+    # What robots of that kind have to cope with; the noise and the handling time are chosen here,
+    # as nobody published them.
     "realistic": Scenario(
         drive="differential",
         max_acceleration=2.0,
@@ -297,5 +353,6 @@ SCENARIO_PRESETS: dict[str, Scenario] = {
         position_noise=0.05,
         radio_loss=0.1,
         heading_drift=0.05,
+        handling_time=1.0,
     ),
 }

@@ -11,6 +11,7 @@ from swarm_logistics_env import Warehouse
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.warehouse import FailureMode
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.warehouse.handling import IDLE, LIFTING
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
@@ -36,6 +37,7 @@ class Watch:
         self.deepest = 0.0
         self._count: Count | None = None
         self._speed = 0.0
+        self._dock = world.scenario.dock_capacity
         self._modes: tuple[tuple[str, ...], ...] = ()
         self._before: dict[str, NDArray[Any]] = {}
         self._jammed = np.zeros((0, 0))
@@ -44,6 +46,7 @@ class Watch:
     def look(self) -> None:
         """Check everything."""
         self._items()
+        self._handling()
         self._cover()
         self._bodies()
         self._timers()
@@ -57,6 +60,7 @@ class Watch:
             for name in ("robot_item", "robot_present", "robot_position", "robot_heading",
                          "item_position", "item_status")
         }  # fmt: skip
+        self._before["kind"] = state.robots.handling[:, 0].copy()
 
     def faults_changed(self) -> None:
         """Note that faults were set: what was repaired may come back within the next step.
@@ -86,11 +90,17 @@ class Watch:
         if state.requested == NOBODY:
             self._demand(bool((state.item_status == DELIVERED).all()), "nothing is asked for")
         else:
-            self._demand(0 <= state.requested < scenario.n_items, f"{state.requested} is asked")
-            asked = state.item_status[state.requested]
-            self._demand(asked in (STORED, CARRIED), "the requested item is delivered")
-        times = np.array(state.delivery_times)
-        self._demand(bool((np.diff(times) >= 0.0).all()), "delivery times fall")
+            asked = state.open_requests[state.open_requests != NOBODY]
+            is_known = (asked >= 0) & (asked < scenario.n_items)
+            self._demand(bool(is_known.all()), f"{asked} is asked")
+            is_there = np.isin(state.item_status[asked], (STORED, CARRIED))
+            self._demand(bool(is_there.all()), "the requested item is delivered")
+            first = state.open_requests[: len(asked)]
+            self._demand(np.array_equal(first, asked), "there is a gap among the requests")
+        gaps = np.diff(np.array(state.delivery_times))
+        self._demand(bool((gaps >= 0.0).all()), "delivery times fall")
+        if scenario.dock_capacity is not None and scenario.dock_capacity == self._dock:
+            self._demand(bool((gaps >= 1.0 / self._dock - 1e-6).all()), "the dock takes too many")
         far = np.array([scenario.warehouse_width, scenario.warehouse_height])
         here = state.item_position[state.item_status == STORED]
         self._demand(bool(((here > 0.0) & (here < far)).all()), "an item lies outside")
@@ -139,6 +149,19 @@ class Watch:
             lasting == 0.0,
             f"bodies overlap by more than {SUSTAINED} m for {JAM} s, now by {lasting:.4f} m",
         )
+
+    def _handling(self) -> None:
+        """Check that who handles an item stands, and that nobody else lifts it."""
+        state = self.world.state
+        kind, item, _ = state.robots.handling.T
+        lifted = item[kind == LIFTING]
+        self._demand(len(set(lifted.tolist())) == len(lifted), "two robots lift one item")
+        is_stored = state.item_status[lifted] == STORED
+        self._demand(bool(is_stored.all()), "an item is being lifted and is not stored")
+        if self._before:
+            stood = (self._before["kind"] != IDLE) & state.robot_present
+            turned = stood & (state.robot_heading != self._before["robot_heading"])
+            self._demand(not turned.any(), "a robot turns while it handles an item")
 
     def _cover(self) -> None:
         """Note which items are no obstacles: (I,), by the rule and not by what the world says.
@@ -262,7 +285,8 @@ class Watch:
         self._demand(not names, f"observations leave their ranges: {', '.join(names)}")
         asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
         flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
-        self._demand(bool((flags.sum(axis=1) <= 1).all()), "a robot sees two requested items")
+        most = self.world.scenario.n_requests
+        self._demand(bool((flags.sum(axis=1) <= most).all()), "a robot sees too many requests")
 
 
 class Count(NamedTuple):

@@ -61,7 +61,7 @@ class Tally:
 # Lengths are drawn around the robot's own, so that things meet; the rest within what may be built.
 CHANGEABLE = ("delivery_width", "max_speed", "view_range", "radio_range", "pickup_range", "relay",
               "timer_limit", "drive", "ranger_noise", "sensor_dropout", "radio_loss",
-              "restock")  # fmt: skip
+              "restock", "demand")  # fmt: skip
 
 
 def some_scenario(source: random.Random) -> Scenario:
@@ -86,6 +86,8 @@ def _fields(source: random.Random) -> dict[str, Any]:
     radius = number(0.05, 0.3)
     width = number(1.0, 12.0)
     physics_period = source.choice([0.01, 0.02, 0.005])
+    control_period = physics_period * source.randint(1, 5)
+    n_items = int(number(1, 60))
     fields: dict[str, Any] = {
         "robot_radius": radius,
         "item_radius": number(0.03, 0.3),
@@ -93,7 +95,11 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "warehouse_height": number(0.8, 12.0),
         "delivery_width": width * source.uniform(0.05, 0.6),
         "n_robots": int(number(1, 40)),
-        "n_items": int(number(1, 60)),
+        "n_items": n_items,
+        "n_requests": rarely(source.randint(1, n_items), 1),
+        "demand": source.choice(["closed", "closed", "independent", "zipf"]),
+        "dock_capacity": rarely(number(0.1, 1.0 / control_period), None),
+        "handling_time": rarely(number(0.02, 3.0), 0.0),
         "duration": 1e6,
         "restock": source.random() < 0.5,
         "n_obstacles": rarely(source.randint(1, 6), 0),
@@ -118,7 +124,7 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "radio_loss": rarely(source.random(), 0.0),
         "heading_drift": rarely(number(0.01, 1.0), 0.02),
         "message_size": rarely(source.randint(1, 4), 0),
-        "control_period": physics_period * source.randint(1, 5),
+        "control_period": control_period,
         "physics_period": physics_period,
     }
     return fields

@@ -85,7 +85,9 @@ def _golden() -> dict[str, GoldenTrajectory]:
             Scenario.preset("paper_scalability"), steps=50
         ),
         "preset dots": GoldenTrajectory(Scenario.preset("dots"), steps=100),
-        "preset realistic": GoldenTrajectory(Scenario.preset("realistic"), steps=100),
+        "preset realistic": GoldenTrajectory(
+            Scenario.preset("realistic").replace(handling_time=0.0), steps=100
+        ),
         "seed 1": GoldenTrajectory(small(), seed=1),
         "long, past the rebuilding of bodies": GoldenTrajectory(small(restock=True), steps=650),
         "until all is delivered": GoldenTrajectory(small(n_items=2, n_robots=8), steps=300),

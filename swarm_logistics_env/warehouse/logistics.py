@@ -10,8 +10,20 @@ import math
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 
+from .demand import ask, close_request, is_requested
 from .grid import look_around
-from .layout import draw_order, place_restocked
+from .handling import (
+    DELIVERING,
+    IDLE,
+    LIFTING,
+    PUTTING_DOWN,
+    gripper_of,
+    is_being_lifted,
+    is_done,
+    item_lifted,
+    may_deliver,
+)
+from .layout import place_restocked
 from .physics import CAME_BACK, DELIVERED_IT, LIFTED, PUT_DOWN
 from .structs import (
     CARRIED,
@@ -66,13 +78,13 @@ def drive(
 
     Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
     turns as commanded and by its heading drift, unless its motor is dead, and drives along its mean
-    direction; one that is not holonomic ignores `left`. Rows of robots that ignore their commands
-    are ignored.
+    direction; one that is not holonomic ignores `left`. Rows of robots that ignore their commands,
+    or stand to handle an item, are ignored.
     """
     for robot in range(len(commands)):
         wanted_velocity[robot, 0] = 0.0
         wanted_velocity[robot, 1] = 0.0
-        if not (robots.present[robot] and able.obeys[robot]):
+        if not (robots.present[robot] and able.obeys[robot]) or robots.handling[robot, 0] != IDLE:
             continue
         forward = min(max(commands[robot, FORWARD], -1.0), 1.0)
         left = min(max(commands[robot, LEFT], -1.0), 1.0) if parameters.is_holonomic else 0.0
@@ -119,18 +131,20 @@ def carry_along(world: World) -> None:
 def open_grippers(world: World, commands: Numbers) -> int:
     """Put down what robots let go of, covered; returns the number of events written.
 
-    The requested item is let go of anywhere, another one only outside the delivery area.
+    A requested item is let go of anywhere, another one only outside the delivery area.
     """
     robots, able, items, n_events = world.robots, world.able, world.items, 0
-    requested = world.progress.requested[0]
     for robot in range(len(commands)):
         item = robots.item[robot]
         is_able = robots.present[robot] and able.obeys[robot]
-        if item == NOBODY or not is_able or commands[robot, GRIPPER] >= _OPEN:
+        command = gripper_of(world, robot, commands[robot, GRIPPER])
+        if item == NOBODY or not is_able or command >= _OPEN:
             continue
-        if robots.in_delivery[robot] and item != requested:
+        if robots.in_delivery[robot] and not is_requested(world, item):
             continue
         if robots.in_delivery[robot] and not able.releases_inside[robot]:
+            continue
+        if not is_done(world, robot, PUTTING_DOWN, item):
             continue
         remember(robots.memory, robot, item)
         robots.item[robot] = NOBODY
@@ -163,20 +177,25 @@ def is_remembered(memory: Integers, robot: int, item: int) -> bool:
 def wanted_item(world: World, robot: int) -> tuple[int, float]:
     """Return the item that `robot` would lift now, or NOBODY, and the square of its distance.
 
-    The requested item in reach comes first, else the nearest that is not in its memory.
+    The nearest requested item in reach comes first, else the nearest that is not in its memory.
+    A robot that lifts goes on with its item, and nobody else takes it.
     """
     robots, grid, nearby = world.robots, world.item_grid, world.nearby
+    if robots.handling[robot, 0] == LIFTING:
+        return item_lifted(world, robot)
     x, y = robots.position[robot, 0], robots.position[robot, 1]
     n_found = look_around(grid, x, y, world.parameters.pickup_range, NOBODY, nearby)
-    best, best_square = NOBODY, math.inf
+    best, best_square, is_best_requested = NOBODY, math.inf, False
     for index in range(n_found):
         item, square = grid.members[nearby.place[index]], nearby.square[index]
-        if world.items.status[item] != STORED:
+        if world.items.status[item] != STORED or is_being_lifted(world, item):
             continue
-        if item == world.progress.requested[0]:
-            return item, square
-        if square < best_square and not is_remembered(robots.memory, robot, item):
-            best, best_square = item, square
+        is_asked_for = is_requested(world, item)
+        is_first = is_asked_for and not is_best_requested
+        if not is_first and (square >= best_square or is_asked_for != is_best_requested):
+            continue
+        if is_asked_for or not is_remembered(robots.memory, robot, item):
+            best, best_square, is_best_requested = item, square, is_asked_for
     return best, best_square
 
 
@@ -188,11 +207,12 @@ def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
     """
     robots, able, items, claims = world.robots, world.able, world.items, world.claims
     while True:
-        n_before = n_events
+        is_settled = True
         for robot in range(len(commands)):
             is_able = robots.present[robot] and able.obeys[robot] and able.lifts[robot]
             is_free = robots.item[robot] == NOBODY
-            if not is_free or not is_able or commands[robot, GRIPPER] <= _HOLD:
+            command = gripper_of(world, robot, commands[robot, GRIPPER])
+            if not is_free or not is_able or command <= _HOLD:
                 continue
             item, square = wanted_item(world, robot)
             if item != NOBODY and (claims.robot[item] == NOBODY or square < claims.square[item]):
@@ -203,6 +223,9 @@ def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
             if robot == NOBODY:
                 continue
             claims.robot[item] = NOBODY
+            is_settled = False
+            if not is_done(world, robot, LIFTING, item):
+                continue
             robots.item[robot] = item
             items.status[item] = CARRIED
             items.carrier[item] = robot
@@ -210,13 +233,13 @@ def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
             items.position[item, 0] = robots.position[robot, 0]
             items.position[item, 1] = robots.position[robot, 1]
             n_events = note_event(claims.events, n_events, LIFTED, robot, item)
-        if n_events == n_before:
+        if is_settled:
             return n_events
 
 
 @kernel
 def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
-    """Deliver the requested item if its carrier can, then the next one, and so on.
+    """Deliver the requested items whose carriers can, the oldest request first, then the next.
 
     A delivery clears every robot's memory; with `restock` the item comes back to the storage.
 
@@ -224,16 +247,19 @@ def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
         The number of events so far, of deliveries, and whether all that came back found room.
     """
     robots, items, progress = world.robots, world.items, world.progress
-    n_delivered, is_room = 0, True
-    while progress.requested[0] != NOBODY:
-        item = progress.requested[0]
+    n_delivered, is_room, place = 0, True, 0
+    while place < len(progress.requested) and progress.requested[place] != NOBODY:
+        item = progress.requested[place]
         robot = items.carrier[item]
+        place += 1
         if robot == NOBODY or not robots.in_delivery[robot] or not world.able.delivers[robot]:
-            break
+            continue
+        if not may_deliver(world, robot) or not is_done(world, robot, DELIVERING, item):
+            continue
         robots.item[robot] = NOBODY
         for other in range(len(robots.memory)):
-            for place in range(robots.memory.shape[1]):
-                robots.memory[other, place] = NOBODY
+            for slot in range(robots.memory.shape[1]):
+                robots.memory[other, slot] = NOBODY
         items.status[item] = DELIVERED
         items.carrier[item] = NOBODY
         world.claims.delivered_by[n_delivered] = robot
@@ -247,22 +273,7 @@ def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
                 n_events = note_event(world.claims.events, n_events, CAME_BACK, robot, item)
             else:
                 is_room = False
-        ask_for_next(world)
+        close_request(world, item)
+        ask(world)
+        place = 0  # what is asked for now may have waited here
     return n_events, n_delivered, is_room
-
-
-@kernel
-def ask_for_next(world: World) -> None:
-    """Ask for the next item in the order of requests that has not left for good."""
-    items, progress = world.items, world.progress
-    progress.requested[0] = NOBODY
-    n_left = 0
-    for item in range(len(items.status)):
-        n_left += int(items.status[item] != DELIVERED)
-    while n_left > 0 and progress.requested[0] == NOBODY:
-        progress.n_asked[0] += 1
-        cycle, place = divmod(progress.n_asked[0], len(items.order))
-        if place == 0:
-            draw_order(items.request_key, cycle, items.order)
-        if items.status[items.order[place]] != DELIVERED:
-            progress.requested[0] = items.order[place]

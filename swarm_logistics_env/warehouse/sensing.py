@@ -15,6 +15,7 @@ import numpy as np
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, uniform
 
+from .demand import is_requested
 from .grid import look_around
 from .structs import NOBODY, Parameters, Sensed, World
 from .surroundings import (
@@ -38,10 +39,10 @@ def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     forward = velocity_x * pose.cosine + velocity_y * pose.sine
     left = velocity_y * pose.cosine - velocity_x * pose.sine
     limit = parameters.max_speed
-    carried, timer, requested = robots.item[me], robots.timer[me], world.progress.requested[0]
+    carried, timer = robots.item[me], robots.timer[me]
     runs = not math.isnan(timer)
     out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
-    out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and carried == requested else 0.0
+    out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and is_requested(world, carried) else 0.0
     out[row.IN_DELIVERY_AREA] = 1.0 if robots.in_delivery[me] else 0.0
     out[row.TIMER_RUNS] = 1.0 if runs else 0.0
     out[row.TIMER] = timer if runs else parameters.timer_limit

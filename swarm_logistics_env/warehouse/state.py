@@ -50,7 +50,7 @@ class Quantity(Generic[T]):
 
 
 class Count(Generic[V]):
-    """A number of `Progress`."""
+    """A number of `Progress`; of `requested`, the oldest request."""
 
     def __set_name__(self, owner: type[WarehouseState], name: str) -> None:
         """Take the attribute's name."""
@@ -59,7 +59,7 @@ class Count(Generic[V]):
     def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> V:
         """Return the number."""
         numbers: NDArray[Any] = state.progress[self.place]
-        number: V = numbers.item()
+        number: V = numbers.item(0)
         return number
 
     def __set__(self, state: WarehouseState, value: V) -> None:
@@ -111,6 +111,8 @@ class WarehouseState:
     item_carrier = Quantity[np.int64]("items", "carrier")
     item_covered = Quantity[np.int64]("items", "covered")
 
+    open_requests = Quantity[np.int64]("progress", "requested")
+
     step, requested, time = Count[int](), Count[int](), Count[float]()
     anchoring_seconds = Count[float]()
 
@@ -134,7 +136,7 @@ class WarehouseState:
 
     @property
     def carrier(self) -> int:
-        """The robot that carries the requested item, or NOBODY."""
+        """The robot that carries the item of the oldest request, or NOBODY."""
         return NOBODY if self.requested == NOBODY else int(self.item_carrier[self.requested])
 
     @property

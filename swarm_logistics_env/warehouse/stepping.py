@@ -12,7 +12,9 @@ from __future__ import annotations
 
 from swarm_logistics_env.kernels import kernel
 
+from .demand import ask
 from .grid import fill, look_around
+from .handling import end_handling
 from .logistics import carry_along, close_grippers, deliver, drive, open_grippers, refused_command
 from .packing import unpacked_at
 from .physics import FREE_ITEM, LIFTED, NO_ONE, advance, collide_with, follow
@@ -63,6 +65,12 @@ def unmask_left(world: World) -> None:
 def reach_of(world: World) -> float:
     """Return the distance [m] between centres up to which a robot stands above an item."""
     return world.parameters.robot_radius + world.parameters.item_radius
+
+
+@kernel
+def begin(address: int) -> None:
+    """Open the first requests of the world at `address`."""
+    ask(unpacked_at(World, address))
 
 
 @kernel
@@ -151,5 +159,6 @@ def handle_items(world: World, commands: Numbers) -> tuple[int, bool]:
     n_events = close_grippers(world, commands, n_events)
     mask_below_lifters(world, n_events)
     n_events, n_delivered, is_room = deliver(world, n_events)
+    end_handling(world)
     follow(world.engine, world.claims.events, n_events, world.items.position)
     return n_delivered, is_room

@@ -52,6 +52,10 @@ class Parameters(NamedTuple):
     control_period: float
     physics_period: float
     n_substeps: int
+    handling_steps: int
+    dock_period: float
+    popularity_exponent: float
+    is_independent: bool
     restock: bool
     is_gossip: bool
     is_holonomic: bool
@@ -70,6 +74,7 @@ class Robots(NamedTuple):
     last_in_delivery: Annotated[Integers, "N"]  # the last step in which it was, or NOBODY
     contact: Annotated[Flags, "N"]  # touches something solid to it
     item: Annotated[Integers, "N"]  # item carried, or NOBODY
+    handling: Annotated[Integers, "N", 3]  # kind, item and last step, see `handling`
     memory: Annotated[Integers, "N", "memory_size"]  # items put down, newest first, or NOBODY
     timer: Annotated[Numbers, "N"]  # [s] since the delivery area, NaN when silent
     told: Annotated[Numbers, "N"]  # [s] the timer it broadcasts, NaN when silent
@@ -109,16 +114,18 @@ class Items(NamedTuple):
     covered: Annotated[Integers, "I"]  # 1: stored, yet no obstacle; or 0
     order: Annotated[Integers, "I"]  # items in the order of this cycle's requests
     request_key: Annotated[Keys, "I"]  # of the streams that decide the order of every cycle
+    demand_key: Annotated[Keys, 1]  # of the stream of requests that are drawn independently
     restock_key: Annotated[Keys, 1]  # of the streams that decide where delivered items come back
 
 
 class Progress(NamedTuple):
-    """How far the episode is; each an array of one number that a step changes."""
+    """How far the episode is: what a step changes, mostly arrays of one number."""
 
     step: Annotated[Integers, 1]  # control steps since the start
     time: Annotated[Numbers, 1]  # [s] since the start
-    requested: Annotated[Integers, 1]  # the item asked for now, or NOBODY when all are delivered
-    n_asked: Annotated[Integers, 1]  # requests before this one
+    requested: Annotated[Integers, "n_requests"]  # items asked for, oldest first, then NOBODY
+    n_asked: Annotated[Integers, 1]  # requests drawn so far, those that were skipped included
+    dock_free: Annotated[Numbers, 1]  # [s] since the start, when the next delivery may begin
     n_delivered: Annotated[Integers, 1]  # items delivered
     anchoring_seconds: Annotated[Numbers, 1]  # of working robots that touch failed ones, summed
     last_step: Annotated[Integers, 1]  # the step in which the time is up
@@ -267,6 +274,7 @@ def lengths_of(scenario: Scenario) -> dict[str, int]:
         "K N": n_kept * n,
         "beams": 3 * N_BEAMS,
         "nearby": max(n, n_items) + 1,
+        "n_requests": scenario.n_requests,
         "memory_size": scenario.memory_size,
         "message_size": scenario.message_size,
     }

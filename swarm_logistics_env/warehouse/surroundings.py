@@ -14,6 +14,7 @@ import numpy as np
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel, kernel, pair_key, uniform
 
+from .demand import is_requested
 from .logistics import MESSAGE, is_remembered
 from .structs import NOBODY, Grid, Nearby, Numbers, Sensed, World
 
@@ -312,7 +313,7 @@ def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> N
         out[column] = 1.0
         out[column + 1] = forward
         out[column + 2] = left
-        out[column + 3] = 1.0 if item == world.progress.requested[0] else 0.0
+        out[column + 3] = 1.0 if is_requested(world, item) else 0.0
         out[column + 4] = 1.0 if is_remembered(robots.memory, me, item) else 0.0
 
 

@@ -19,6 +19,7 @@ from . import layout, stepping
 from .fault_text import FaultLike, checked_faults
 from .faults import GRACE, Fault, Occurrence, apply_faults
 from .grid import blank_grid
+from .handling import IDLE
 from .packing import blank, packed
 from .physics import Physics
 from .state import NOBODY, STORED, WarehouseState
@@ -86,6 +87,7 @@ class Warehouse:
         self.faults, self._occurrences, self.n_removed = faults, occurrences, 0
         self._make_room_to_work()
         self._build()
+        stepping.begin(self._address)
         self._apply_faults()
         self._rows = self._blank_rows()
         stepping.perceive(self._address, self._rows)
@@ -228,7 +230,7 @@ class Warehouse:
         return self._seed
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
-        """Place everything, give it its random streams, and ask for the first item."""
+        """Place everything and give it its random streams."""
         state.obstacle_position = layout.place_obstacles(scenario, seed)
         state.item_position = layout.place_items(scenario, seed, state.obstacle_position)
         state.robot_position, state.robot_heading = layout.place_robots(
@@ -238,9 +240,10 @@ class Warehouse:
         state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
         items = state.items
         items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
+        items.demand_key[0] = key(seed, "demand")
         items.restock_key[0] = key(seed, "restock")
         layout.draw_order(items.request_key, 0, items.order)
-        state.requested = int(items.order[0])
+        state.open_requests[:] = NOBODY
 
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
         self._begun("step")
@@ -331,6 +334,7 @@ class Warehouse:
         state.robot_present[robot] = False
         state.robot_in_delivery[robot] = False
         state.robot_item[robot] = NOBODY
+        state.robots.handling[robot] = IDLE
         state.robot_memory[robot] = NOBODY
         for zeroed in (state.robot_position, state.robot_velocity, state.robot_heading):
             zeroed[robot] = 0.0

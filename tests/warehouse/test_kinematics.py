@@ -90,14 +90,10 @@ def test_speed_stays_within_the_top_and_heading_within_pi(
     wanted, turned = driven(commands, heading, period=period)
     assert np.hypot(*wanted) <= 2.0 + 1e-12
     assert abs(turned) <= math.pi + 1e-12
+    stood, kept = driven(commands, heading, obeys=False)
+    assert (stood.tolist(), kept) == ([0.0, 0.0], heading)
     change = turned - heading - np.clip(commands[2], -1.0, 1.0) * 6.0 * period
     assert math.remainder(change, math.tau) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_robot_that_does_not_obey_stands_and_does_not_turn() -> None:
-    wanted, heading = driven((1.0, 1.0, 1.0, 1.0), heading=0.4, obeys=False)
-    assert wanted.tolist() == [0.0, 0.0]
-    assert heading == 0.4
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -1,0 +1,123 @@
+"""Play each reading of the paper's FM1 and FM3, and print what comes near its table, and its price.
+
+    python docs/play_readings.py 40  # seeds a cell
+
+A reading that changes what sound robots do changes all other cells, too.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.policies.policy import start
+from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.warehouse import FailureMode
+
+FIRST_SEED = 3_300_000  # nothing else uses these
+PAPER = {"FM1": (41, 38, 35), "FM3": (40, 41, 40)}
+# Cells without a fault, each with a quarter of the seeds: N, items, P of the paper.
+OTHERS = ((25, 60, 39), (22, 60, 36), (10, 100, 18), (50, 100, 56))
+Change = Callable[[Warehouse, Any], None]  # of the rows (N, D), in place
+
+
+def lets_go(world: Warehouse, rows: Any) -> None:
+    """A failed robot takes the requested item for delivered, and puts it down as any other."""
+    rows[world.state.failed, row.CARRYING_REQUESTED] = 0.0
+
+
+def only_lower(_: Warehouse, rows: Any) -> None:
+    """A robot follows only a timer that is lower than its own."""
+    own = np.where(rows[:, row.TIMER_RUNS] > 0.5, rows[:, row.TIMER], np.inf)
+    rows[rows[:, row.LOWEST_TIMER + 3] >= own, row.LOWEST_TIMER] = 0.0
+
+
+def choose(pick: Callable[[Any], Any]) -> Change:
+    """Of those that tell the lowest timer, the carrier follows `pick` of their distances."""
+
+    def change(world: Warehouse, rows: Any) -> None:
+        state, me = world.state, world.state.carrier
+        if me < 0 or rows[me, row.LOWEST_TIMER] < 0.5:
+            return
+        away = state.robot_position - state.robot_position[me]
+        distance = np.hypot(*away.T)
+        is_heard = state.sends & (distance <= world.scenario.radio_range) & (distance > 0.0)
+        told = np.where(is_heard, state.robot_told, np.nan)
+        ties = np.flatnonzero(told == np.nanmin(told))
+        x, y = away[ties[pick(distance[ties])]]
+        seen = complex(x, y) * cmath.exp(-1j * float(state.robot_heading[me]))
+        rows[me, row.LOWEST_TIMER + 1 : row.LOWEST_TIMER + 3] = seen.real, seen.imag
+
+    return change
+
+
+class Reading(NamedTuple):
+    """What a failure mode may mean."""
+
+    of: str
+    words: str
+    mode: str
+    change: Change | None = None
+    relay: Literal["none", "gossip"] = "none"
+
+
+FAILURE_MODES["there"] = FailureMode("tells 0, and hears nobody", honest=False, hears=False)
+READINGS = (
+    Reading("FM1", "tells 0; of equals the nearest is followed (shipped)", "FM1"),
+    Reading("FM1", "all pass on the lowest timer, aged", "FM1", None, "gossip"),
+    Reading("FM1", "as if it were there: follows nobody", "there"),
+    Reading("FM1", "as if it were there: puts the requested item down", "FM1", lets_go),
+    Reading("FM1", "of equals the farthest is followed", "FM1", choose(np.argmax)),
+    Reading("FM1", "of equals the lowest number is followed", "FM1", choose(lambda _: 0)),
+    Reading("FM1", "only timers below its own are followed", "FM1", only_lower),
+    Reading("FM3", "neither sends nor hears (shipped)", "FM3"),
+    Reading("FM3", "does not send", "FM3_send"),
+    Reading("FM3", "does not hear", "FM3_hear"),
+)
+
+
+def delivered(number: int, n: int, n_items: int, m: int, seed: int) -> int:
+    """Return how many items a swarm delivers of which `m` robots have failed."""
+    _, _, mode, change, relay = READINGS[number]
+    world, policy = Warehouse(Scenario(n_robots=n, n_items=n_items, relay=relay)), SwarmDT()
+    rows = world.reset(seed, [Fault(mode, m)] if m else [])
+    start(policy, world.scenario, seed)
+    while not (world.is_over_time or world.all_delivered):
+        if change is not None:
+            change(world, rows)
+        rows = world.step(policy.act(rows))
+    return world.state.delivered
+
+
+def main() -> None:
+    """Play and print."""
+    n_seeds = int(sys.argv[1])
+    print("| mode | reading | m = 1 | m = 2 | m = 3 | mean abs ln | other cells |")
+    print("|---" * 7 + "|")
+    for number, (of, words, _, change, relay) in enumerate(READINGS):
+        is_for_all = number == 0 or relay == "gossip" or change not in (None, lets_go)
+        cells = [(25, 60, m + 1, p, n_seeds) for m, p in enumerate(PAPER[of])]
+        cells += [(*cell[:2], 0, cell[2], -(-n_seeds // 4)) for cell in OTHERS if is_for_all]
+        shown, errors = [], []
+        with ProcessPoolExecutor(2) as pool:
+            for n, n_items, m, paper, count in cells:
+                play = partial(delivered, number, n, n_items, m)
+                mean = np.mean([*pool.map(play, range(FIRST_SEED, FIRST_SEED + count))])
+                shown.append(f"{mean:.1f} ({paper})")
+                errors.append(abs(math.log(mean / paper)))
+        price = f"{np.mean(errors[3:]):.2f}" if is_for_all else "as shipped"
+        told = " | ".join([of, words, *shown[:3], f"{np.mean(errors[:3]):.2f}", price])
+        print(f"| {told} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""What is asked for: the open requests, and which item the next one is for.
+
+`n_requests` of them are open at a time, oldest first. A delivery closes one, and the next is drawn:
+in cycles of all items, or each by itself from a keyed stream of its own. An item may be asked for
+twice at a time where delivered items come back; else it is asked for once, as it leaves for good.
+"""
+
+from __future__ import annotations
+
+from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
+
+from .layout import draw_order
+from .structs import DELIVERED, NOBODY, World
+
+
+@inlined_kernel
+def is_requested(world: World, item: int) -> bool:
+    """Return whether a request for `item` is open."""
+    requested, found = world.progress.requested, False
+    for place in range(len(requested)):
+        found |= requested[place] == item
+    return found
+
+
+@kernel
+def ask(world: World) -> None:
+    """Ask for items until `n_requests` requests are open or there is nothing to ask for."""
+    requested = world.progress.requested
+    for place in range(len(requested)):
+        if requested[place] == NOBODY:
+            requested[place] = next_item(world)
+
+
+@kernel
+def close_request(world: World, item: int) -> None:
+    """Close the oldest request for an item that was delivered; all of them if it left for good."""
+    requested, n_kept, n_closed = world.progress.requested, 0, 0
+    most = len(requested) if world.items.status[item] == DELIVERED else 1
+    for place in range(len(requested)):
+        other = requested[place]
+        if other == item and n_closed < most:
+            n_closed += 1
+        else:
+            requested[n_kept] = other
+            n_kept += 1
+    requested[n_kept:] = NOBODY
+
+
+@kernel
+def next_item(world: World) -> int:
+    """Return the item of the next request, or NOBODY if there is none to ask for."""
+    items, progress, total = world.items, world.progress, 0.0
+    for item in range(len(items.status)):
+        total += weight_of(world, item)
+    if total == 0.0:
+        return NOBODY
+    number, chosen = progress.n_asked[0], NOBODY
+    if world.parameters.is_independent:
+        progress.n_asked[0] += 1
+        left = total * uniform(items.demand_key[0], number)
+        for item in range(len(items.status)):
+            weight = weight_of(world, item)
+            if weight > 0.0 and left >= 0.0:  # of equal numbers by rounding, the last one
+                chosen = item
+            left -= weight
+        return chosen
+    while chosen == NOBODY:
+        cycle, place = divmod(progress.n_asked[0], len(items.order))
+        if cycle > 0 and place == 0:
+            draw_order(items.request_key, cycle, items.order)
+        progress.n_asked[0] += 1
+        if weight_of(world, items.order[place]) > 0.0:
+            chosen = items.order[place]
+    return chosen
+
+
+@kernel
+def weight_of(world: World, item: int) -> float:
+    """Return how often an item is asked for beside item 0; 0: it cannot be, now."""
+    parameters = world.parameters
+    is_away = world.items.status[item] == DELIVERED
+    if is_away or (not parameters.restock and is_requested(world, item)):
+        return 0.0
+    return float(1.0 / (item + 1.0) ** parameters.popularity_exponent)

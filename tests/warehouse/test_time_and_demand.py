@@ -1,0 +1,272 @@
+"""Handling that takes time, several requests at a time, ways to draw them, a dock's capacity."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env import observations as row
+from swarm_logistics_env.errors import ScenarioError
+from swarm_logistics_env.kernels import uniform
+from swarm_logistics_env.policies.policy import decide, start
+from swarm_logistics_env.streams import key, row_keys
+from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+from tests.warehouse.conftest import EAST, FAR, HOLD, INSIDE, OPEN, STAY, WEST, Build, steps
+from verification.invariants import Watch
+
+TIMED = {"handling_time": 0.3}  # three steps
+GO_ON = (1.0, 0.0, 0.5, 0.0)
+
+
+def test_lifting_and_putting_down_take_their_time_and_the_robot_stands_meanwhile(
+    build: Build,
+) -> None:
+    world = build([(2.0, 2.0), (2.3, 2.0)], [FAR, (2.1, 2.0)], pickup_range=0.35, **TIMED)
+    state = world.state
+    steps(world, HOLD, STAY)
+    for _ in range(2):  # whatever it commands, and whoever else wants the item
+        rows = steps(world, GO_ON, HOLD)
+        assert (state.item_status[1], state.robot_item.tolist()) == (STORED, [NOBODY] * 2)
+        assert rows[:, [row.CARRYING, row.ITEMS]].tolist() == [[0.0, 1.0]] * 2
+    steps(world, OPEN, STAY)
+    for _ in range(3):
+        assert (state.item_status[1], state.robot_item.tolist()) == (CARRIED, [1, NOBODY])
+        steps(world, STAY, STAY)
+    assert (state.robot_position[0, 0], state.robot_heading[0]) == (2.0, 0.0)
+    steps(world, WEST, STAY, times=2)
+    place = state.robot_position[0, 0]
+    assert place < 1.8
+    steps(world, OPEN, STAY)
+    steps(world, EAST, STAY, times=2)
+    assert state.robot_item[0] == 1
+    steps(world, HOLD, STAY)
+    assert (state.item_status[1], state.robot_memory[0, 0]) == (STORED, 1)
+    assert state.item_position[1, 0] == pytest.approx(place, abs=0.15)  # where it came to rest
+    steps(world, WEST, STAY)
+    assert state.robot_velocity[0, 0] < -1.0
+
+
+def test_a_delivery_takes_its_time_and_the_next_request_comes_after_it(build: Build) -> None:
+    world = build([(7.5, 5.0)], [(7.5, 5.1), FAR], **TIMED)
+    state = world.state
+    steps(world, HOLD, times=4)
+    while not state.robot_in_delivery[0]:
+        steps(world, EAST)
+    arrived = state.time
+    rows = steps(world, WEST, times=2)
+    assert (state.delivered, state.requested, state.item_status[0]) == (0, 0, CARRIED)
+    assert rows[0, [row.CARRYING_REQUESTED, row.IN_DELIVERY_AREA]].tolist() == [1.0, 1.0]
+    steps(world, WEST)
+    assert state.delivery_times == pytest.approx([arrived + 0.3])
+    assert (state.delivered_by, state.requested, state.item_status[0]) == ([0], 1, DELIVERED)
+
+
+# What a robot holds in the end, by what befalls it after a step of handling; it begins with HOLD
+# beside an item, or with item 0 in its hands to put it down outside or to deliver it inside.
+BEFALLS: dict[str, tuple[str, Fault, int, int]] = {
+    "dead while it lifts": ("lift", Fault("dead", (0,), 0.2), NOBODY, STORED),
+    "FM2 while it lifts": ("lift", Fault("FM2", (0,), 0.2), NOBODY, STORED),
+    "FM4 hinders no lifting": ("lift", Fault("FM4", (0,), 0.2), 0, CARRIED),
+    "able again when it is over": ("lift", Fault("FM2", (0,), 0.2, 0.1), 0, CARRIED),
+    "removed while it lifts": ("lift", Fault("removed", (0,), 0.2), NOBODY, STORED),
+    "dead while it puts down": ("put", Fault("dead", (0,), 0.6), 0, CARRIED),
+    "removed while it puts down": ("put", Fault("removed", (0,), 0.6), NOBODY, STORED),
+    "FM2 while it delivers": ("deliver", Fault("FM2", (0,), 0.6), NOBODY, DELIVERED),
+    "FM4 while it delivers": ("deliver", Fault("FM4", (0,), 0.6), 0, CARRIED),
+    "dead while it delivers": ("deliver", Fault("dead", (0,), 0.6), 0, CARRIED),
+    "removed while it delivers": ("deliver", Fault("removed", (0,), 0.6), NOBODY, STORED),
+}
+
+
+@pytest.mark.parametrize("case", BEFALLS)
+def test_a_fault_in_mid_handling_counts_if_it_holds_when_the_time_is_over(
+    build: Build, case: str
+) -> None:
+    doing, fault, item, status = BEFALLS[case]
+    x = INSIDE if doing == "deliver" else 2.0
+    world = build([(x, 5.0), (x, 5.3)], [(x, 5.1), FAR], [fault], pickup_range=0.35, **TIMED)
+    steps(world, HOLD, STAY)
+    steps(world, STAY, STAY, times=3)
+    steps(world, OPEN if doing == "put" else STAY, STAY)
+    steps(world, STAY, STAY, times=4)
+    state = world.state
+    assert (state.robot_item[0], state.item_status[0]) == (item, status)
+    if status == STORED:  # it is bound to nobody any more
+        steps(world, STAY, HOLD, times=4)
+        assert state.item_carrier[0] == 1
+
+
+def test_who_is_out_of_reach_when_the_time_is_over_has_lifted_nothing(build: Build) -> None:
+    world = build([(2.0, 2.0)], [(2.2, 2.0)], **TIMED)
+    steps(world, HOLD)
+    world.change(pickup_range=0.1)
+    steps(world, HOLD, times=3)
+    assert world.state.robot_item[0] == NOBODY
+    steps(world, EAST, times=2)
+    assert world.state.robot_position[0, 0] > 2.1  # and it goes on
+
+
+def test_any_open_request_can_be_delivered_and_the_next_one_joins_the_end(build: Build) -> None:
+    robots = [(INSIDE, 5.0), (INSIDE, 7.0), (2.0, 2.0), (4.0, 4.0)]
+    items = [FAR, (INSIDE, 7.1), (INSIDE, 5.1), (2.2, 2.0), (1.95, 2.0), (4.1, 4.0)]
+    world = build(robots, items, n_requests=2)
+    state = world.state
+    assert state.open_requests.tolist() == [0, 1]
+    steps(world, HOLD, HOLD, STAY, STAY)
+    # Item 1 was asked for; then item 2, which was inside, and item 3.
+    assert state.delivered_by == [1, 0]
+    assert (state.open_requests.tolist(), state.requested) == ([0, 3], 0)
+    rows = steps(world, STAY, STAY, HOLD, HOLD)
+    assert state.robot_item.tolist() == [NOBODY, NOBODY, 3, 5]  # 3 before the nearer item 4
+    assert rows[:, row.CARRYING_REQUESTED].tolist() == [0.0, 0.0, 1.0, 0.0]
+    steps(world, STAY, STAY, OPEN, STAY)
+    rows = steps(world, STAY, STAY, STAY, STAY)
+    asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
+    assert sorted(rows[2, [asked, asked + row.ITEM_WIDTH]].tolist()) == [0.0, 1.0]
+
+
+def test_requests_end_with_the_items(build: Build) -> None:
+    world = build([(INSIDE, 5.0)], [(INSIDE, 5.1), (INSIDE, 4.9)], n_requests=2)
+    for left in ([1, NOBODY], [NOBODY] * 2):
+        assert not world.all_delivered
+        steps(world, HOLD)
+        assert world.state.open_requests.tolist() == left
+    assert world.all_delivered
+
+
+def test_an_item_that_is_asked_for_twice_is_delivered_twice_unless_it_leaves_for_good(
+    build: Build,
+) -> None:
+    items = [(INSIDE, 5.1), FAR]
+    world = build([(INSIDE, 5.0)], items, n_requests=2, restock=True, pickup_range=0.3)
+    state = world.state
+    state.open_requests[:] = 0
+    steps(world, HOLD)
+    assert (state.delivered, state.open_requests.tolist()[0]) == (1, 0)
+    state.open_requests[:] = 0
+    world.change(restock=False, pickup_range=14.0)
+    steps(world, HOLD)
+    assert (state.delivered, state.open_requests.tolist()) == (2, [1, NOBODY])
+
+
+@pytest.mark.parametrize("handling_time", [0.0, 0.4])
+def test_the_dock_counts_the_oldest_request_first_and_the_others_wait(
+    build: Build, handling_time: float
+) -> None:
+    heights = (3.0, 5.0, 7.0)
+    items = [(INSIDE, y + 0.1) for y in reversed(heights)]
+    robots = [(INSIDE, y) for y in heights]
+    timed = {"handling_time": handling_time, "dock_capacity": 2.0}
+    world = build(robots, items, n_requests=3, **timed)
+    steps(world, HOLD, HOLD, HOLD, times=30)
+    state = world.state
+    assert state.delivered_by == [2, 1, 0]
+    assert np.diff(state.delivery_times) == pytest.approx([0.5, 0.5])
+    assert (state.robot_item == NOBODY).all()
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"n_requests": 61}, "n_requests = 61: should be at most n_items = 60"),
+        ({"n_requests": 0}, "Scenario.n_requests = 0: should be greater than 0"),
+        ({"dock_capacity": 10.1}, "dock_capacity = 10.1: should be at most .* 10 per second"),
+        ({"dock_capacity": 0.0}, "Scenario.dock_capacity = 0.0: should be greater than 0"),
+        ({"handling_time": -1.0}, "Scenario.handling_time = -1.0: should be greater than or"),
+        ({"demand": "random"}, "Scenario.demand = 'random'"),
+    ],
+)
+def test_what_cannot_be_is_refused(fields: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ScenarioError, match=complaint):
+        Scenario(**fields)
+
+
+def test_robots_of_the_preset_realistic_take_their_time() -> None:
+    assert Scenario.preset("realistic").handling_steps == 10
+    assert Scenario().handling_steps == 0
+
+
+def requests_of(demand: str, seed: int, n_items: int, count: int) -> list[int]:
+    """Return the first requests of a world whose items come back, by a plain computation."""
+    if demand == "closed":
+        keys = row_keys(seed, "requests 0", n_items)
+        cycles = range(count // n_items + 1)
+        drawn = [np.argsort([uniform(one, c) for one in keys], kind="stable") for c in cycles]
+        return [int(item) for cycle in drawn for item in cycle][:count]
+    ranks = np.arange(1.0, n_items + 1.0)
+    shares = np.cumsum(1.0 / ranks if demand == "zipf" else np.ones(n_items))
+    own = np.array([key(seed, "demand")], np.uint64)
+    draws = np.array([uniform(own[0], number) for number in range(count)])
+    return [int(item) for item in np.searchsorted(shares / shares[-1], draws, side="right")]
+
+
+@settings(max_examples=12, deadline=None)
+@given(data=st.data(), seed=st.integers(0, 2**32))
+def test_random_worlds_keep_their_items_their_order_and_their_bits(
+    data: st.DataObject, seed: int
+) -> None:
+    draw = data.draw
+    n_items = draw(st.integers(2, 12))
+    demands: list[Literal["closed", "independent", "zipf"]] = ["closed", "independent", "zipf"]
+    demand = draw(st.sampled_from(demands))
+    capacity = draw(st.sampled_from([None, 0.5, 1.0, 3.0, 10.0]))
+    scenario = Scenario(
+        n_robots=6, n_items=n_items, n_requests=draw(st.integers(1, n_items)), demand=demand,
+        dock_capacity=capacity, handling_time=draw(st.sampled_from([0.0, 0.05, 0.5, 1.0])),
+        warehouse_width=3.0, warehouse_height=2.0, delivery_width=1.2, restock=True,
+    )  # fmt: skip
+    modes = draw(st.lists(st.sampled_from(["dead", "FM2", "FM4", "removed"]), max_size=2))
+    faults = [Fault(mode, 1, 5.0 * (n + 1)) for n, mode in enumerate(modes)]
+    world, same = Warehouse(scenario), Warehouse(scenario)
+    rows, watch, state = world.reset(seed, faults), Watch(world), world.state
+    same_rows, drawn = same.reset(seed, faults), requests_of(demand, seed, n_items, 1000)
+    policy = policies.load("central")
+    start(policy, scenario, seed)
+    for step in range(150):
+        watch.look()
+        commands = decide(policy, rows, state)
+        rows, same_rows = world.step(commands), same.step(commands)
+        np.testing.assert_array_equal(rows, same_rows)
+        if step == 70:
+            same = pickle.loads(pickle.dumps(same))
+        asked = drawn[: scenario.n_requests + state.delivered]
+        assert state.open_requests[-1] == asked[-1]
+        left = iter(asked)
+        assert all(item in left for item in state.open_requests)  # in the order of the draws
+    times = np.array(state.delivery_times)
+    if capacity is not None:
+        assert (np.diff(times) >= 1.0 / capacity - 1e-6).all()
+        within = [((times >= t - 1e-6) & (times < t + 1.0 - 1e-6)).sum() for t in times]
+        assert max(within, default=0) <= max(capacity, 1.0)
+
+
+def test_how_requests_are_drawn_changes_no_other_stream() -> None:
+    fields: list[dict[str, Any]] = [
+        {},
+        {"demand": "zipf"},
+        {"n_requests": 4, "dock_capacity": 1.0},
+        TIMED,
+    ]
+    worlds = [Warehouse(Scenario(sensor_dropout=0.2, ranger_noise=0.1, **each)) for each in fields]
+    starts = [world.reset(3) for world in worlds]
+    asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
+    for rows in starts:
+        rows[:, asked : row.NEIGHBOURS : row.ITEM_WIDTH] = 0.0
+        np.testing.assert_array_equal(rows, starts[0])
+    moved = [world.step(np.full((25, 4), [1.0, 0.3, 0.1, 0.0])) for world in worlds]
+    for rows in moved:
+        rows[:, asked : row.NEIGHBOURS : row.ITEM_WIDTH] = 0.0
+        np.testing.assert_array_equal(rows, moved[0])
+
+
+def test_zipf_asks_for_the_first_items_most_often() -> None:
+    counts = np.bincount(requests_of("zipf", 1, 10, 4000), minlength=10)
+    assert counts / 4000 == pytest.approx(
+        1 / np.arange(1, 11) / (1 / np.arange(1, 11)).sum(), abs=0.03
+    )
