@@ -19,7 +19,6 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.spi.ratio import RatioTest, paired_ratio
 from swarm_logistics_env.spi.stalls import at_stake
 from swarm_logistics_env.studies.specification import looks_up_to
-from swarm_logistics_env.studies.until_clear import SPENDING
 
 STUDIES = 10_000
 STALL_STUDIES = 3_000
@@ -128,7 +127,7 @@ def wrong_verdicts(
     p_o, p_new = draw(np.random.default_rng(len(looks)), (studies, looks[-1]), mean_f)
     running = np.ones(studies, dtype=bool)
     above = below = 0
-    for n, level in zip(looks, spi.look_alphas(looks, alpha, spending=SPENDING)):
+    for n, level in zip(looks, spi.look_alphas(looks, alpha)):
         t = _t_statistic(p_o[:, :n], p_new[:, :n], truth)
         # p is the largest of several, so that the others are asked only where the t test rejects.
         asked = np.flatnonzero(running & (2 * stdtr(n - 1, -np.abs(t)) < level))

@@ -15,7 +15,7 @@ from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, Answer, digest
 from swarm_logistics_env.report.section import WORDS, Section
 from swarm_logistics_env.report.write import section_markdown
-from swarm_logistics_env.spi.verdict_signs import SIGNS
+from swarm_logistics_env.spi.estimate import SIGNS
 
 _PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
 _COLOURS = {word: SIGNS[verdict].colour for verdict, word in WORDS.items()}

@@ -9,8 +9,8 @@ from importlib.metadata import version
 
 from pydantic import JsonValue
 
-from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
+from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped

@@ -21,7 +21,6 @@ from swarm_logistics_env.studies.fault_measures import (
     window_of,
 )
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.until_clear import SPENDING
 from swarm_logistics_env.studies.verdict import grouped
 
 from . import drawing, section
@@ -100,7 +99,7 @@ def _may_fail(one: ModeBudget) -> str:
 def look_section(results: StudyResults) -> Section:
     """Return the looks of a study that runs until it is clear, and what stopped at each."""
     stopped = Counter(test.stopped_at for test in results.verdicts if test.stopped_at)
-    alphas = spi.look_alphas(results.looks, 1 - CONFIDENCE, spending=SPENDING)
+    alphas = spi.look_alphas(results.looks, 1 - CONFIDENCE)
     return Section.table(
         "Looks, until it is clear",
         list(zip(results.looks, alphas)),

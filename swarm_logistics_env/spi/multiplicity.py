@@ -1,19 +1,22 @@
-"""Error control over a declared family of verdicts (Holm 1979)."""
+"""Error control over a declared family of verdicts, and over looks at a growing study."""
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .equivalence import Equivalence
 from .estimate import Estimate, Verdict
-from .inputs import IndicatorError, Numbers, numbers
+from .inputs import IndicatorError, Numbers, between_0_and_1, count, numbers
 
 
 def holm(p_values: ArrayLike) -> Numbers:
-    """Holm's adjusted p-values, in the order given, shape (k,).
+    """Holm's (1979) adjusted p-values, in the order given, shape (k,).
 
     Rejecting where the adjusted p < alpha keeps the chance of any false rejection in the family
     below alpha, whatever the dependence.
@@ -60,3 +63,70 @@ def adjusted_p_values(estimates: Sequence[Estimate | Equivalence]) -> tuple[floa
         holm([1.0 if e.p_value is None else e.p_value for e in estimates if not e.identical])
     )
     return tuple(None if e.identical else float(next(adjusted)) for e in estimates)
+
+
+_REACH = 9.0  # standard deviations that the integration grid covers
+_GRID = 801  # its points: the boundaries are then right to five digits
+
+
+def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
+    """Two-sided p below which to stop at each declared look, in order.
+
+    Alpha is spent on both sides in proportion to the seeds (Lan and DeMets 1983; Kim and DeMets
+    1987), so that clear cases stop early. A single look gives (alpha,).
+
+    Args:
+        looks: Numbers of seeds at which the study is looked at, rising.
+        alpha: Chance of any false verdict over all looks, in (0, 1).
+
+    Raises:
+        IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1).
+    """
+    between_0_and_1("alpha", alpha)
+    seeds = [count("look", look) for look in looks]
+    if not seeds or any(later <= earlier for earlier, later in pairwise(seeds)):
+        raise IndicatorError(f"looks = {tuple(looks)}: should be rising numbers of seeds")
+    return _boundaries(tuple(seeds), alpha)
+
+
+@functools.lru_cache(maxsize=256)
+def _boundaries(seeds: tuple[int, ...], alpha: float) -> tuple[float, ...]:
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    # The sum process is Brownian motion on [0, 1]; `density` is that of paths not stopped so far,
+    # on the points of the last look, where they start.
+    points, density, weights = np.zeros(1), np.ones(1), np.ones(1)
+    alphas, information, spent = [], 0.0, 0.0
+    for look in seeds:
+        now = look / seeds[-1]
+        step = math.sqrt(now - information)
+        to_spend = alpha * now - spent
+
+        def stopped(
+            boundary: float,
+            to_spend: float = to_spend,
+            step: float = step,
+            start: Numbers = points,
+            mass: Numbers = weights * density,
+        ) -> float:
+            """Chance of a first crossing here, over both sides, less what may be spent."""
+            return 2.0 * float((mass * ndtr((start - boundary) / step)).sum()) - to_spend
+
+        reach = _REACH * math.sqrt(now)
+        boundary = reach if stopped(reach) >= 0.0 else float(brentq(stopped, 0.0, reach))
+        alphas.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
+        start, mass = points, weights * density
+        points = np.linspace(-boundary, boundary, _GRID)
+        steps = (points[:, np.newaxis] - start) / step
+        density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
+        weights = _simpson(points)
+        information, spent = now, spent + to_spend
+    return tuple(alphas)
+
+
+def _simpson(points: Numbers) -> Numbers:
+    weights = np.full(points.size, 2.0)
+    weights[1::2] = 4.0
+    weights[[0, -1]] = 1.0
+    return weights * (float(points[1] - points[0]) / 3.0)

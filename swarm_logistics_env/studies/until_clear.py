@@ -24,7 +24,6 @@ from .runs import Outcomes
 from .verdict import Cell, Level, Verdict, grouped, judge_one
 
 MOST_SEEDS = 200
-SPENDING: spi.Spending = "linear"
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ class _Looks:
 
     def alpha(self, look: int, alpha: float) -> float:
         """Return what is spent of an error up to a look, counted from 0."""
-        return spi.look_alphas(self.declared, alpha, spending=SPENDING)[look]
+        return spi.look_alphas(self.declared, alpha)[look]
 
 
 class _Family:

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from swarm_logistics_env.spi.ratio import paired_ratio
-from swarm_logistics_env.spi.unpaired import Term, unpaired_ratio
+from swarm_logistics_env.spi.ratio import Term, paired_ratio, unpaired_ratio
 
 STUDIES = 10_000
 CHUNK = 500  # studies whose resamples fit into memory at once

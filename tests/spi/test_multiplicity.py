@@ -64,3 +64,27 @@ def test_identical_runs_stand_outside_the_family() -> None:
     same = spi.robustness(p_o, p_o, n=25, m=1, identical=True)
     assert spi.adjusted_p_values([same, close, same]) == (None, close.p_value, None)
     assert spi.adjust([same, close])[0] == "inconclusive"
+
+
+def test_looks_keep_the_error_that_peeking_inflates() -> None:
+    from scipy.special import ndtr
+
+    looks = (5, 12, 20)
+    steps = np.random.default_rng(7).normal(size=(100_000, 20)).cumsum(axis=1)
+    p = 2 * ndtr(-np.abs(steps[:, [look - 1 for look in looks]] / np.sqrt(looks)))
+    alphas = spi.look_alphas(looks)
+    crossed = np.logical_or.accumulate(p < np.array(alphas), axis=1).mean(axis=0)
+    # Alpha is spent in proportion to the seeds.
+    assert crossed == pytest.approx(0.05 * np.array(looks) / 20, abs=0.002)
+    assert (p < 0.05).any(axis=1).mean() > 0.1
+    assert alphas[0] == pytest.approx(0.05 * 5 / 20)
+    assert spi.look_alphas((20,), alpha=0.1) == pytest.approx((0.1,))
+
+
+@pytest.mark.parametrize(
+    ("looks", "alpha", "words"),
+    [*((looks, 0.05, "look") for looks in ((), (0, 10), (10, 10), (20, 10))), ((10,), 5, "alpha")],
+)
+def test_looks_that_cannot_be(looks: tuple[int, ...], alpha: float, words: str) -> None:
+    with pytest.raises(IndicatorError, match=words):
+        spi.look_alphas(looks, alpha)
