@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NoReturn
 
-from .equivalence import Equivalence, equivalence
-from .estimate import Estimate, Options, Verdict
-from .indicators import (
-    FaultBudget,
+from .definitions import (
     adaptability,
-    fault_budget,
     fault_tolerance,
     relative_change,
     robustness,
     scalability,
 )
+from .equivalence import Equivalence, equivalence
+from .estimate import Estimate, Options, Verdict
 from .inputs import IndicatorError
-from .multiplicity import adjust, adjusted_p_values, holm, look_alphas
+from .multiplicity import FaultBudget, adjust, adjusted_p_values, fault_budget, holm, look_alphas
 from .power import (
     lower_decile_of_power,
     minimum_detectable_effect,

@@ -23,13 +23,17 @@ from swarm_logistics_env.records import Record
 from .failing_robots import FAILURE_MODES, REMOVED, FailingRobots, RobotFault, failing_rows
 from .parallel_policies import (
     Env,
+    Gain,
     RandomActions,
+    SumOfRewards,
     Value,
     agent_actions,
     agents_by_row,
+    in_words,
+    name_of,
     observation_rows,
+    performance_of,
 )
-from .performance import Gain, SumOfRewards, in_words, name_of, performance_of
 from .task import Case, Fields, Outcome, TaskScenario
 
 # These files decide what a run in somebody else's environment gives.
@@ -38,8 +42,6 @@ ENVIRONMENT_SOURCES = (
     "tasks/failing_robots.py",
     "tasks/parallel_policies.py",
     "tasks/parallel_task.py",
-    "tasks/performance.py",
-    "tasks/tuple_env.py",
 )
 _environments: dict[str, str] = {}
 

@@ -41,7 +41,7 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
     view_of,
 )
-from swarm_logistics_env.train.training import Training, follow_progress, make_worlds
+from swarm_logistics_env.train.training import Training, make_worlds
 
 CHECKPOINT_EVERY = 20.0  # seconds
 
@@ -199,7 +199,6 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         # The first layer's weights hold those of `learn_inputs`; `make_learner` keeps the others.
         linears(policy)[0].weight.requires_grad_(is_free)
         done = min(1.0, self.num_timesteps / self._training.agent_steps)
-        follow_progress(self._view.venv, done)
         floor = self._training.ppo.floor(done)
         with torch.no_grad():
             policy.log_std.clamp_(min=math.log(floor))
@@ -237,7 +236,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         card = _card(training, self.num_timesteps, log)
         means = evaluate(
             LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads
-        ).means()
+        )
         row = {
             "agent_steps": self.num_timesteps,
             "seconds": round(self._before + time.monotonic() - self._start, 1),

@@ -169,7 +169,7 @@ def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> Non
     [
         ({}, "gpu", "device = 'gpu': should be 'cpu' or 'cuda'"),
         ({}, "cuda", "device = 'cuda': torch finds no GPU here"),
-        ({"indicators": Indicators(weights={"Q": 1.0})}, "cpu", "no indicator 'Q'"),
+        ({"indicators": Indicators(weights={"Q": 1.0}, references=9.0)}, "cpu", "no indicator 'Q'"),
         ({"start": "homing"}, "cpu", "start = 'homing': should be a trained policy"),
         ({"start": "ppo-delivery"}, "cpu", "start = 'ppo-delivery': its tensors lack .* and have"),
     ],
@@ -259,8 +259,8 @@ def test_a_training_of_some_inputs_goes_on_to_the_same_bits(
         start=str(first),
         learn_inputs=("cannot_lift",),
         conditions=(
-            Conditions(modes=("FM2",), robots=(2,), final_weight=0.5),
-            Conditions(weight=0.1, final_weight=1.0),
+            Conditions(modes=("FM2",), robots=(2,)),
+            Conditions(weight=0.5),
         ),
     )
     whole = train(training, tmp_path / "whole")

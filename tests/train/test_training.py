@@ -73,6 +73,7 @@ def test_potentials_are_discounted_as_the_learner_discounts() -> None:
         ("[[worlds]]\nscenario = { message_size = 2 }", "the network sends no messages"),
         ("[imitation]\nrounds = 1", "Training has no field 'imitation'"),
         ("[ppo]\nleast_deviation = [0.0, 0.1]", "should be greater than 0"),
+        ("[[conditions]]\nweight = 0", "weight = 0: should be greater than 0"),
         ("[[conditions]]\nonset = [9, 1]", "should be the earliest time, then the latest"),
         ("seed = -1", "Training.seed = -1: should be greater than or equal to 0"),
         ("[network]\nhidden = [0]", "hidden"),
