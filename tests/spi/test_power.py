@@ -80,12 +80,6 @@ def test_early_looks_have_a_minimum_detectable_effect() -> None:
     assert (spi.seeds_for_power(two, 0.5) or 0) > (spi.seeds_for_power(few, 0.5) or 0)
 
 
-def test_effects_are_counted_from_the_threshold() -> None:
-    moved = dataclasses.replace(PILOT, threshold=1.0)
-    assert spi.seeds_for_power(moved, 1.2) == spi.seeds_for_power(PILOT, 0.2)
-    assert spi.minimum_detectable_effect(moved) == spi.minimum_detectable_effect(PILOT)
-
-
 def test_no_plan_names_fewer_seeds_than_a_verdict_needs() -> None:
     assert spi.seeds_for_power(PILOT, 1_000.0) == 10
     p_o = np.array([400.0, 410, 395, 402, 399])
@@ -101,6 +95,7 @@ def test_textbook_sample_sizes() -> None:
     assert spi.seeds_for_power(pilot, 0.5) == 34
     assert spi.no_plan_because(pilot, 0.01) is None
     assert spi.seeds_for_power(pilot, 0.01) == pytest.approx(78_489, rel=1e-3)
+    assert spi.seeds_for_power(dataclasses.replace(pilot, threshold=1.0), 1.5) == 34
 
 
 @pytest.mark.parametrize(
@@ -121,16 +116,6 @@ def test_no_number_comes_with_a_reason(pilot: spi.Estimate, effect: float, reaso
     assert reason in (spi.no_plan_because(pilot, effect) or "")
 
 
-def test_unpaired_plan_reaches_80_percent() -> None:
-    pilot = spi.robustness(P_O, rng.poisson(36, 8), n=25, m=2, paired=False)
-    n = spi.seeds_for_power(pilot, 0.15)
-    assert n is not None
-    assert pilot.difference_sd is not None
-    # Large-sample check: (1.96 + 0.84)^2 sd^2 / distance^2, a little more for Student's t.
-    normal = 7.849 * (planned_spread(pilot) / (0.15 * pilot.mean_denominator)) ** 2
-    assert normal < n < normal + 4
-
-
 @pytest.mark.parametrize("power", [0.0, 1.0, 0.02])
 def test_power_out_of_range(power: float) -> None:
     with pytest.raises(IndicatorError, match="power"):
@@ -143,10 +128,10 @@ def test_power_out_of_range(power: float) -> None:
         spi.lower_decile_of_power(PILOT, 0.1, 1)
 
 
-@pytest.mark.parametrize("n_pilot", [5, 10, 20])
+@pytest.mark.parametrize("n_pilot", [5, 15])
 def test_a_promised_power_of_80_percent_is_kept_on_average(n_pilot: int) -> None:
     mean, sd, effect = 40.0, 6.0, 0.08
-    draws = np.random.default_rng(n_pilot).normal(0.0, sd, (400, n_pilot))
+    draws = np.random.default_rng(n_pilot).normal(0.0, sd, (200, n_pilot))
     achieved, least = [], list[float]()
     for difference in draws:
         pilot = spi.relative_change(np.full(n_pilot, mean), mean + difference)
