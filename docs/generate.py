@@ -20,8 +20,8 @@ from swarm_logistics_env.observations import columns, n_columns
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
-from swarm_logistics_env.studies.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns
 from swarm_logistics_env.studies.presets import PRESETS
+from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, Columns
 from swarm_logistics_env.studies.specification import (
     Ablation,
     Faults,

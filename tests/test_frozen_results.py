@@ -16,8 +16,7 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.columns import frame_of_verdicts
-from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.results import StudyResults, frame_of_verdicts, judge
 from swarm_logistics_env.tasks import Outcome
 
 FROZEN = Path(__file__).parent / "frozen"

@@ -15,7 +15,6 @@ import typer
 from swarm_logistics_env.errors import SetupError, TrainingError
 from swarm_logistics_env.train.training import preset_names
 
-from . import planning  # noqa: F401 - adds `study plan`
 from .application import (
     Application,
     FaultOption,
@@ -351,7 +350,7 @@ def list_command(
             )
             for name, plan in plans
         ]
-        line = "swarm-logistics study plan NAME says how long one takes; study run NAME plays it."
+        line = "swarm-logistics study plan NAME prints its conditions; study run NAME plays it."
         show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)
 
 
@@ -369,7 +368,6 @@ app.command("train")(train_command)
 app.command("judge")(judge_command)
 app.command("attack")(attack_command)
 app.command("list")(list_command)
-study.registered_commands.insert(1, study.registered_commands.pop())  # plan, after run
 app.add_typer(study)
 
 

@@ -13,14 +13,7 @@ import typer
 from swarm_logistics_env.errors import StudyError
 
 from .application import TrustPolicyOption
-from .study_commands import (
-    FullOption,
-    ProcessesOption,
-    in_one_line,
-    run_study,
-    show_report,
-    study_of,
-)
+from .study_commands import FullOption, ProcessesOption, run_study, study_of
 
 if TYPE_CHECKING:
     from swarm_logistics_env.studies.results import StudyResults
@@ -144,6 +137,8 @@ def _finish(results: StudyResults, out: Path, *, full: bool) -> None:
     """Print the answer, a sentence for a paper, and what was written."""
     from swarm_logistics_env.report.answer import in_a_sentence
 
+    from .terminal_tables import show_report
+
     show_report(results, out, full=full)
     typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
     typer.echo(f"For a paper: {in_a_sentence(results)}")
@@ -204,6 +199,8 @@ def _judge_policy(
     from swarm_logistics_env.report.section import slug
     from swarm_logistics_env.studies.play import engine_named
     from swarm_logistics_env.studies.specification import FIRST_LOOK
+
+    from .terminal_tables import in_one_line
 
     load(asked, trust_code=trust_code)  # what is wrong with it is said before anything is written
     out = out or Path("results", "judged", slug(called(asked)))

@@ -10,16 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import plain
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.report.document import Document
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.gate import GateAnswer
     from swarm_logistics_env.studies.plan import Shard
     from swarm_logistics_env.studies.play import Engine, Tally
-    from swarm_logistics_env.studies.results import StudyResults
 
 SYMBOLS = tuple(DEFINITIONS)
 StudyArgument = Annotated[
@@ -113,6 +110,8 @@ def run_command(
     from swarm_logistics_env.studies.specification import FIRST_LOOK
     from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
+    from .terminal_tables import in_one_line, show_report
+
     part = Shard.parse(shard) if shard else None
     looks: dict[str, bool] = {}
     if until_clear:
@@ -168,6 +167,45 @@ def _saturated(asked: Study) -> list[str]:
     ]
 
 
+@study.command("plan")
+def plan_command(
+    asked: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE|PRESET|DIR", help="A study; or the directory of one that was run."
+        ),
+    ],
+    policies: PolicyOption = None,
+    seeds: SeedsOption = None,
+    first_seed: FirstSeedOption = None,
+    effect: Annotated[
+        float | None,
+        typer.Option(help="Of a study that was run: assumed indicator; the paper's if not given."),
+    ] = None,
+    trust_code: TrustCodeOption = False,
+) -> None:
+    """Print the conditions and count the runs; of a study that was run, the seeds that it needs."""
+    from swarm_logistics_env.studies import Study
+
+    from .terminal_tables import show_power, show_table
+
+    if Path(asked).is_dir():
+        if policies:
+            raise StudyError("--policy: a study that was run has its own policies")
+        show_power(asked, Study.stored(asked, trust_code=trust_code).findings(), effect)
+        return
+    plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
+    uses: dict[str, list[str]] = {}
+    for _, table, arm in plan.cells:
+        uses.setdefault(arm.case.key, []).append(f"{table} ({arm.setting})")
+    rows = (
+        (case.policy.title, str(case.scenario.n_robots), "; ".join(uses[case.key]))
+        for case in plan.cases
+    )
+    show_table("Conditions", ("policy", "N", "stands in"), rows)
+    typer.echo(plan)
+
+
 @study.command("report")
 def report_command(
     directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
@@ -176,6 +214,8 @@ def report_command(
 ) -> None:
     """Print the answer and write the report of a study again, from its store alone."""
     from swarm_logistics_env.studies import Study
+
+    from .terminal_tables import show_report
 
     stored = Study.stored(directory, trust_code=trust_code)
     typer.echo(f"{stored.plan()}\n")
@@ -304,14 +344,6 @@ def study_of(
     return Study.preset(asked, out=out, **fields)
 
 
-def duration(seconds: float) -> str:
-    """Return a time in words, e.g. "2 h 10 min"."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    hours, minutes = divmod(round(seconds / 60), 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
-
-
 def run_study(
     asked: Study, engine: Engine, shard: Shard | None = None, minutes: float | None = None
 ) -> Tally:
@@ -329,38 +361,3 @@ def run_study(
             err=True,
         )
         raise typer.Exit(130) from None
-
-
-def in_one_line(tally: Tally, players: str) -> str:
-    """Return how many runs `players` have played, in which time."""
-    rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
-    error = plain(tally.error or "")
-    why = f", the first with {error}; study export has each traceback" if error else ""
-    return (
-        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
-        f"were kept from before; {tally.failed} failed{why}"
-    )
-
-
-def show_report(results: StudyResults, out: Path | None, *, full: bool = False) -> Document:
-    """Print the answer of a study, the tables too if `full`, and write its report into `out`."""
-    from swarm_logistics_env.report.answer import answer
-    from swarm_logistics_env.report.document import document
-    from swarm_logistics_env.report.write import (
-        how_to_get_figures,
-        missing_packages,
-        write_report,
-    )
-
-    from .terminal_tables import show, show_answer
-
-    whole = document(results)
-    for section in whole.summary if full else ():
-        show(section)
-    # Printed first: what was found is told even where no file can be written.
-    show_answer(answer(results, most=None) if full else whole.answer, None, whole=full)
-    if out:
-        typer.echo(f"Report: {write_report(results, out, whole)[0]}")
-        if missing := missing_packages():
-            typer.echo(how_to_get_figures(missing))
-    return whole

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.answer import MOST_LINES, Answer, digest
-from swarm_logistics_env.report.section import WORDS, Section
-from swarm_logistics_env.report.write import section_markdown
+from swarm_logistics_env.report.answer import MOST_LINES, Answer, answer, digest
+from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.section import NOTHING, WORDS, Section, number
+from swarm_logistics_env.report.write import (
+    how_to_get_figures,
+    missing_packages,
+    section_markdown,
+    write_report,
+)
 from swarm_logistics_env.spi.estimate import SIGNS
+from swarm_logistics_env.studies.play import Tally
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import POWER, Verdict
 
 _PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
 _COLOURS = {word: SIGNS[verdict].colour for verdict, word in WORDS.items()}
@@ -50,16 +62,66 @@ def show_table(
     show(Section(title, tuple(columns), tuple(rows), lines))
 
 
-def show_answer(found: Answer, where: Path | None, *, whole: bool = False) -> None:
+def show_answer(found: Answer, *, whole: bool = False) -> None:
     """Print the answer of a study on one screen, or with every line of it."""
     console = Console(highlight=False)
     width = console.width if console.is_terminal else _PLAIN_WIDTH
-    shown = Text(plain_lines(digest(found, width, where, None if whole else MOST_LINES)))
+    lines = digest(found, width, None if whole else MOST_LINES).split("\n")
+    shown = Text("\n".join(map(plain, lines)))
     for word in _VERDICTS.finditer(shown.plain):
         shown.stylize(_COLOURS[word[1]], *word.span())
     console.print(shown, soft_wrap=True)
 
 
-def plain_lines(text: str) -> str:
-    """Return lines of text without signs that steer a terminal."""
-    return "\n".join(map(plain, text.split("\n")))
+def show_report(results: StudyResults, out: Path | None, *, full: bool = False) -> None:
+    """Print the answer of a study, the tables too if `full`, and write its report into `out`."""
+    whole = document(results)
+    for section in whole.summary if full else ():
+        show(section)
+    # Printed first: what was found is told even where no file can be written.
+    show_answer(answer(results, most=None) if full else whole.answer, whole=full)
+    if out:
+        typer.echo(f"Report: {write_report(results, out, whole)[0]}")
+        if missing := missing_packages():
+            typer.echo(how_to_get_figures(missing))
+
+
+def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
+    """Print the seeds that each comparison of a study needs for an effect, given or published."""
+    n_seeds, margin = len(results.plan.seeds), results.plan.specification.margin
+    columns = (
+        "policy", "verdict on", "assumed effect", f"seeds for {POWER:.0%} power",
+        f"distance that {n_seeds} seeds find", f"seeds for equivalent at {margin:.0%}",
+    )  # fmt: skip
+    hint = f"For another effect: swarm-logistics study plan {shlex.quote(asked)} --effect 0.2"
+    rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
+    show_table(f"Seeds needed, from {n_seeds} seeds", columns, rows, hint)
+
+
+def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
+    # Only the spread is taken from the runs, never the effect that they happened to show.
+    compared, estimate, same = test.compared, test.estimate, test.equivalence
+    seeds = test.problem or "no effect is named"
+    if estimate is not None and effect is not None:
+        seeds = spi.no_plan_because(estimate, effect) or str(
+            spi.seeds_for_power(estimate, effect, POWER)
+        )
+    return (
+        compared.policy,
+        f"{compared.indicator} > {compared.threshold:.3g}, {compared.label}",
+        number(effect),
+        seeds,
+        number(test.detectable),
+        NOTHING if same is None else number(spi.seeds_for_equivalence(same, POWER), 0),
+    )
+
+
+def in_one_line(tally: Tally, players: str) -> str:
+    """Return how many runs `players` have played, in which time."""
+    rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
+    error = plain(tally.error or "")
+    why = f", the first with {error}; study export has each traceback" if error else ""
+    return (
+        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
+        f"were kept from before; {tally.failed} failed{why}"
+    )

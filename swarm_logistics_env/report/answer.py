@@ -6,7 +6,6 @@ import math
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
@@ -263,17 +262,16 @@ def in_a_sentence(results: StudyResults) -> str:
     return f"{', '.join(results.policies)}: {told}."
 
 
-def digest(found: Answer, width: int, where: Path | None, most: int | None = MOST_LINES) -> str:
+def digest(found: Answer, width: int, most: int | None = MOST_LINES) -> str:
     """Return the answer for a terminal.
 
     Args:
         found: to show.
         width: of the terminal [characters]; no line is longer.
-        where: the report; None: there is none.
         most: lines at most; None: as many as it takes.
     """
     head = [line for text in (found.asked, found.performance) for line in _fold(text, width)]
-    tail = _fold(found.last, width) + ([f"Report: {where}"] if where else [])
+    tail = _fold(found.last, width)
     rows = list(_rows(found, width))
     room = None if most is None else most - len(head) - len(tail)
     if room is not None and len(rows) > room:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-
-from pydantic import JsonValue
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
@@ -16,11 +13,10 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
-from .fault_sections import fault_sections, look_section
+from .fault_sections import fault_sections
 from .figures import forest_figure, indicator_figures
-from .policies_compared import policy_sections
-from .section import NOTHING, Figure, Section, sentence
-from .tables import tables, warnings
+from .section import Figure, Section, sentence
+from .tables import policy_sections, tables, warnings
 
 
 @dataclass(frozen=True)
@@ -78,7 +74,6 @@ def document(results: StudyResults) -> Document:
         *(replace(one, figures=()) for one in faults if one.columns or one.lines),
     )
     figures = forest_figure(results, found), *indicator_figures(results)
-    looks = (look_section(results),) if plan.specification.until_clear else ()
     chapters = [
         Chapter("Warnings", "", (Section("", lines=lines),) if lines else ()),
         Chapter(
@@ -98,7 +93,6 @@ def document(results: StudyResults) -> Document:
             'level that the heading gives; "one run" is where a single further run falls.',
             result_tables,
         ),
-        Chapter("Checks", "How far the verdicts hang on the method.", looks),
         Chapter(
             "Policies compared",
             "Side by side, seed by seed; the first policy of the study is the one that the others "
@@ -150,8 +144,8 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
         Section("Study", lines=tuple(_study(plan))),
         Section(
             "Policies",
-            ("policy", "class", "parameters", "source"),
-            tuple((label, *_identified(policies[label])) for label in sorted(policies)),
+            ("policy", "identity"),
+            tuple(sorted(policies.items())),
         ),
         *_failure_modes(plan),
         Section(
@@ -170,36 +164,6 @@ def _study(plan: Plan) -> Iterator[str]:
         f"condition. swarm-logistics-env {version('swarm-logistics-env')}, code version "
         f"{plan.code}."
     )
-    clear = plan.specification.until_clear
-    level = "at the levels of the declared looks." if clear else "2.5 % on each side."
-    yield (
-        f"Performance P is {plan.specification.played.performance}. Intervals of P are "
-        "t-intervals over seeds; those of indicators invert the test, paired by seed. A verdict is "
-        "a paired test against the threshold, from ten seeds on the larger p of Student's t and "
-        f"the studentised bootstrap, below them t alone, one-sided {level}"
-    )
-
-
-def _identified(identity: str) -> tuple[str, str, str]:
-    """Return class, parameters and digest of the source from a policy's identity."""
-    try:
-        told = json.loads(identity)
-    except json.JSONDecodeError:  # a policy's own identity need not be JSON
-        told = None
-    match told:
-        case {"given": given, "policy": str(policy)}:
-            kind, parameters, source = _identified(policy)
-            own = "" if parameters == NOTHING else f"{parameters}; "
-            return kind, f"{own}given: {_listed(given)}", source
-        case {"class": kind, "parameters": parameters, "source": source}:
-            return kind, _listed(parameters) or NOTHING, source
-    return identity, NOTHING, NOTHING
-
-
-def _listed(parameters: JsonValue) -> str:
-    if not isinstance(parameters, dict):
-        return str(parameters)
-    return ", ".join(f"{name} = {value}" for name, value in parameters.items())
 
 
 def _failure_modes(plan: Plan) -> Iterator[Section]:

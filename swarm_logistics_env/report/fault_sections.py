@@ -1,20 +1,15 @@
-"""Sections on measures of faults that the paper does not define, and on the looks of a study."""
+"""Sections on faults in mid-run: measures that the paper does not define."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.comparison import CONFIDENCE, Comparison
+from swarm_logistics_env.studies.comparison import Comparison
 from swarm_logistics_env.studies.fault_measures import (
-    ModeBudget,
     RepairCurve,
     Resilience,
-    anchoring_loads,
-    fault_budgets,
     mid_run_faults,
     rate_curves,
     resiliences,
@@ -26,11 +21,6 @@ from swarm_logistics_env.studies.verdict import grouped
 from . import drawing, section
 from .section import Figure, Section, slug
 
-_LOAD_TEXT = (
-    "Time that working robots spend in contact range of failed ones; in the paired "
-    "run with the same robots removed it is 0. The last column is the load per "
-    "failed robot and second of failure."
-)
 _SINGLE_TEXT = (
     "Until the first window in which a run delivers as much again as the paired run with the "
     "robots removed; those that never do are censored (Kaplan and Meier). Deliveries scatter, so "
@@ -41,83 +31,6 @@ _RATE_DATA = ["panel", "runs", "seconds", "deliveries", "low", "high"]
 
 
 def fault_sections(results: StudyResults) -> Iterator[Section]:
-    """Yield the fault budget, the resilience to faults in mid-run, and the anchoring load."""
-    yield from _budgets(results)
-    yield from _resilience(results)
-    loads = list(anchoring_loads(results))
-    if loads:
-        yield Section.table(
-            "Anchoring load",
-            loads,
-            [
-                ("policy", lambda one: one.compared.policy),
-                ("fault", lambda one: str(one.compared.changed.setting)),
-                ("robot-seconds a run [95 %]", lambda one: section.bracketed(one.load, 1)),
-                ("robots by a failed one [95 %]", lambda one: section.bracketed(one.neighbours, 3)),
-            ],
-            _LOAD_TEXT,
-        )
-
-
-def _budgets(results: StudyResults) -> Iterator[Section]:
-    # A budget that is 0 for every mode tells nothing that R does not tell.
-    budgets = list(fault_budgets(results))
-    if any(one.budget is None or one.budget.robots for one in budgets):
-        yield Section.table(
-            "Fault budget",
-            budgets,
-            [
-                ("policy", lambda one: one.compared.policy),
-                ("failure mode", _mode),
-                ("N", lambda one: str(one.compared.n_robots)),
-                ("m tested", lambda one: ", ".join(map(str, one.tested))),
-                ("robots that may fail", _may_fail),
-            ],
-            "The largest m with R > 0 supported at every m' up to it, tested in order, with "
-            "unadjusted verdicts: the sequence is fixed, so the error stays below 5 %. "
-            f"Over {section.seeds_text(results)}.",
-        )
-
-
-def _mode(one: ModeBudget) -> str:
-    setting = one.compared.changed.setting
-    return setting.name + (f" from {setting.onset:g} s" if setting.onset else "")
-
-
-def _may_fail(one: ModeBudget) -> str:
-    if one.budget is None:
-        return "undefined: a run failed or is missing"
-    robots, limit = one.budget
-    if limit is None:
-        return f"at least {robots}"
-    if limit not in one.tested:
-        return f"{robots} shown; m = {limit} was not tested"
-    # Whether more are refuted or only unknown differs for whoever has to decide.
-    return f"{robots}; m = {limit} {section.said(one.verdict)}"
-
-
-def look_section(results: StudyResults) -> Section:
-    """Return the looks of a study that runs until it is clear, and what stopped at each."""
-    stopped = Counter(test.stopped_at for test in results.verdicts if test.stopped_at)
-    alphas = spi.look_alphas(results.looks, 1 - CONFIDENCE)
-    return Section.table(
-        "Looks, until it is clear",
-        list(zip(results.looks, alphas)),
-        [
-            ("seeds", lambda look: str(look[0])),
-            ("p below, alone", lambda look: f"{look[1]:.4f}"),
-            ("level of intervals", lambda look: section.percent(1 - look[1])),
-            ("stopped here", lambda look: str(stopped[look[0]])),
-        ],
-        "Declared before the first run. Alpha is spent over the looks in proportion to the seeds, "
-        "and Holm's procedure steps down at each look, so that a comparison stops once its verdict "
-        "stands; the intervals hold over all looks together with 95 %.",
-        f"{stopped.total()} of {len(results.verdicts)} comparisons stopped. P and the further "
-        f"measures are over the {len(results.plan.seeds)} seeds that all conditions share.",
-    )
-
-
-def _resilience(results: StudyResults) -> Iterator[Section]:
     """Yield the measures of faults in mid-run, and the curves of what is delivered around them."""
     found = list(resiliences(results))
     if not found:

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
-from swarm_logistics_env.studies.columns import frame_of_verdicts
-from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.results import StudyResults, frame_of_verdicts
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 
 from . import drawing
@@ -49,89 +48,63 @@ def forest_figure(results: StudyResults, found: Answer) -> Figure:
 
 
 def indicator_figures(results: StudyResults) -> Iterator[Figure]:
-    """Yield S per step, FT and R per mode and m, A per parameter, and P without a part."""
-    for table, tests in grouped(_asked(results, "size"), lambda t: t.compared.table).items():
-        panels = _panels(results, tests, "swarm size N → N + m")
-        title = f"{_policies(tests)}, {table}: {_caption(tests, 'per step in N')}"
-        yield _interval_figure(results, (table,), title, tests, panels)
-    yield from _faults(results)
-    tests = _asked(results, "parameter")
-    if tests:
-        panels = [
-            panel
-            for (table, name), here in grouped(
-                tests, lambda t: (t.compared.table, t.compared.changed.setting.name)
-            ).items()
-            for panel in _panels(results, here, f"{name}, x_o → x_new", table)
-        ]
-        title = f"{_policies(tests)}: {_caption(tests, 'per parameter')}"
-        yield _interval_figure(results, (), title, tests, panels)
-    asked = [t for t in results.verdicts if t.compared.changed.setting.kind == "policy"]
-    for table, tests in grouped(asked, lambda t: t.compared.table).items():
-        # 0 first: it is the threshold that always stands in the picture.
-        thresholds = tuple(dict.fromkeys([0.0, *(t.compared.threshold for t in tests)]))
-        title = (
-            f"{_policies(tests)}, {table}: relative change of P where another policy takes its "
-            "place, (P_new - P_o) / P_o; below a threshold P falls by more than that share."
-        )
-        panels = _panels(results, tests, "in its place", thresholds=thresholds)
-        yield _interval_figure(results, (table,), title, tests, panels)
+    """Yield S per step, FT and R per mode and m, A per value, and P without a part."""
 
+    def place(test: Verdict) -> tuple[str, Factor, float, int]:
+        after, by_fault = test.after, test.after.kind == "fault"
+        return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
 
-def _faults(results: StudyResults) -> Iterator[Figure]:
-    def place(test: Verdict) -> tuple[str, float, int]:
-        compared = test.compared
-        return compared.table, compared.changed.setting.onset, compared.n_robots
-
-    for (table, onset, swarm), tests in grouped(_asked(results, "fault"), place).items():
+    for (table, _, onset, swarm), tests in grouped(_once(results), place).items():
         start = f", faults from {onset:g} s" if onset else ""
-        title = (
-            f"{_policies(tests)}, {table}, N = {swarm}{start}: "
-            f"{_caption(tests, 'per failure mode and number m of faulty robots')}"
-        )
-        several = len({test.compared.policy for test in tests}) > 1
-        x_label = "failure mode and number m of faulty robots" if several else "failure mode"
+        where = f"{table}, N = {swarm}{start}" if swarm else table
         names = table, f"{onset:g}s" if onset else ""
-        panels = _panels(results, tests, x_label, by_m=not several)
-        yield _interval_figure(results, names, title, tests, panels)
+        crosses = "; crosses: published" if any(t.published is not None for t in tests) else ""
+        caption = f"{listed(list(dict.fromkeys(t.compared.policy for t in tests)))}, {where}: "
+        caption += f"{_caption(tests)} {seeds_text(results).capitalize()}. {_MARKS}{crosses}."
+        panels = [_panel(results, tests, definition) for definition in _definitions(tests)]
+        yield Figure(
+            slug(*(definition.symbol for definition in _definitions(tests)), *names),
+            caption + _capped(tests),
+            frame_of_verdicts(tests)[_COLUMNS],
+            0.5 + 2.5 * len(panels),
+            partial(drawing.intervals, panels=panels),
+        )
+
+
+def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definition) -> Panel:
+    """Return a pair of axes for an indicator, a series a policy."""
+    here = [test for test in tests if test.compared.indicator == definition.symbol]
+    after, first = here[0].after, here[0].compared.policy
+    points = tuple(
+        _point(
+            test,
+            results.policies.index(policy := test.compared.policy),
+            _category(test),
+            # The published values stand beside the first policy.
+            test.published if policy == first else None,
+            policy,
+        )
+        for test in here
+    )
+    # 0 first: it is the threshold that always stands in the picture.
+    thresholds = {0.0: None, **dict.fromkeys(definition.adjectives)}
+    thresholds |= dict.fromkeys(test.compared.threshold for test in here)
+    x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else _X_LABELS[after.kind]
+    return Panel("", definition.heading, points, tuple(thresholds), x_label)
+
+
+_X_LABELS = {
+    "size": "swarm size N → N + m",
+    "fault": "failure mode and number m of faulty robots",
+    "policy": "in its place",
+}
 
 
 def _category(test: Verdict) -> str:
-    before, after = test.compared.original.setting, test.compared.changed.setting
+    before, after = test.compared.original.setting, test.after
     if after.kind == "fault":
         return f"{after.name} {after.value:g}"
     return test.compared.label if after.kind == "policy" else f"{before.value:g}→{after.value:g}"
-
-
-def _panels(
-    results: StudyResults,
-    tests: Sequence[Verdict],
-    x_label: str,
-    title: str = "",
-    thresholds: tuple[float, ...] = (),
-    *,
-    by_m: bool = False,
-) -> list[Panel]:
-    """Return a pair of axes for each indicator: a series a policy or, of one policy, an m."""
-    found = []
-    numbers = sorted({test.compared.changed.setting.value for test in tests})
-    for definition in _definitions(tests):
-        points = []
-        for test in tests:
-            if test.compared.indicator != definition.symbol:
-                continue
-            setting, policy = test.compared.changed.setting, test.compared.policy
-            # The published values stand beside the first policy.
-            published = test.published if policy == tests[0].compared.policy else None
-            if by_m:
-                style, series, category = numbers.index(setting.value), "", setting.name
-                series = f"m = {setting.value:g}"
-            else:
-                style, series, category = results.policies.index(policy), policy, _category(test)
-            points.append(_point(test, style, category, published, series))
-        above = thresholds or tuple(definition.adjectives)
-        found.append(Panel(title, definition.heading, tuple(points), above, x_label))
-    return found
 
 
 def _point(
@@ -151,24 +124,6 @@ def _point(
     )
 
 
-def _interval_figure(
-    results: StudyResults,
-    names: tuple[str, ...],
-    caption: str,
-    tests: Sequence[Verdict],
-    panels: Sequence[Panel],
-) -> Figure:
-    """Return the figure of indicators with their intervals."""
-    crosses = "; crosses: published" if any(t.published is not None for t in tests) else ""
-    return Figure(
-        slug(*(definition.symbol for definition in _definitions(tests)), *names),
-        f"{caption} {seeds_text(results).capitalize()}. {_MARKS}{crosses}.{_capped(tests)}",
-        frame_of_verdicts(tests)[_COLUMNS],
-        0.5 + 2.5 * len(panels),
-        partial(drawing.intervals, panels=panels),
-    )
-
-
 _CAPPED = " †: P is capped, every item was delivered in a run."
 
 
@@ -181,27 +136,25 @@ def _definitions(tests: Sequence[Verdict]) -> list[Definition]:
     return [definition for symbol, definition in DEFINITIONS.items() if symbol in asked]
 
 
-def _policies(tests: Sequence[Verdict]) -> str:
-    return listed(list(dict.fromkeys(test.compared.policy for test in tests)))
-
-
-def _caption(tests: Sequence[Verdict], per: str) -> str:
-    """Return what a figure shows, e.g. "robustness R per failure mode; above 0 robust."."""
+def _caption(tests: Sequence[Verdict]) -> str:
+    """Return what a figure shows, e.g. "robustness R; above 0 robust."."""
     definitions = _definitions(tests)
     above: dict[float, list[str]] = {}
     for definition in definitions:
         for threshold, adjective in definition.adjectives.items():
             above.setdefault(threshold, []).append(adjective)
     says = ", ".join(f"above {threshold:g} {', '.join(says)}" for threshold, says in above.items())
-    return f"{listed([definition.heading for definition in definitions])} {per}; {says}."
+    if not says:
+        says = "(P_new - P_o) / P_o; below a threshold P falls by more than that share"
+    return f"{listed([definition.heading for definition in definitions])}; {says}."
 
 
-def _asked(results: StudyResults, factor: Factor) -> list[Verdict]:
-    """Return each indicator of a factor once: that asked against the lowest threshold."""
-    of = [t for t in results.verdicts if t.compared.changed.setting.kind == factor]
+def _once(results: StudyResults) -> list[Verdict]:
+    """Return each value once: that asked against the lowest threshold."""
 
     def same(test: Verdict) -> tuple[str, str, str, str]:
         compared = test.compared
         return compared.policy, compared.table, compared.indicator, compared.label
 
-    return [min(tests, key=lambda t: t.compared.threshold) for tests in grouped(of, same).values()]
+    alike = grouped(results.verdicts, same).values()
+    return [min(tests, key=lambda t: t.compared.threshold) for tests in alike]

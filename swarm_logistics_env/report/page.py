@@ -23,7 +23,6 @@ from swarm_logistics_env.warehouse.fault_text import text_of
 
 from .answer import Answer
 from .section import sentence
-from .tables import by_factor
 
 Json: TypeAlias = dict[str, JsonValue]
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
@@ -160,22 +159,21 @@ def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterato
     """Yield P of every policy in the conditions of each table, on one axis."""
     shown = [cell for cell in results.cells if cell.arm.setting.kind != "policy"]
     for table, here in grouped(shown, lambda cell: cell.table).items():
-        rows = by_factor(here)  # one failure mode after the other, as in the tables
-        categories = list(dict.fromkeys(str(row.arm.setting) for row in rows))
+        categories = list(dict.fromkeys(row.words for row in here))
         yield {
             "name": f"P: {table}",
-            "y": f"performance P over {_over(rows[0].arm)}",
+            "y": f"performance P over {_over(here[0].arm)}",
             "thresholds": [],
             "categories": [_short(one) for one in categories],
             "points": [
                 {
                     "policy": row.policy,
-                    "at": categories.index(str(row.arm.setting)),
+                    "at": categories.index(row.words),
                     **_limits(row.mean),
                     "published": _number(row.published),
                     "condition": places[row.arm.case.key],
                 }
-                for row in rows
+                for row in here
                 if row.n_seeds
             ],
         }

@@ -14,7 +14,7 @@ from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.specification import seeds_in_words
-from swarm_logistics_env.studies.verdict import POWER, Cell, Verdict
+from swarm_logistics_env.studies.verdict import Cell, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,6 +33,20 @@ WORDS = {
     "inconclusive": "open",
     "unaffected": UNAFFECTED,
     "blocked": "undefined",
+}
+FLAGS = {
+    "single_seed": "One seed gives a value, but no interval and no verdict",
+    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
+    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
+    "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
+    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
+    "so it is open",
+    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
+    "the verdict comes from the test",
+    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
+    "ten, or unpaired",
+    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
+    "its level says",
 }
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 Row = TypeVar("Row")
@@ -136,26 +150,20 @@ def percent(confidence: float) -> str:
     return "> 99.99 %" if confidence > 0.9999 else f"{100 * confidence:.4g} %"
 
 
-def p_text(p: float) -> str:
-    """Return a p-value, e.g. "0.013" or "< 0.001"."""
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"
-
-
 def mean_p(cell: Cell) -> str:
     """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
         return "no run"
-    return bracketed(cell.mean, digits_of(cell.mean.value)) + mark(cell)
-
-
-def mark(row: Cell | Verdict) -> str:
-    """Return the sign of a P that is capped, or of what rests on it."""
-    return SATURATED if row.saturated else ""
+    return bracketed(cell.mean, digits_of(cell.mean.value)) + SATURATED * cell.saturated
 
 
 def ratio(test: Verdict) -> str:
     """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
-    return NOTHING if test.interval is None else bracketed(test.interval, 3) + mark(test)
+    return (
+        NOTHING
+        if test.interval is None
+        else bracketed(test.interval, 3) + SATURATED * test.saturated
+    )
 
 
 def said(verdict: str | None) -> str:
@@ -224,7 +232,8 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         return
     found = limits(estimate, 3)
     level = f", {percent(estimate.confidence)} interval {found}" if found else " (no interval)"
-    yield f"{indicator}{mark(test)} = {fixed(estimate.value, 3)}{level} over {seeds}."
+    capped = SATURATED * test.saturated
+    yield f"{indicator}{capped} = {fixed(estimate.value, 3)}{level} over {seeds}."
     # One seed gives no p, and Holm's placeholder of 1 says nothing.
     adjusted_p = None if estimate.p_value is None else test.p_holm
     yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"
@@ -238,19 +247,9 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         adjusted = "" if same == holm else f" ({holm} under Holm)"
         change = bracketed(test.equivalence.change, 3)
         yield f"{test.unchanged}? Change {change}: {same}{adjusted}."
-    if "inconclusive" in (test.answer, test.answer_holm):
-        yield from _what_it_takes(test, estimate)
-    if estimate.pairing_correlation is not None:
-        yield f"Pairing correlation {estimate.pairing_correlation:.2f}."
-    if "assumes_normal" in test.flags:
-        yield "The verdict assumes normal differences."
+    yield from (f"{FLAGS[flag]}." for flag in test.flags)
     if "hidden_stalls" in test.flags:
-        yield (
-            "No verdict, as stalled runs that these seeds did not show could turn it: it needs at "
-            f"least {spi.seeds_against_stalls(estimate)} seeds."
-        )
-    if "skewed" in test.flags:
-        yield "Skewed: at so few seeds the verdict errs more often than its level."
+        yield f"It needs at least {spi.seeds_against_stalls(estimate)} seeds."
     if results.plan.specification.until_clear:
         where = "Open after" if test.stopped_at is None else "Clear at"
         yield f"{where} {estimate.n_seeds} of at most {results.looks[-1]} seeds."
@@ -273,20 +272,7 @@ def _conditions(test: Verdict) -> str:
 
 
 def _p(p: float | None) -> str:
+    """Return a p-value in brackets, e.g. " (p = 0.013)"; empty: there is none."""
     if p is None:
         return ""
-    text = p_text(p)
-    return f" (p {text})" if text.startswith("<") else f" (p = {text})"
-
-
-def _what_it_takes(test: Verdict, estimate: Estimate) -> Iterator[str]:
-    if test.detectable is not None:
-        yield (
-            f"{estimate.n_seeds} seeds find an effect {test.detectable:.3f} away from "
-            f"{test.compared.threshold:.3g} with {100 * POWER:.0f} % power, unadjusted."
-        )
-    if test.seeds_needed is not None:
-        least = ""
-        if test.least_power is not None:
-            least = f" ({test.least_power:.0%} power or more in nine pilots of ten)"
-        yield f"The published value {test.published:.3f} needs {test.seeds_needed} seeds{least}."
+    return " (p < 0.001)" if p < 0.001 else f" (p = {p:.3f})"

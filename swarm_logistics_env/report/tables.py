@@ -1,12 +1,19 @@
-"""Tables of results, claims and agreement with published values, and the warnings."""
+"""Tables of results, claims, agreement with published values, policies side by side; warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparison import CONFIDENCE
-from swarm_logistics_env.studies.policy_comparison import Agreement, agreements
+from swarm_logistics_env.studies.policy_comparison import (
+    Agreement,
+    CellAgainstBaseline,
+    IndicatorAgainstBaseline,
+    agreements,
+    cells_against_baseline,
+    indicators_against_baseline,
+)
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
@@ -14,63 +21,32 @@ from . import section
 from .section import NOTHING, Section
 
 CellColumn = tuple[str, Callable[[Cell], str]]
-_MOST_MISSES = 8  # more are no list that anybody reads
-_FLAGS = {
-    "single_seed": "One seed gives a value, but no interval and no verdict",
-    "identical": "Both conditions gave the same runs, so the value is exact, but it is no evidence "
-    "and stands outside Holm's family",
-    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
-    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
-    "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
-    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
-    "so it is open",
-    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
-    "the verdict comes from the test",
-    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
-    "ten, or unpaired",
-    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
-    "its level says",
-}
 
 
 def tables(results: StudyResults) -> Iterator[Section]:
-    """Yield the tables of a study's results, policy by policy."""
-    known = {one.policy: one for one in agreements(results)}
-    for policy, cells in grouped(results.cells, lambda cell: cell.policy).items():
-        tests = [test for test in results.verdicts if test.compared.policy == policy]
-        for table, here in grouped(cells, lambda cell: cell.table).items():
-            asked = [test for test in tests if test.compared.table == table]
-            yield from _tables(f"{policy}: {table}", here, asked)
-        claims = [test for test in tests if test.claim]
-        if claims:
-            yield _claims(f"{policy}: claims", claims)
-        if policy in known:
-            yield _agreement(known[policy])
+    """Yield the tables of a study's results, policy by policy; then how near each comes.
 
-
-def by_factor(cells: Sequence[Cell]) -> list[Cell]:
-    """Return cells of one failure mode (or other factor) together, in order of appearance."""
-    groups = grouped(cells, lambda cell: cell.arm.setting.name)
-    return [cell for here in groups.values() for cell in here]
-
-
-def _tables(title: str, cells: Sequence[Cell], tests: Sequence[Verdict]) -> Iterator[Section]:
-    """Yield a table of P and the first indicator, then one of each further indicator."""
-    published = any(cell.published is not None for cell in cells)
-    rows = by_factor(cells)
-    setting: CellColumn = ("", lambda cell: str(cell.arm.setting))
-    columns = [setting]
-    if published:
-        columns.append(("P paper", _published))
-    columns.append(("P ours [95 %]" if published else "P [95 %]", section.mean_p))
-    columns.append(("one run [95 %]", _one_run))
-    for indicator, asked in grouped(tests, lambda test: test.compared.indicator).items():
-        answers = _answers(indicator, asked, published=published)
-        yield Section.table(title, rows, [*columns, *answers])
-        # P is printed once: the tables of further indicators hold what was asked alone.
-        changed = {test.compared.changed for test in asked}
-        rows = [cell for cell in rows if cell.arm in changed]
-        columns, title = [setting], title.removesuffix(", continued") + ", continued"
+    Each has a table of P and the first indicator, then one of each further indicator.
+    """
+    for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
+        rows = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
+        tests = [test for test in results.verdicts if test.where == (policy, table)]
+        published = any(cell.published is not None for cell in rows)
+        setting: CellColumn = ("", lambda cell: cell.words)
+        columns = [setting]
+        if published:
+            columns.append(("P paper", _published))
+        columns.append(("P ours [95 %]" if published else "P [95 %]", section.mean_p))
+        columns.append(("one run [95 %]", _one_run))
+        title = f"{policy}: {table}"
+        for indicator, asked in grouped(tests, lambda test: test.compared.indicator).items():
+            answers = _answers(indicator, asked, published=published)
+            yield Section.table(title, rows, [*columns, *answers])
+            # P is printed once: the tables of further indicators hold what was asked alone.
+            changed = {test.compared.changed for test in asked}
+            rows = [cell for cell in rows if cell.arm in changed]
+            columns, title = [setting], f"{policy}: {table}, continued"
+    yield from map(_agreement, agreements(results))
 
 
 def _published(cell: Cell) -> str:
@@ -109,74 +85,22 @@ def _claimed(test: Verdict) -> str:
     return NOTHING if test.claimed is None else "yes" if test.claimed else "no"
 
 
-def _claims(title: str, tests: Sequence[Verdict]) -> Section:
-    plain, adjusted = (
-        section.counted(section.counted_as(test, verdict) for test, verdict in zip(tests, verdicts))
-        for verdicts in (
-            [test.claim_verdict for test in tests],
-            [test.claim_verdict_holm for test in tests],
-        )
-    )
-    return Section.table(
-        title,
-        tests,
-        [
-            ("indicator", lambda test: f"{test.compared.indicator}, {test.compared.label}"),
-            ("claim", lambda test: str(test.claim)),
-            ("paper", lambda test: section.number(test.published)),
-            ("ours [95 %]", section.ratio),
-            ("claim is", lambda test: section.said(test.claim_verdict)),
-            ("under Holm", lambda test: section.said(test.claim_verdict_holm)),
-            ("seeds for 80 % power at the paper's value", _seeds_needed),
-        ],
-        f"Unadjusted: {plain}.",
-        f"Under Holm, family = all comparisons of one indicator: {adjusted}.",
-        'A "not" claim is supported where the indicator lies below its threshold beyond chance.',
-        *(f"undefined: {why}." for why in dict.fromkeys(t.no_plan for t in tests) if why),
-    )
-
-
-def _seeds_needed(test: Verdict) -> str:
-    if test.estimate is None or test.published is None:
-        return NOTHING
-    return "undefined" if test.seeds_needed is None else f"{test.seeds_needed}"
-
-
 def _agreement(found: Agreement) -> Section:
     total = len(found.cells)
-    lines = []
-    if found.misses is None or found.met is None or found.mean_interval_width is None:
-        lines.append("Cells inside the 95 % prediction interval: one seed gives no interval.")
-    else:
-        lines += [
+    lines = ["Cells inside the 95 % prediction interval: one seed gives no interval."]
+    if found.misses is not None and found.met is not None:
+        lines = [
             (
                 f"Cells whose published P lies inside the 95 % prediction interval of one of our "
                 f"runs: {total - len(found.misses)} of {total}; inside that of our mean: "
                 f"{len(found.met)} of {total}."
             ),
             f"Mean width of those intervals: {found.mean_interval_width:.1f} items.",
-            f"Misses: {_misses(found.misses)}.",
+            f"Misses: {'; '.join(cell.words for cell in found.misses) or 'none'}.",
         ]
-    lines.append(f"Mean relative error of our mean P: {found.mean_relative_error:.1%}.")
     if found.mean_log_error is not None:
         lines.append(f"Mean |log error| of our mean P: {found.mean_log_error:.3f}.")
-    pairs = [f"{a.arm.setting} and {b.arm.setting}" for a, b in found.disorder]
-    lines.append(
-        f"Swarm sizes up to {found.largest_ordered} in the opposite order to the published one, "
-        f"95 % intervals apart: {'; '.join(pairs) or 'none'}."
-    )
     return Section(f"{found.policy}: agreement with the published values", lines=tuple(lines))
-
-
-def _misses(cells: Sequence[Cell]) -> str:
-    told = [
-        f"{cell.arm.setting} ({_published(cell)} published, "
-        f"{section.bracketed(Interval(*cell.one_run), 1)} ours)"
-        for cell in cells[:_MOST_MISSES]
-    ]
-    if len(cells) > _MOST_MISSES:
-        told.append(f"and {len(cells) - _MOST_MISSES} more, in cells.csv")
-    return ", ".join(told) or "none"
 
 
 def warnings(results: StudyResults) -> Iterator[str]:
@@ -212,17 +136,69 @@ def warnings(results: StudyResults) -> Iterator[str]:
             compared = test.compared
             what = f"{compared.policy}, {compared.indicator}, {compared.label}"
             yield f"{what} is undefined: {test.problem}."
-    for flag, meaning in _FLAGS.items():
-        families = "; ".join(_families(results.verdicts, flag))
-        if families:
-            yield f"{meaning}: {families}."
 
 
-def _families(tests: Sequence[Verdict], flag: str) -> Iterator[str]:
-    """Name the comparisons with a flag, those of one policy and indicator together."""
-    for (policy, indicator), family in grouped(tests, lambda test: test.compared.family).items():
-        whole = {test.compared.label for test in family}
-        labels = list(dict.fromkeys(t.compared.label for t in family if flag in t.flags))
-        which = f"all {len(whole)}" if len(labels) == len(whole) > 1 else "; ".join(labels)
-        if labels:
-            yield f"{policy}: {indicator} ({which})"
+_HOW_TO_READ = (
+    (
+        "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
+        "differences are paired by seed, their intervals jackknifed."
+    ),
+    (
+        "P: IQM is the mean without the lowest and the highest quarter of the seeds, worst tenth "
+        "the mean of the lowest tenth, rounded up to whole seeds. Differences are paired by seed "
+        "(t-interval), and so are ratios of mean P (Fieller); the last column is the share of "
+        "seeds with more deliveries, ties counting half (Wilson)."
+    ),
+)
+
+
+def policy_sections(results: StudyResults) -> Iterator[Section]:
+    """Yield policy x indicator: values with differences, then P cell by cell."""
+    if len(results.policies) < 2:
+        return
+    yield Section("", lines=(*_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
+    questions = list(indicators_against_baseline(results))
+    by_table = grouped(questions, lambda one: one.test.compared.table)
+    for table, here in by_table.items():
+        yield _side_by_side(table, here, results.policies)
+    for table, cells in cells_against_baseline(results).items():
+        yield _cells_beside(table, cells, results.policies[0])
+
+
+def _side_by_side(
+    table: str, questions: Sequence[IndicatorAgainstBaseline], policies: Sequence[str]
+) -> Section:
+    def answer(one: IndicatorAgainstBaseline, policy: str) -> str:
+        test = one.tests.get(policy)
+        return f"{section.ratio(test)} {section.answered(test)}" if test else section.NOTHING
+
+    def difference(one: IndicatorAgainstBaseline, policy: str) -> str:
+        return section.bracketed(one.differences.get(policy), 3)
+
+    baseline, *others = policies
+    columns: list[tuple[str, Callable[[IndicatorAgainstBaseline], str]]] = [
+        ("question", lambda one: f"{one.test.asked}, {one.test.compared.label}"),
+        *((f"{policy} [95 %]", partial(answer, policy=policy)) for policy in policies),
+        *((f"{one} - {baseline} [95 %]", partial(difference, policy=one)) for one in others),
+    ]
+    return Section.table(f"Indicators side by side: {table}", questions, columns)
+
+
+def _cells_beside(table: str, cells: Sequence[CellAgainstBaseline], baseline: str) -> Section:
+    return Section.table(
+        f"P side by side: {table}",
+        cells,
+        [
+            ("condition", lambda one: str(one.cell.arm.setting)),
+            ("policy", lambda one: one.cell.policy),
+            ("mean P [95 %]", lambda one: section.mean_p(one.cell)),
+            ("IQM of P", lambda one: f"{one.interquartile_mean:.1f}"),
+            ("worst tenth", lambda one: f"{one.worst_decile:.1f}"),
+            (f"P - {baseline}'s [95 %]", lambda one: section.bracketed(one.difference, 1)),
+            (f"P / {baseline}'s [95 %]", lambda one: section.bracketed(one.ratio, 2)),
+            (
+                f"delivers more than {baseline} [95 %]",
+                lambda one: section.bracketed(one.improvement, 2),
+            ),
+        ],
+    )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import becoming, plain
 from swarm_logistics_env.spi.estimate import SIGNS
-from swarm_logistics_env.studies.columns import frame_of_cells, frame_of_verdicts
-from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.results import StudyResults, frame_of_cells, frame_of_verdicts
 from swarm_logistics_env.studies.runs import write_csv
 
 from .document import Document, document
@@ -125,7 +124,10 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
 def section_markdown(section: Section, *, level: int = 2, pictures: str | None = None) -> str:
     """Return one section, its heading of the given level."""
     lines = [f"{'#' * level} {_inert(section.title)}", ""] if section.title else []
-    lines += _figures(section, pictures)
+    for figure in section.figures:
+        if pictures is not None:
+            lines += [f"![{figure.name}]({pictures}/{figure.name}.png)", ""]
+        lines += [_inert(figure.caption), ""]
     if section.sentences:
         lines += [f"* **{_inert(one.head)}** {_inert(one.text)}" for one in section.sentences] + [
             ""
@@ -136,13 +138,6 @@ def section_markdown(section: Section, *, level: int = 2, pictures: str | None =
     for line in section.lines:
         lines += [_inert(line), ""]
     return "\n".join(lines)
-
-
-def _figures(section: Section, pictures: str | None) -> Iterator[str]:
-    for figure in section.figures:
-        if pictures is not None:
-            yield from (f"![{figure.name}]({pictures}/{figure.name}.png)", "")
-        yield from (_inert(figure.caption), "")
 
 
 def _row(values: Sequence[str]) -> str:

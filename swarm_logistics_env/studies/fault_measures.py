@@ -1,8 +1,7 @@
-"""Measures of faults besides P: fault budget, anchoring load, and what a fault in mid-run does."""
+"""Measures of faults in mid-run, which the paper does not define."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,17 +11,13 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi import FaultBudget
-from swarm_logistics_env.spi import estimate as words
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.resilience import SurvivalCurve
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
-from swarm_logistics_env.warehouse.faults import Fault
 
 from .comparison import Comparison
 from .results import StudyResults, Times
-from .verdict import Verdict, grouped, same_runs
+from .verdict import grouped, same_runs
 
 Pair = tuple[Times, Times]
 Outcomes = tuple[Outcome, ...]
@@ -203,72 +198,3 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
             )
             curves.append(RateCurve(runs, seconds, *limits.T))
     return tuple(curves)
-
-
-class ModeBudget(NamedTuple):
-    """How many robots may fail by one mode.
-
-    Attributes:
-        compared: the comparison of the smallest m.
-        tested: the numbers m of faulty robots that were tested.
-        budget: None: blocked.
-        verdict: on the m which ended the search; None: none did, or it was not tested.
-    """
-
-    compared: Comparison
-    tested: tuple[int, ...]
-    budget: FaultBudget | None
-    verdict: words.Verdict | None
-
-
-class AnchoringLoad(NamedTuple):
-    """Time that working robots spent in contact range of failed ones.
-
-    In the paired run with the robots removed there is no failed robot, so it is 0.
-
-    Attributes:
-        compared: the comparison of the fault with the robots removed.
-        load: mean over seeds with 95 % interval [robot-seconds a run].
-        neighbours: the same per failed robot and second of failure: how many working robots stand
-            by a failed one at any time.
-    """
-
-    compared: Comparison
-    load: Interval
-    neighbours: Interval
-
-
-def fault_budgets(results: StudyResults) -> Iterator[ModeBudget]:
-    """Yield the fault budget of every policy, failure mode and onset."""
-    asked = [one for one in results.verdicts if one.compared.indicator == "R"]
-
-    def mode(one: Verdict) -> tuple[str, str, str, float]:
-        setting = one.compared.changed.setting
-        return one.compared.policy, one.compared.table, setting.name, setting.onset
-
-    for tests in grouped(asked, mode).values():
-        by_m = {int(test.compared.changed.setting.value): test for test in tests}
-        known = {m: test.estimate for m, test in by_m.items() if test.estimate is not None}
-        budget = spi.fault_budget(known) if len(known) == len(by_m) else None
-        last = known.get(budget.limit) if budget and budget.limit else None
-        yield ModeBudget(tests[0].compared, tuple(by_m), budget, last.answer if last else None)
-
-
-def anchoring_loads(results: StudyResults) -> Iterator[AnchoringLoad]:
-    """Yield the anchoring load of every fault whose runs are complete and tell it."""
-    for comparison in results.plan.comparisons:
-        outcomes = results.outcomes_of(comparison.changed)
-        # Nobody recorded how long robots stood by each other in trials from elsewhere.
-        if comparison.removed is None or outcomes is None or results.plan.imported_from is not None:
-            continue
-        if any(outcome.anchoring_seconds is None for outcome in outcomes):
-            continue  # the task does not tell
-        (fault,) = comparison.changed.case.faults
-        if not isinstance(fault, Fault) or fault.intermittent is not None:
-            continue  # how long each robot had failed is not recorded
-        end = fault.onset + (fault.duration or math.inf)
-        seconds = np.array([outcome.anchoring_seconds for outcome in outcomes], dtype=np.float64)
-        lasted = np.array([max(0.0, min(o.ended_at, end) - fault.onset) for o in outcomes])
-        failed = comparison.changed.setting.value * lasted
-        shares = np.divide(seconds, failed, out=np.zeros_like(seconds), where=failed > 0)
-        yield AnchoringLoad(comparison, spi.mean_interval(seconds), spi.mean_interval(shares))

@@ -55,13 +55,16 @@ class Plan:
 
     @cached_property
     def cells(self) -> tuple[tuple[str, str, Arm], ...]:
-        """Every (policy label, table, arm) whose P the report shows, each once."""
+        """Every (policy label, table, arm) whose P the report shows, those of a factor together."""
         cells = [
             (comparison.policy, comparison.table, arm)
             for comparison in self.comparisons
             for arm in comparison.arms
         ]
         cells += [(policy, table, arm) for (policy, table), arm in self.nulls.items()]
+        factors = [(policy, table, arm.setting.name) for policy, table, arm in cells]
+        order = {factor: place for place, factor in enumerate(dict.fromkeys(factors))}
+        cells.sort(key=lambda cell: order[cell[0], cell[1], cell[2].setting.name])
         return tuple(dict.fromkeys(cells))
 
     @cached_property

@@ -17,7 +17,7 @@ from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import ModuleType
 from unittest.mock import patch
@@ -25,15 +25,13 @@ from unittest.mock import patch
 from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.kernels import QUIET
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.tasks.task import Case, Outcome, Run
+from swarm_logistics_env.tasks.task import Outcome, Run
 
-from .plan import Plan
 from .runs import Runs
 
 Played = Generator[tuple[Run, Outcome], None, None]
 Engine = Callable[[Iterable[Run]], Played]
 NAMES = ("local", "process", "ray")
-PILOT = 3.0  # simulated seconds that are played to know how long a study takes
 
 
 @dataclass(frozen=True)
@@ -253,37 +251,6 @@ def _play(message: bytes) -> Outcome:
     except Exception:  # noqa: BLE001 - a policy that only the parent can import
         return Outcome(error=traceback.format_exc())
     return run.play()
-
-
-def expected_seconds(plan: Plan) -> float:
-    """Return how long a study takes at most on one process of this machine [s].
-
-    The start of one condition is played for each policy and swarm size. Runs that deliver all items
-    end earlier than their duration, so this is an upper bound.
-
-    Raises:
-        StudyError: a policy fails in its first seconds.
-    """
-    shortened = {_kind(case): case for case in plan.cases}
-    pace = {kind: _pace(plan, case) for kind, case in shortened.items()}
-    return len(plan.seeds) * sum(pace[_kind(c)] * c.scenario.duration for c in plan.cases)
-
-
-def _kind(case: Case) -> tuple[str, int]:
-    return case.identity, case.scenario.n_robots
-
-
-def _pace(plan: Plan, case: Case) -> float:
-    """Return the wall time of a simulated second [s]."""
-    duration = min(PILOT, case.scenario.duration)
-    scenario = case.task.vary(case.scenario, {"duration": duration})
-    run = replace(case, scenario=scenario, faults=()).run(plan.code, 0)
-    outcomes = [run.play() for _ in range(2)]  # the first may compile
-    for outcome in outcomes:
-        if outcome.error is not None:
-            reason = outcome.error.strip().splitlines()[-1]
-            raise StudyError(f"policy {case.policy.title!r} fails in its first seconds: {reason}")
-    return min(outcome.wall_seconds for outcome in outcomes) / duration
 
 
 RETRIES = 1  # after a worker's death, as local processes do

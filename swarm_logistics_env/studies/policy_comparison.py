@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -153,24 +152,17 @@ class Agreement:
         misses: those whose published value lies outside our 95 % prediction interval of one run: a
             weak test, which quite different policies pass as well. None at one seed.
         met: those whose published value lies inside the 95 % interval of our mean. None as above.
-        mean_relative_error: mean of |our mean P - published P| / published P.
         mean_log_error: mean of |ln(our mean P / published P)|; None where a mean is 0.
         mean_interval_width: mean width of the prediction intervals [items], since wide intervals
             meet published values by their width alone. None at one seed.
-        disorder: pairs of swarm sizes that stand opposite to the published order, with our 95 %
-            intervals of the means apart.
-        largest_ordered: the order is judged up to this swarm size, where the published P peaks.
     """
 
     policy: str
     cells: tuple[Cell, ...]
     misses: tuple[Cell, ...] | None
     met: tuple[Cell, ...] | None
-    mean_relative_error: float
     mean_log_error: float | None
     mean_interval_width: float | None
-    disorder: tuple[tuple[Cell, Cell], ...]
-    largest_ordered: int
 
 
 def agreements(results: StudyResults) -> tuple[Agreement, ...]:
@@ -197,24 +189,11 @@ def agreement(policy: str, cells: Sequence[Cell]) -> Agreement:
         for cell, p in known
         if cell.mean.low is not None and cell.mean.low <= p <= (cell.mean.high or 0.0)
     ]
-    # Beyond the peak the published fall is within one run's noise.
-    sizes = [(cell, p) for cell, p in known if cell.arm.setting.kind == "size"]
-    largest = max(sizes, key=lambda one: one[1])[0].arm.setting.value if sizes else 0.0
-    ordered = sorted(
-        (one for one in sizes if one[0].arm.setting.value <= largest), key=lambda one: one[1]
-    )
     return Agreement(
         policy,
         tuple(cells),
         tuple(cell for cell in cells if not cell.published_inside) if width else None,
         tuple(met) if width else None,
-        float(np.abs(ratio - 1.0).mean()),
         float(np.abs(np.log(ratio)).mean()) if ratio.all() else None,
         float(np.mean(width)) if width else None,
-        tuple(
-            (a, b)
-            for (a, p), (b, more) in combinations(ordered, 2)
-            if p < more and a.mean.low is not None and a.mean.low > (b.mean.high or np.inf)
-        ),
-        int(largest),
     )

@@ -1,16 +1,15 @@
-"""StudyResults: what the finished runs of a study say, in cells and verdicts; the seeds needed."""
+"""StudyResults: what the finished runs of a study say, in cells and verdicts, and as tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env import spi
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparison import Arm, Reference, load_reference
@@ -19,6 +18,9 @@ from .plan import Plan
 from .runs import Outcomes
 from .until_clear import standing
 from .verdict import Cell, Verdict, judge_one, under_holm
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Times = tuple[NDArray[np.float64], ...]
 Place = tuple[str, str, Arm]  # of a cell: policy, table, arm
@@ -145,61 +147,102 @@ def _beside(reference: Reference | None, verdict: Verdict) -> Verdict:
     return replace(verdict, claimed=claimed, published=published)
 
 
-class Demand(NamedTuple):
-    """The number of seeds that one comparison needs.
+# Name to type, where the value stands in the record, and what it means. A number that is missing
+# is NaN, a text None.
+Columns = Mapping[str, tuple[type, str, str]]
+CELL_COLUMNS: Columns = {
+    "policy": (str, "policy", "label of the policy"),
+    "table": (str, "table", "heading of the report's table"),
+    "cell": (str, "words", "the condition in words, e.g. N = 10"),
+    "kind": (str, "arm.setting.kind", "what is varied: size, fault, parameter or policy"),
+    "factor": (str, "arm.setting.name", "n_robots, a failure mode, a parameter, or a policy"),
+    "value": (float, "arm.setting.value", "N, faulty robots m, or the parameter in its unit"),
+    "onset": (float, "arm.setting.onset", "when the fault begins [s]"),
+    "n_robots": (int, "arm.case.scenario.n_robots", "swarm size N"),
+    "published": (float, "published", "P of the reference"),
+    "counted": (bool, "counted", "whether it is one of the cells of the reference's tables"),
+    "n_seeds": (int, "n_seeds", "number of runs that succeeded"),
+    "mean": (float, "mean.value", "mean P, in the unit of the task: items in the warehouse"),
+    "low": (float, "mean.low", "lower limit of its 95 % interval; missing at one seed"),
+    "high": (float, "mean.high", "upper limit of it"),
+    "prediction_low": (float, "one_run.low", "lower limit of the 95 % interval of a further run"),
+    "prediction_high": (float, "one_run.high", "upper limit of it"),
+    "published_inside": (bool, "published_inside", "whether that interval holds the published P"),
+    "saturated": (bool, "saturated", "whether a run delivered every item, so that P is capped"),
+    "stalled": (float, "stalled", "share of runs with less than a quarter of the median P"),
+    "problem": (str, "problem", "why runs are missing; missing: they are complete"),
+}
+VERDICT_COLUMNS: Columns = {
+    "policy": (str, "compared.policy", "label of the policy"),
+    "table": (str, "compared.table", "heading of the report's table"),
+    "indicator": (str, "compared.indicator", "its symbol, e.g. FT"),
+    "comparison": (str, "compared.label", "the step in words, e.g. N 5 -> 10"),
+    "kind": (str, "after.kind", "what differs: size, fault, parameter or policy"),
+    "factor": (str, "after.name", "n_robots, a failure mode, a parameter, or a policy"),
+    "before": (float, "compared.original.setting.value", "its value in the original condition"),
+    "after": (float, "after.value", "its value in the changed condition"),
+    "onset": (float, "after.onset", "when the fault begins [s]"),
+    "n_robots": (int, "compared.n_robots", "swarm size N of the original condition"),
+    "threshold": (float, "compared.threshold", "what the indicator is tested against"),
+    "value": (float, "value", "the estimate; missing: undefined"),
+    "low": (float, "estimate.low", "lower limit of its interval"),
+    "high": (float, "estimate.high", "upper limit of its interval"),
+    "confidence": (float, "estimate.confidence", "level of the interval and the verdict"),
+    "probability": (float, "estimate.probability", "confidence that it is above the threshold"),
+    "p_value": (float, "estimate.p_value", "two-sided p, unadjusted"),
+    "p_holm": (float, "p_holm", "p adjusted after Holm within the family"),
+    "verdict": (str, "plain", "whether it is above the threshold; unaffected: the same runs"),
+    "verdict_holm": (str, "holm", "the same after Holm"),
+    "n_seeds": (float, "estimate.n_seeds", "number of seeds; missing: undefined"),
+    "stopped_at": (float, "stopped_at", "number of seeds at which it was clear; missing: open"),
+    "pairing_correlation": (float, "estimate.pairing_correlation", "of the two P over seeds"),
+    "flags": (str, "marks", "marks on the verdict, see `Estimate`, with blanks between"),
+    "saturated": (bool, "saturated", "whether it rests on a P that is capped"),
+    "property": (str, "asked", "what is asked, e.g. tolerant, FT > 0.5 or P falls"),
+    "answer": (str, "answer", "verdict on the property"),
+    "answer_holm": (str, "answer_holm", "the same after Holm"),
+    "conclusion": (str, "conclusion", "answer_holm; equivalent if that is open and P unchanged"),
+    "claim": (str, "claim", "what is claimed, e.g. not tolerant; missing: nothing"),
+    "published": (float, "published", "the reference's value of the indicator"),
+    "claim_verdict": (str, "claim_verdict", "verdict on the claim"),
+    "claim_verdict_holm": (str, "claim_verdict_holm", "the same after Holm"),
+    "unchanged": (str, "unchanged", "what is tested for equivalence, e.g. P_F within 10 % of P_o"),
+    "margin": (float, "equivalence.margin", "the largest change that counts as none"),
+    "change": (float, "equivalence.change.value", "P_F / P_o - 1; of FT (P_F - P_S) / P_o"),
+    "change_low": (float, "equivalence.change.low", "lower limit of its interval"),
+    "change_high": (float, "equivalence.change.high", "upper limit of it, level 1 - 2 alpha"),
+    "p_unchanged": (float, "equivalence.p_value", "p of equivalence, or of a change beyond it"),
+    "equivalence": (str, "equivalence.verdict", "equivalent, refuted or inconclusive"),
+    "equivalence_holm": (str, "equivalence_holm", "the same after Holm"),
+    "detectable": (float, "detectable", "distance that these seeds find with 80 % power"),
+    "seeds_for_power_80": (float, "seeds_needed", "seeds for 80 % power at the published value"),
+    "problem": (str, "problem", "why the comparison is undefined, e.g. by a failed run"),
+}
 
-    Attributes:
-        test: the pilot's verdict.
-        effect: assumed true value of the indicator: the one named, or the published one.
-        seeds: for a verdict at that effect with the wanted power on average; None: `problem` says
-            why.
-        least_power: power that so many seeds reach in nine pilots of ten; None as `seeds`.
-        detectable: distance from the threshold that the pilot's own seeds would find.
-        problem: why there is no number of seeds.
-        unchanged: seeds for the verdict "equivalent" with the wanted power, if the change truly is
-            0; None: it is not asked, or the pilot shows no spread.
-    """
 
-    test: Verdict
-    effect: float | None
-    seeds: int | None = None
-    least_power: float | None = None
-    detectable: float | None = None
-    problem: str | None = None
-    unchanged: int | None = None
+def frame_of_cells(cells: Iterable[Cell]) -> pd.DataFrame:
+    """Return cells as a table with the columns of `CELL_COLUMNS`, for CSV and for users."""
+    return _frame(list(cells), CELL_COLUMNS)
 
 
-def demands(
-    results: StudyResults, effect: float | None = None, power: float = 0.8
-) -> tuple[Demand, ...]:
-    """Return what every comparison of a study needs, from the spread that its runs show.
-
-    Only the spread is taken from them. The effect is to come from elsewhere: the least that
-    matters, or the published value; never the one that the pilot itself happened to show.
-
-    Args:
-        results: the results of the pilot, from at least two seeds.
-        effect: assumed true value of every indicator, in its units; None: the published one.
-        power: wanted probability of a verdict, in (0, 1).
-
-    Raises:
-        IndicatorError: effect not finite, power outside (0, 1).
-    """
-    return tuple(_demand(test, effect, power) for test in results.verdicts)
+def frame_of_verdicts(verdicts: Iterable[Verdict]) -> pd.DataFrame:
+    """Return verdicts as a table with the columns of `VERDICT_COLUMNS`, for CSV and for users."""
+    return _frame(list(verdicts), VERDICT_COLUMNS)
 
 
-def _demand(test: Verdict, effect: float | None, power: float) -> Demand:
-    estimate = test.estimate
-    effect = test.published if effect is None else effect
-    if estimate is None:
-        return Demand(test, effect, problem=test.problem)
-    detectable = spi.minimum_detectable_effect(estimate, power)
-    equivalence = test.equivalence
-    unchanged = spi.seeds_for_equivalence(equivalence, power) if equivalence else None
-    if effect is None:
-        no_effect = "no effect is named"
-        return Demand(test, None, detectable=detectable, problem=no_effect, unchanged=unchanged)
-    seeds = spi.seeds_for_power(estimate, effect, power)
-    least = None if seeds is None else spi.lower_decile_of_power(estimate, effect, seeds)
-    problem = spi.no_plan_because(estimate, effect)
-    return Demand(test, effect, seeds, least, detectable, problem, unchanged)
+def _frame(rows: Sequence[Cell | Verdict], columns: Columns) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(
+        {
+            # Missing texts stay None, which pandas would turn into NaN.
+            name: pd.Series([_at(row, place) for row in rows], dtype=kind if kind is float else "O")
+            for name, (kind, place, _) in columns.items()
+        }
+    )
+
+
+def _at(record: object, place: str) -> object:
+    for name in place.split("."):
+        record = getattr(record, name, None)
+    return record

@@ -12,13 +12,12 @@ from weakref import finalize
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.tasks.task import Run, Task
 
-from .columns import frame_of_cells, frame_of_verdicts
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
 from .plan import Plan, Shard, make_plan
 from .play import Engine, Tally, engine_named, play
 from .presets import load_preset
-from .results import StudyResults, judge
+from .results import StudyResults, frame_of_cells, frame_of_verdicts, judge
 from .runs import FILE_NAME, Runs
 from .specification import Specification, read_study_file
 from .until_clear import standing

@@ -191,6 +191,11 @@ class Verdict:
         return definition.property_name(self.compared.threshold, claimed_below=below)
 
     @property
+    def where(self) -> tuple[str, str]:
+        """Policy and table that it stands in."""
+        return self.compared.policy, self.compared.table
+
+    @property
     def after(self) -> Setting:
         """The setting of the changed condition."""
         return self.compared.changed.setting
@@ -269,20 +274,6 @@ class Verdict:
         return spi.seeds_for_power(self.estimate, self.published, POWER)
 
     @property
-    def no_plan(self) -> str | None:
-        """Why no such number can be named."""
-        if self.estimate is None or self.published is None:
-            return None
-        return spi.no_plan_because(self.estimate, self.published)
-
-    @property
-    def least_power(self) -> float | None:
-        """Power that so many seeds keep in at least nine pilots of ten."""
-        if self.estimate is None or self.published is None or self.seeds_needed is None:
-            return None
-        return spi.lower_decile_of_power(self.estimate, self.published, self.seeds_needed)
-
-    @property
     def detectable(self) -> float | None:
         """Distance from the threshold that these seeds find with 80 % power."""
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
@@ -317,14 +308,15 @@ def judge_one(
         cells: those of the comparison's arms.
     """
     level = level or Level()
-    used = {arm: cells[arm] for arm in comparison.arms}
-    saturated = [arm for arm, one in used.items() if one.saturated]
+    saturated = [arm for arm in comparison.arms if cells[arm].saturated]
     estimate, same = None, None
-    problems = [f"{arm.setting}: {one.problem}" for arm, one in used.items() if one.problem]
+    problems = [
+        f"{arm.setting}: {cells[arm].problem}" for arm in comparison.arms if cells[arm].problem
+    ]
     if not problems:
-        before, after = used[comparison.original], used[comparison.changed]
-        identical = comparison.removed is None and same_runs(before.digests, after.digests)
-        samples = {arm: one.by_seed for arm, one in used.items()}
+        digests = (cells[arm].digests for arm in (comparison.original, comparison.changed))
+        identical = comparison.removed is None and same_runs(*digests)
+        samples = {arm: cells[arm].by_seed for arm in comparison.arms}
         try:
             estimate = comparison.estimate(
                 samples,
@@ -342,7 +334,7 @@ def judge_one(
                 alpha=level.alpha,
             )
         except spi.IndicatorError as error:
-            nothing = not used[comparison.original].by_seed.any()
+            nothing = not samples[comparison.original].any()
             estimate, problems = None, ["it delivers nothing" if nothing else str(error)]
     return Verdict(comparison, estimate, "; ".join(problems) or None, same, bool(saturated), margin)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.studies import Study
 from tests.conftest import SMALL
@@ -147,36 +148,28 @@ def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(
     assert "tests nothing" in capsys.readouterr().err
 
 
-def test_seeds_needed_are_told_of_a_stored_study_and_of_a_pilot(
+def test_seeds_needed_are_told_of_a_stored_study(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stored = imported(tmp_path / "old", (40, 41, 43, 42))
     capsys.readouterr()
-    plan = ["study", "plan"]
-    assert app.run([*plan, stored, "--effect", "-0.1", "--indicator", "R"]) == 0
-    printed = capsys.readouterr().out
-    assert "R > 0, FM1, m = 1 | -0.100 | " in printed
-    assert "FT" not in printed
-    path = tmp_path / "mine.toml"
-    path.write_text(
-        "seeds = 30\nuntil_clear = true\nscenario = { n_robots = 3, n_items = 4, "
-        "warehouse_width = 3, warehouse_height = 3, delivery_width = 1, duration = 20 }\n"
-        "[[sizes]]\nvalues = [2, 3]\n"
-    )
-    pilot = [*plan, str(path), "--pilot", "3", "--processes", "1", "--effect", "1"]
-    assert app.run(pilot) == 0
-    printed = capsys.readouterr().out
-    assert "Seeds needed, from 3 seeds" in printed
-    assert "S > 0, N 2 -> 3 | 1.000 | " in printed
-    assert {path.name for path in tmp_path.iterdir()} == {"mine.toml", "old", "old.csv"}
-    for arguments, words in (
-        (
-            [*pilot, "--indicator", "R"],
-            "--indicator R: the study makes no such comparison; it asks",
-        ),
-        ([*pilot, "--at", "FM9"], "no such comparison"),
-        ([*plan, stored, "--power", "2"], "power"),
-        ([*plan, stored, "--policy", "homing"], "--policy is for a pilot"),
+    plan = ["study", "plan", stored]
+    (test,) = (t for t in Study.stored(stored).findings().verdicts if t.compared.indicator == "R")
+    assert test.estimate is not None
+    found = []
+    for effect in (-0.1, -0.5):
+        assert app.run([*plan, "--effect", str(effect)]) == 0
+        printed = capsys.readouterr().out
+        seeds = spi.seeds_for_power(test.estimate, effect, 0.8)
+        distance = f"{spi.minimum_detectable_effect(test.estimate, 0.8):.3f}"
+        assert f"R > 0, FM1, m = 1 | {effect:.3f} | {seeds} | {distance} | " in printed
+        found.append(seeds or 0)
+    assert found[0] > found[1]
+    for effects, words in (
+        ([], "| – | no effect is named |"),
+        (["--effect", "0"], "at the thresh"),
     ):
-        assert app.run(arguments) == 2
-        assert words in capsys.readouterr().err
+        assert app.run([*plan, *effects]) == 0
+        assert words in capsys.readouterr().out
+    assert app.run([*plan, "--policy", "homing"]) == 2
+    assert "--policy: a study that was run has its own" in capsys.readouterr().err

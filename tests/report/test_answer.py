@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from pathlib import Path
 
 import pytest
 
@@ -58,11 +57,11 @@ def test_digest_fits_the_screen_and_nothing_is_cut(
     width: int, name: str, request: pytest.FixtureRequest
 ) -> None:
     found: StudyResults = request.getfixturevalue(name)
-    lines = digest(answer(found), width, Path("results") / "a-study").splitlines()
+    lines = digest(answer(found), width).splitlines()
     assert len(lines) <= MOST_LINES
     assert max(map(len, lines)) <= width
     assert not any("…" in line for line in lines if "N 5→" not in line)
-    whole = digest(answer(found, most=None), width, None, most=None)
+    whole = digest(answer(found, most=None), width, most=None)
     assert max(map(len, whole.splitlines())) <= width
     assert len(whole.splitlines()) >= len(found.verdicts)
 
@@ -92,7 +91,7 @@ def test_words_for_what_is_no_plain_verdict(few: StudyResults) -> None:
 
 
 def test_policies_stand_one_below_the_other_with_p_as_a_multiple(compared: StudyResults) -> None:
-    text = digest(answer(compared), 80, None)
+    text = digest(answer(compared), 80)
     first, second = text.index("\nswarm-dt:\n"), text.index("\nswarm-dt-follow:\n")
     assert first < second
     assert re.search(r"P at N = 25, no fault: swarm-dt 39\.\d \[[\d., ]+\],\s+swarm-dt-f", text)

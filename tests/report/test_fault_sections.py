@@ -17,8 +17,6 @@ from swarm_logistics_env.studies.comparison import NO_FAULT, OTHER_BEHAVIOUR, Se
 from swarm_logistics_env.studies.fault_measures import (
     RateCurve,
     Resilience,
-    anchoring_loads,
-    fault_budgets,
     rate_curves,
     resiliences,
 )
@@ -163,42 +161,6 @@ def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) ->
         bottom, top = axes.get_ylim()
         assert bottom == 0.0
         assert top >= max(curve.high.max() for curve in many)
-
-
-def test_anchoring_load_and_fault_budget(unharmed: StudyResults) -> None:
-    (load,) = anchoring_loads(unharmed)
-    assert load.load.value == 21.0
-    assert load.neighbours.value == pytest.approx(21.0 / (3 * (END - ONSET)))
-    (budget,) = fault_budgets(unharmed)
-    assert (budget.tested, budget.budget) == ((3,), spi.FaultBudget(0, 1))
-    # A budget that is 0 for every mode tells nothing that R does not tell.
-    assert table(unharmed, "Fault budget") == []
-
-
-@pytest.mark.parametrize(
-    ("by_m", "answer"),
-    [
-        # One robot of ten may be lost, and R = 0 lies at a tenth of the deliveries.
-        (([10, 11, 10, 11], [10, 11, 10, 11]), "at least 2"),
-        (([10, 11, 10, 11], [5, 6, 5, 6]), "1; m = 2 refuted"),
-        (([10, 11, 10, 11], [2, 14, 2, 14]), "1; m = 2 open"),
-        (([5, 6, 5, 6], [5, 6, 5, 6]), None),
-    ],
-)
-def test_fault_budget_says_whether_more_is_refuted_or_unknown(
-    by_m: tuple[list[int], list[int]], answer: str | None
-) -> None:
-    study = Study(
-        seeds=4,
-        scenario={"n_robots": 10, "duration": END},
-        faults=[{"modes": ["FM4"], "robots": [1, 2]}],
-    )
-
-    def play(_: str, level: Setting, seed: int) -> Outcome:
-        return delivered(by_m[int(level.value) - 1][seed] if level.name == "FM4" else 10)
-
-    said = [row[-1] for row in table(judged(study, play), "Fault budget")]
-    assert said == ([] if answer is None else [answer])
 
 
 def two_policies(seeds: int, factor: float) -> StudyResults:

@@ -29,10 +29,6 @@ def test_no_headline_counts_a_verdict_that_assumes_normal_differences(few: Study
     assert len(decided) == 1
     assert decided.isdisjoint({"supported", "refuted", "equivalent"})
     assert {counted_as(test, "inconclusive") for test in assumed} == {"open"}
-    text = markdown(document(few))
-    (line,) = {one for one in text.splitlines() if "Unadjusted: " in one and "not counted" in one}
-    assert not re.search(r"\d (supported|refuted)", line)
-    assert "The verdict assumes normal differences." in text
 
 
 def test_no_name_breaks_a_table() -> None:
@@ -130,8 +126,7 @@ def test_sentences_tell_what_a_verdict_rests_on() -> None:
     assert re.search(r"P_F within 10 % of P_o\? Change -0\.[67]\d\d \[.*\]: refuted\.", text)
     assert "P_F within 10 % of P_o from P_S? Change" in text
     assert "R = 0.080 exactly, over 10 paired seeds (0 to 9): same runs." in text
-    assert "that these seeds did not show could turn it: it needs at least" in text
-    assert "undefined: an effect of 0 lies at the threshold" in text
+    assert re.search(r"too few to exclude stalled runs .* It needs at least \d+ seeds\.", text)
 
 
 def test_missing_runs_leave_a_verdict_undefined_with_the_reason(few: StudyResults) -> None:
@@ -147,7 +142,10 @@ def test_missing_runs_leave_a_verdict_undefined_with_the_reason(few: StudyResult
 def test_capped_cells_and_the_set_up_are_on_the_page(few: StudyResults, directory: Path) -> None:
     page = (directory / "report.html").read_text().replace("\N{NO-BREAK SPACE}", " ")
     assert "† marks a P that is capped" in page
-    for name, marks in (("A", 3), ("S-Table-I-scalability", 0)):
+    for name, marks in (
+        ("A-Table-III-adaptability-to-warehouse-width", 3),
+        ("S-Table-I-scalability", 0),
+    ):
         drawing = ElementTree.parse(directory / "figures" / f"{name}.svg")
         assert sum(element.text == "†" for element in drawing.iter()) == marks
     for name in few.plan.specification.scenario.model_dump():

@@ -20,7 +20,7 @@ from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.studies.play import engine_named, expected_seconds
+from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.tasks.task import Case
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, code_version
@@ -150,21 +150,3 @@ def test_workers_end_with_a_parent_that_is_killed() -> None:
             os.killpg(killed.pid, signal.SIGKILL)
     assert int(said) >= 1
     assert killed.returncode == -signal.SIGKILL
-
-
-class Broken:
-    """Fails at once."""
-
-    identity = "broken"
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        raise RuntimeError("a wheel came off")
-
-    def act(self, observations: Any) -> Any: ...
-
-
-def test_more_seeds_take_more_time_and_a_policy_that_fails_is_named(sizes: dict[str, Any]) -> None:
-    few, many = (expected_seconds(Study(**{**sizes, "seeds": n}).plan()) for n in (2, 200))
-    assert 0 < few < many
-    with pytest.raises(StudyError, match=r"'Broken' fails .*a wheel came off"):
-        expected_seconds(Study(**{**sizes, "policies": [Broken()]}).plan())

@@ -155,7 +155,6 @@ def test_an_event_log_has_the_resilience_of_the_simulators_own_rows(tmp_path: Pa
         assert np.array_equal(np.array(one.curve), np.array(other.curve))
     report = markdown(document(study.findings()))
     assert "Resilience: deliveries after the onset" in report
-    assert "Anchoring" not in report  # nobody recorded it
 
 
 def test_an_event_log_without_seeds_and_removed_robots_has_the_index_alone(tmp_path: Path) -> None:

@@ -8,20 +8,19 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from swarm_logistics_env import spi
 from swarm_logistics_env.report.tables import warnings
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.columns import (
-    CELL_COLUMNS,
-    VERDICT_COLUMNS,
-    frame_of_cells,
-    frame_of_verdicts,
-)
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.declaration import Declaration
-from swarm_logistics_env.studies.fault_measures import fault_budgets
 from swarm_logistics_env.studies.policy_comparison import agreement, agreements
-from swarm_logistics_env.studies.results import StudyResults, demands, judge
+from swarm_logistics_env.studies.results import (
+    CELL_COLUMNS,
+    VERDICT_COLUMNS,
+    StudyResults,
+    frame_of_cells,
+    frame_of_verdicts,
+    judge,
+)
 from swarm_logistics_env.studies.verdict import Cell
 from swarm_logistics_env.tasks.task import Outcome
 from tests.studies.made_up import by_question, judged, paper, published
@@ -41,22 +40,19 @@ def test_the_papers_own_values_agree_with_the_paper(found: StudyResults) -> None
     assert len(figure.cells) == 33
     # Three cells share the base run with 39 under other published values: 41 twice missing.
     assert words(figure.misses) <= {"warehouse_width = 10"}
-    assert figure.mean_relative_error < 0.03
-    assert figure.mean_log_error == pytest.approx(figure.mean_relative_error, rel=0.1)
+    assert figure.mean_log_error is not None
+    assert figure.mean_log_error < 0.03
     assert len(figure.met or ()) > 25
-    assert figure.disorder == ()
-    assert figure.largest_ordered == 100
     assert figure.mean_interval_width == pytest.approx(2 * 2.26 * 1.05, rel=0.25)
 
 
-def test_misses_and_disorder_are_found() -> None:
+def test_misses_are_found() -> None:
     def p(policy: str, setting: Setting) -> float:
         swapped = {20.0: 33.0, 30.0: 29.0} if setting.kind == "size" else {}
         return swapped.get(setting.value, published(policy, setting))
 
     (figure,) = agreements(paper(p))
     assert {"N = 20", "N = 30"} <= words(figure.misses)
-    assert [(a.words, b.words) for a, b in figure.disorder] == [("N = 20", "N = 30")]
 
 
 def test_a_value_in_the_interval_of_one_run_may_lie_outside_that_of_the_mean() -> None:
@@ -103,7 +99,6 @@ def test_power_is_undefined_where_the_published_value_is_the_threshold(
     power = by_question(found)
     at_threshold = power["FT", "FM4, m = 1", 0.0]
     assert (at_threshold.published, at_threshold.seeds_needed) == (0, None)
-    assert "threshold" in str(at_threshold.no_plan)
     assert power["FT", "FM4, m = 3", 0.0].seeds_needed == 10
 
 
@@ -168,8 +163,6 @@ def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
     assert len(rest) == 9
     smallest = min(t.estimate.p_value for t in rest if t.estimate and t.estimate.p_value)
     assert min(t.p_holm for t in rest if t.p_holm) == pytest.approx(9 * smallest)
-    budgets = {b.compared.changed.setting.name: b.budget for b in fault_budgets(found)}
-    assert budgets["FM2"] == (3, None)
 
 
 def test_one_failed_run_blocks_its_family_under_holm(found: StudyResults) -> None:
@@ -203,31 +196,3 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     assert tests["value"].isna().all()
     assert tests["published"].notna().any()
     assert set(tests["verdict"]) == {None}
-
-
-def test_a_named_effect_decides_the_number_of_seeds_and_the_seen_one_never() -> None:
-    study = Study(seeds=5, sizes=[{"values": [5, 10]}])
-    pilot = judged(
-        study, lambda _, at, seed: Outcome(untimed=at.value + seed ** (at.value // 5) % 5)
-    )
-    (far,), (near,) = demands(pilot, 1.0), demands(pilot, 0.3)
-    assert far.test.estimate is not None
-    assert far.seeds is not None
-    assert near.seeds is not None
-    assert far.seeds < near.seeds
-    assert far.seeds == spi.seeds_for_power(far.test.estimate, 1.0, 0.8)
-    assert far.detectable == spi.minimum_detectable_effect(far.test.estimate, 0.8)
-    (unnamed,) = demands(pilot)
-    assert (unnamed.effect, unnamed.seeds) == (None, None)
-    assert unnamed.problem == "no effect is named"
-    assert unnamed.detectable is not None
-    (useless,) = demands(pilot, effect=0.0)
-    assert (useless.seeds, "lies at the threshold" in str(useless.problem)) == (None, True)
-    (blocked,) = demands(judge(pilot.plan, {}), effect=1.0)
-    assert "5 of 5 runs missing" in str(blocked.problem)
-
-
-def test_a_published_effect_is_taken_where_there_is_one(found: StudyResults) -> None:
-    by_step = {demand.test.compared.label: demand.effect for demand in demands(found)}
-    assert by_step["N 10 -> 20"] == pytest.approx(0.611, abs=1e-3)
-    assert by_step["FM4, m = 2"] is not None

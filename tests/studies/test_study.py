@@ -23,9 +23,9 @@ from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.columns import CELL_COLUMNS, VERDICT_COLUMNS
 from swarm_logistics_env.studies.declaration import Declaration, note
 from swarm_logistics_env.studies.plan import Shard
+from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
 from swarm_logistics_env.tasks.task import Outcome, Run
 from tests.conftest import SMALL

@@ -19,8 +19,8 @@ COMMANDS = [["run"], ["list"], ["study", "plan"], ["study", "run"], ["study", "r
             ["study"], []]  # fmt: skip
 WORDS = [
     "--seed", "--set", "--preset", "--policy", "--fault", "--out", "--seeds", "--processes",
-    "--engine", "--shard", "--to", "--json", "--pilot", "scenario",
-    "faults", "--fail-if", "--effect", "--power", "--at", "--help",
+    "--engine", "--shard", "--to", "--json", "scenario",
+    "faults", "--fail-if", "--effect", "--help",
     "--version", "0", "-1", "1.5", "nan", "1e400", "99999999999999999999", "", " ", "\n", "=", "x",
     "here", "nowhere/x", "mine.toml", "none.csv", "paper", "quick", "n_robots=0", "n_robots={}",
     "n_robots=[1", "duration=0.2", "duration=1e-300", "duration=null", "n_items=1e9", "local",

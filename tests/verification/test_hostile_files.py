@@ -147,7 +147,6 @@ def test_a_study_file_runs_no_code_unless_it_is_allowed_to(
     for arguments in (
         ["plan", "mine.toml"],
         ["run", "mine.toml", "--out", "out"],
-        ["plan", "mine.toml", "--pilot", "2"],
     ):
         assert app.run(["study", *arguments]) == 2
         said = capsys.readouterr().err
