@@ -14,7 +14,7 @@ from .definitions import (
 from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .inputs import IndicatorError
-from .multiplicity import FaultBudget, adjust, adjusted_p_values, fault_budget, holm, look_alphas
+from .multiplicity import adjust, adjusted_p_values, holm, look_alphas
 from .power import (
     lower_decile_of_power,
     minimum_detectable_effect,
@@ -39,7 +39,6 @@ from .trials import Trial, Trials, read_trials
 __all__ = [
     "Equivalence",
     "Estimate",
-    "FaultBudget",
     "IndicatorError",
     "Interval",
     "Options",
@@ -51,7 +50,6 @@ __all__ = [
     "adjust",
     "adjusted_p_values",
     "equivalence",
-    "fault_budget",
     "fault_tolerance",
     "holm",
     "interquartile_mean",
@@ -80,11 +78,13 @@ __all__ = [
 # Public names that went with 0.3.0, and where to look instead.
 _TWO_CHECKS = "use check_policy, or check_wrapper"
 REMOVED = {
+    "spi.FaultBudget": "use spi.robustness of each m, from 1 up",
     "spi.ScalingFit": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.SelfRepair": "use spi.repair_times with spi.kaplan_meier",
     "spi.Simulation": "judge the real runs alone",
     "spi.Spending": "leave it out: spi.look_alphas spends alpha in proportion to the seeds",
     "spi.compare_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
+    "spi.fault_budget": "use spi.robustness of each m, from 1 up",
     "spi.fit_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.karp_flatt": "use spi.scalability: S = 1 where nothing is serial",
     "spi.mean_with_simulation": "use spi.mean_interval of the real runs alone",

@@ -121,7 +121,7 @@ class Estimate:
     def answer(self) -> Verdict:
         """The verdict; of identical runs what their exact value says, which is no evidence.
 
-        Gates and fault budgets ask for it: "is it above the threshold?" has an answer there.
+        Gates ask for it: "is it above the threshold?" has an answer there.
         """
         if not self.identical:
             return self.verdict
