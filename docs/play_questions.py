@@ -22,7 +22,7 @@ from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.drawing import Draw, Panel, Point
 from swarm_logistics_env.report.section import DECIDED
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.fault_measures import RateCurve, rate_curves
+from swarm_logistics_env.studies.measures import RateCurve, rate_curves
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
 

@@ -22,7 +22,7 @@ from swarm_logistics_env.cli.judging import RECORDED, STUDY
 from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT, Setting
-from swarm_logistics_env.studies.policy_comparison import agreement
+from swarm_logistics_env.studies.measures import agreement
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import UNAFFECTED, Cell, Verdict, grouped
 

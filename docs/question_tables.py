@@ -14,7 +14,7 @@ from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.estimate import SIGNS, Estimate
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
-from swarm_logistics_env.studies.policy_comparison import (
+from swarm_logistics_env.studies.measures import (
     cells_against_baseline,
     indicators_against_baseline,
     jackknife_interval,

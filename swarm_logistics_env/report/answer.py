@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.policy_comparison import cells_against_baseline
+from swarm_logistics_env.studies.measures import cells_against_baseline
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from swarm_logistics_env.studies.fault_measures import RateCurve, RepairCurve
+from swarm_logistics_env.studies.measures import RateCurve, RepairCurve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

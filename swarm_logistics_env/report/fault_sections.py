@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.comparison import Comparison
-from swarm_logistics_env.studies.fault_measures import (
+from swarm_logistics_env.studies.measures import (
     RepairCurve,
     Resilience,
     mid_run_faults,
@@ -98,71 +98,82 @@ def _not_back(curve: RepairCurve) -> str:
     return f"{curve.censored} of {curve.total} runs"
 
 
-def _panels(results: StudyResults) -> list[list[Comparison]]:
-    """Return the faults in mid-run that share a figure: all m of one mode and onset."""
+def _by_mode(results: StudyResults) -> Iterator[tuple[Comparison, list[Comparison]]]:
+    """Yield the faults in mid-run that share a figure, after the first of them."""
 
     def place(one: Comparison) -> tuple[str, str, int, str, float]:
         setting = one.changed.setting
         return one.policy, one.table, one.n_robots, setting.name, setting.onset
 
-    return list(grouped(mid_run_faults(results), place).values())
+    for compared in grouped(mid_run_faults(results), place).values():
+        yield compared[0], compared
+
+
+def _figure(
+    name: str,
+    one: Comparison,
+    caption: str,
+    columns: list[str],
+    panels: Mapping[str, Iterable[tuple[str, Iterable[Iterable[float]]]]],
+    draw: drawing.Draw,
+) -> Iterator[Figure]:
+    """Yield a figure with a panel for each number of faulty robots, unless there is no curve."""
+    import pandas as pd
+
+    rows = [
+        (title, runs, *point)
+        for title, curves in panels.items()
+        for runs, points in curves
+        for point in points
+    ]
+    setting = one.changed.setting
+    if rows:
+        yield Figure(
+            slug(name, one.policy, one.table, setting.name, f"{setting.onset:g}s"),
+            f"{one.policy}, {one.table}, N = {one.n_robots}: {caption}",
+            pd.DataFrame(rows, columns=columns),
+            0.6 + 2.2 * len(panels),
+            draw,
+        )
 
 
 def _rate_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
-    import pandas as pd
-
-    for compared in _panels(results):
-        one, setting = compared[0], compared[0].changed.setting
+    for one, compared in _by_mode(results):
+        setting, window = one.changed.setting, window_of(one)
         panels = {f"m = {c.changed.setting.value:g}": rate_curves(results, c) for c in compared}
-        rows = [
-            (title, curve.runs, *point)
-            for title, curves in panels.items()
-            for curve in curves
-            for point in zip(*curve[1:])
-        ]
-        if rows:
-            window = window_of(one)
-            yield Figure(
-                slug("deliveries", one.policy, one.table, setting.name, f"{setting.onset:g}s"),
-                f"{one.policy}, {one.table}, N = {one.n_robots}: deliveries in the trailing "
-                f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
-                f"line). Mean over {section.seeds_text(results)} with pointwise 95 % t-intervals.",
-                pd.DataFrame(rows, columns=_RATE_DATA),
-                0.6 + 2.3 * len(panels),
-                partial(
-                    drawing.rates,
-                    panels=panels,
-                    onset=setting.onset,
-                    y_label=f"deliveries in {window:g} s",
-                ),
-            )
+        yield from _figure(
+            "deliveries",
+            one,
+            f"deliveries in the trailing {window:g} s around failure mode {setting.name} from "
+            f"{setting.onset:g} s (dotted line). Mean over {section.seeds_text(results)} with "
+            "pointwise 95 % t-intervals.",
+            _RATE_DATA,
+            {title: [(c.runs, zip(*c[1:])) for c in curves] for title, curves in panels.items()},
+            partial(
+                drawing.rates,
+                panels=panels,
+                onset=setting.onset,
+                y_label=f"deliveries in {window:g} s",
+            ),
+        )
 
 
 def _repair_figures(
     results: StudyResults, singles: dict[Comparison, tuple[RepairCurve, ...]]
 ) -> Iterator[Figure]:
     """Yield the curves of single runs' times to come back, a figure per failure mode."""
-    import pandas as pd
-
-    for compared in _panels(results):
-        one, setting = compared[0], compared[0].changed.setting
+    for one, compared in _by_mode(results):
+        setting = one.changed.setting
         panels = {f"m = {c.changed.setting.value:g}": singles[c] for c in compared if c in singles}
-        rows = [
-            (title, curve.runs, *point)
-            for title, curves in panels.items()
-            for curve in curves
-            for point in zip(*curve.curve)
-        ]
-        if rows:
-            yield Figure(
-                slug("self-repair", one.policy, one.table, setting.name, f"{setting.onset:g}s"),
-                f"{one.policy}, {one.table}, N = {one.n_robots}: share of runs whose delivery rate "
-                f"is not back yet after failure mode {setting.name} from {setting.onset:g} s, "
-                "beside pairs of runs without fault that differ in behaviour seeds alone. "
-                "Kaplan-Meier with pointwise 95 % intervals (Greenwood, log-log); "
-                f"{section.seeds_text(results)}; a cross where runs are censored.",
-                pd.DataFrame(rows, columns=_REPAIR_DATA),
-                0.6 + 2.1 * len(panels),
-                partial(drawing.repairs, panels=panels),
-            )
+        yield from _figure(
+            "self-repair",
+            one,
+            f"share of runs whose delivery rate is not back yet after failure mode {setting.name} "
+            f"from {setting.onset:g} s, beside pairs of runs without fault that differ in "
+            "behaviour seeds alone. Kaplan-Meier with pointwise 95 % intervals (Greenwood, "
+            f"log-log); {section.seeds_text(results)}; a cross where runs are censored.",
+            _REPAIR_DATA,
+            {title: [(c.runs, zip(*c.curve)) for c in curves] for title, curves in panels.items()},
+            partial(drawing.repairs, panels=panels),
+        )

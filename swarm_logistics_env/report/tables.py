@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from swarm_logistics_env.studies.comparison import CONFIDENCE
-from swarm_logistics_env.studies.policy_comparison import (
+from swarm_logistics_env.studies.measures import (
     Agreement,
     CellAgainstBaseline,
     IndicatorAgainstBaseline,
@@ -139,16 +139,9 @@ def warnings(results: StudyResults) -> Iterator[str]:
 
 
 _HOW_TO_READ = (
-    (
-        "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
-        "differences are paired by seed, their intervals jackknifed."
-    ),
-    (
-        "P: IQM is the mean without the lowest and the highest quarter of the seeds, worst tenth "
-        "the mean of the lowest tenth, rounded up to whole seeds. Differences are paired by seed "
-        "(t-interval), and so are ratios of mean P (Fieller); the last column is the share of "
-        "seeds with more deliveries, ties counting half (Wilson)."
-    ),
+    "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
+    "differences are paired by seed, their intervals jackknifed. Differences of P are paired by "
+    "seed (t-interval), and so are ratios of mean P (Fieller)."
 )
 
 
@@ -156,7 +149,7 @@ def policy_sections(results: StudyResults) -> Iterator[Section]:
     """Yield policy x indicator: values with differences, then P cell by cell."""
     if len(results.policies) < 2:
         return
-    yield Section("", lines=(*_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
+    yield Section("", lines=(_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
     questions = list(indicators_against_baseline(results))
     by_table = grouped(questions, lambda one: one.test.compared.table)
     for table, here in by_table.items():
@@ -192,13 +185,7 @@ def _cells_beside(table: str, cells: Sequence[CellAgainstBaseline], baseline: st
             ("condition", lambda one: str(one.cell.arm.setting)),
             ("policy", lambda one: one.cell.policy),
             ("mean P [95 %]", lambda one: section.mean_p(one.cell)),
-            ("IQM of P", lambda one: f"{one.interquartile_mean:.1f}"),
-            ("worst tenth", lambda one: f"{one.worst_decile:.1f}"),
             (f"P - {baseline}'s [95 %]", lambda one: section.bracketed(one.difference, 1)),
             (f"P / {baseline}'s [95 %]", lambda one: section.bracketed(one.ratio, 2)),
-            (
-                f"delivers more than {baseline} [95 %]",
-                lambda one: section.bracketed(one.improvement, 2),
-            ),
         ],
     )

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
 from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
@@ -196,47 +195,3 @@ class Comparison:
             saturated=[name for name, arm in named.items() if arm in saturated],
             identical=identical and not self.removed,
         )
-
-
-@dataclass(frozen=True)
-class Reference:
-    """Performances and yes/no claims that somebody published, without a number of runs.
-
-    Each performance is treated as one run.
-
-    Attributes:
-        source: whose they are, for the report.
-        performance: P at each setting [items].
-        cells: the settings that count as cells of the tables; a baseline repeated under another
-            name is none.
-        claims: whether the text says that the indicator is above the threshold.
-    """
-
-    source: str
-    performance: Mapping[Setting, float]
-    cells: tuple[Setting, ...]
-    claims: Mapping[Question, bool]
-
-    def estimate(self, comparison: Comparison) -> Estimate | None:
-        """Return the published value of an indicator, without interval, where there is one."""
-        if any(arm.setting not in self.performance for arm in comparison.arms):
-            return None
-        return comparison.estimate(
-            {arm: np.array([self.performance[arm.setting]]) for arm in comparison.arms}
-        )
-
-
-def load_reference(name: str | None) -> Reference | None:
-    """Return the reference of that name; None for none.
-
-    Raises:
-        StudyError: there is none of that name.
-    """
-    if name is None:
-        return None
-    from .presets import PAPER
-
-    known = {"paper": PAPER}
-    if name not in known:
-        raise StudyError(f"no reference {name!r}{suggest(name, known)}")
-    return known[name]

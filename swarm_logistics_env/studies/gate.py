@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
@@ -37,8 +37,7 @@ _Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
-@dataclass(frozen=True)
-class Match:
+class Match(NamedTuple):
     """One condition that both studies hold.
 
     Attributes:
@@ -51,11 +50,11 @@ class Match:
     after: Cell
 
 
-@dataclass(frozen=True)
-class Unmatched:
+class Unmatched(NamedTuple):
     """A judged policy of one study that the other gives nothing to compare with.
 
     Attributes:
+        policy: its label.
         names: of its conditions, as `Match.name`.
         problem: one sentence that names the policy and says what is missing.
     """
@@ -90,12 +89,16 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     partners = {label: label for label in after if label in before}
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
-    matches: list[Match] = []
-    unmatched = [
-        *_without_partner(before, partners.values(), "old", "new", tuple(after)),
-        *_without_partner(after, partners, "new", "old", tuple(before)),
-    ]
-    notes: list[str] = []
+    matches, unmatched, notes = list[Match](), list[Unmatched](), list[str]()
+    for study, judged, other, others, known in (
+        ("old", before, "new", after, {*partners.values()}),
+        ("new", after, "old", before, {*partners}),
+    ):
+        for label in (label for label in judged if label not in known):
+            problem = f"policy {label!r} of the {study} study has no match: the {other} study "
+            problem += f"judges {', '.join(map(repr, others)) or 'no policy'}"
+            names = tuple(_name(label, cell) for cell in judged[label].values())
+            unmatched.append(Unmatched(label, names, problem))
     for label, old_label in partners.items():
         named = label if label == old_label else f"{old_label} -> {label}"
         theirs, ours = before[old_label], after[label]
@@ -106,13 +109,21 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
             unmatched.append(Unmatched(named, names, problem))
             continue
         matches += [Match(_name(named, ours[c]), theirs[c], ours[c]) for c in common]
-        notes += _only_in("old", named, theirs, ours)
-        notes += _only_in("new", named, ours, theirs)
+        for study, own in (("old", theirs), ("new", ours)):
+            alone = [f"{c.words} ({c.table})" for at, c in own.items() if at not in common]
+            if alone:
+                told = f"{named}, {'; '.join(alone)}"
+                notes.append(f"Only in the {study} study, and not compared: {told}.")
     seeds = None
     if old.plan.paired and new.plan.paired:
         seeds = tuple(sorted({*old.plan.seeds} & {*new.plan.seeds}))
-    if seeds:
-        notes += _seed_notes(seeds, old, new)
+    for study, results in (("old", old), ("new", new)) if seeds else ():
+        extra = [seed for seed in results.plan.seeds if seed not in (seeds or ())]
+        if seeds and extra:
+            notes.append(
+                f"Only in the {study} study, and left out: seeds {seeds_in_words(extra)}. "
+                f"Runs are paired over the shared seeds, {seeds_in_words(seeds)}."
+            )
     return Matching(tuple(matches), tuple(unmatched), seeds, tuple(notes))
 
 
@@ -137,40 +148,7 @@ def _judged(results: StudyResults) -> _Judged:
 
 
 def _name(policy: str, cell: Cell) -> str:
-    return f"{policy}: change, {cell.arm.setting} ({cell.table})"
-
-
-def _without_partner(
-    own: _Judged, matched: Iterable[str], study: str, other: str, theirs: Sequence[str]
-) -> Iterator[Unmatched]:
-    known = set(matched)
-    for label in (label for label in own if label not in known):
-        yield Unmatched(
-            label,
-            tuple(_name(label, cell) for cell in own[label].values()),
-            f"policy {label!r} of the {study} study has no match: the {other} study judges "
-            + (", ".join(map(repr, theirs)) or "no policy"),
-        )
-
-
-def _only_in(
-    study: str, policy: str, own: Mapping[_Content, Cell], others: Mapping[_Content, Cell]
-) -> Iterator[str]:
-    lacking = [cell for content, cell in own.items() if content not in others]
-    if lacking:
-        settings = "; ".join(f"{cell.arm.setting} ({cell.table})" for cell in lacking)
-        yield f"Only in the {study} study, and not compared: {policy}, {settings}."
-
-
-def _seed_notes(seeds: Sequence[int], old: StudyResults, new: StudyResults) -> Iterator[str]:
-    shared = set(seeds)
-    for study, results in (("old", old), ("new", new)):
-        extra = [seed for seed in results.plan.seeds if seed not in shared]
-        if extra:
-            yield (
-                f"Only in the {study} study, and left out: seeds {seeds_in_words(extra)}. "
-                f"Runs are paired over the shared seeds, {seeds_in_words(seeds)}."
-            )
+    return f"{policy}: change, {cell.words} ({cell.table})"
 
 
 SUBJECTS = "|".join(DEFINITIONS)
@@ -280,16 +258,16 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
             f"gate {gate.text!r}: the studies hold no {gate.subject}{where}, so it tests nothing"
         )
     verdicts = iter(spi.adjust([value for _, value in asked if isinstance(value, Estimate)]))
-    return tuple(_answer(gate, name, value, verdicts) for name, value in asked)
-
-
-def _answer(gate: Gate, name: str, value: _Found, verdicts: Iterator[Verdict]) -> GateAnswer:
-    if isinstance(value, str):
-        return GateAnswer(name, fails=True, problem=value)
-    if isinstance(value, float):
-        return GateAnswer(name, gate.holds_for(value), exact=value)
-    verdict = next(verdicts)
-    return GateAnswer(name, gate.fails_on(verdict), estimate=value, verdict=verdict)
+    said = []
+    for name, value in asked:
+        if isinstance(value, str):
+            said.append(GateAnswer(name, fails=True, problem=value))
+        elif isinstance(value, float):
+            said.append(GateAnswer(name, gate.holds_for(value), exact=value))
+        else:
+            verdict = next(verdicts)
+            said.append(GateAnswer(name, gate.fails_on(verdict), value, verdict))
+    return tuple(said)
 
 
 def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:

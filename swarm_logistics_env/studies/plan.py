@@ -14,7 +14,8 @@ from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.task import Case, Run
 
-from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, load_reference
+from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .presets import load_reference
 from .specification import Ablation, Factor, Faults, Manner, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`

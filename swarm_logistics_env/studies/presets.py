@@ -1,4 +1,4 @@
-"""The studies that come with the package, and the paper's tables and claims for one of them.
+"""The studies that come with the package, and published values: the paper's, and how near we come.
 
 Source: Milner, Sooriyabandara and Hauert, Swarm Performance Indicators: Metrics for Robustness,
 Fault Tolerance, Scalability and Adaptability; Tables I to III and the text around them.
@@ -7,12 +7,45 @@ Fault Tolerance, Scalability and Adaptability; Tables I to III and the text arou
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from swarm_logistics_env.errors import StudyError, suggest
+import numpy as np
 
-from .comparison import NO_FAULT, Question, Reference, Setting
+from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.spi.estimate import Estimate
+
+from .comparison import NO_FAULT, Comparison, Question, Setting
 from .specification import Specification, read_study_file
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Performances and yes/no claims that somebody published, without a number of runs.
+
+    Each performance is treated as one run.
+
+    Attributes:
+        source: whose they are, for the report.
+        performance: P at each setting [items].
+        cells: the settings that count as cells of the tables; a baseline repeated under another
+            name is none.
+        claims: whether the text says that the indicator is above the threshold.
+    """
+
+    source: str
+    performance: Mapping[Setting, float]
+    cells: tuple[Setting, ...]
+    claims: Mapping[Question, bool]
+
+    def estimate(self, comparison: Comparison) -> Estimate | None:
+        """Return the published value of an indicator, without interval, where there is one."""
+        if any(arm.setting not in self.performance for arm in comparison.arms):
+            return None
+        return comparison.estimate(
+            {arm: np.array([self.performance[arm.setting]]) for arm in comparison.arms}
+        )
 
 
 def size(n: int) -> Setting:
@@ -111,3 +144,15 @@ def load_preset(name: str) -> Specification:
     if name not in PRESETS:
         raise StudyError(f"no study preset {name!r}{suggest(name, PRESETS)}")
     return PRESETS[name]
+
+
+def load_reference(name: str | None) -> Reference | None:
+    """Return the reference of that name; None for none.
+
+    Raises:
+        StudyError: there is none of that name.
+    """
+    known = {"paper": PAPER}
+    if name is not None and name not in known:
+        raise StudyError(f"no reference {name!r}{suggest(name, known)}")
+    return None if name is None else known[name]

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.tasks.task import Outcome
 
-from .comparison import Arm, Reference, load_reference
+from .comparison import Arm
 from .declaration import Declaration
 from .plan import Plan
+from .presets import Reference, load_reference
 from .runs import Outcomes
 from .until_clear import standing
 from .verdict import Cell, Verdict, judge_one, under_holm

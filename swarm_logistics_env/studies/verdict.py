@@ -17,7 +17,8 @@ from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
 
-from .comparison import CONFIDENCE, Arm, Comparison, Reference, Setting
+from .comparison import CONFIDENCE, Arm, Comparison, Setting
+from .presets import Reference
 
 POWER = 0.8
 UNAFFECTED = "unaffected"

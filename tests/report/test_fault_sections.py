@@ -14,16 +14,14 @@ from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT, OTHER_BEHAVIOUR, Setting
-from swarm_logistics_env.studies.fault_measures import (
+from swarm_logistics_env.studies.measures import (
     RateCurve,
     Resilience,
-    rate_curves,
-    resiliences,
-)
-from swarm_logistics_env.studies.policy_comparison import (
     cells_against_baseline,
     indicators_against_baseline,
     jackknife_interval,
+    rate_curves,
+    resiliences,
 )
 from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
@@ -190,12 +188,9 @@ def test_policies_are_set_against_the_first() -> None:
     first, second = entries["swarm-dt", "N = 10"], entries["random-walk", "N = 10"]
     assert first.difference is None
     assert first.cell.by_seed.tolist() == [20, 22, 24, 26] * 2
-    assert (first.interquartile_mean, first.worst_decile) == (23.0, 20.0)
     assert second.difference == spi.mean_interval([20, 22, 24, 26] * 2)
     assert first.ratio is None
     assert second.ratio == pytest.approx((2.0, 2.0, 2.0))
-    assert second.improvement is not None
-    assert second.improvement.value == 1.0
     # Twice the deliveries everywhere leaves every ratio as it was.
     one, *_ = indicators_against_baseline(found)
     assert one.differences["random-walk"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)

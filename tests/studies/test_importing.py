@@ -11,8 +11,8 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study, presets
-from swarm_logistics_env.studies.fault_measures import resiliences
 from swarm_logistics_env.studies.importing import import_results
+from swarm_logistics_env.studies.measures import resiliences
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 from tests.studies.made_up import GOLDEN

@@ -12,7 +12,7 @@ from swarm_logistics_env.report.tables import warnings
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.declaration import Declaration
-from swarm_logistics_env.studies.policy_comparison import agreement, agreements
+from swarm_logistics_env.studies.measures import agreement, agreements
 from swarm_logistics_env.studies.results import (
     CELL_COLUMNS,
     VERDICT_COLUMNS,
