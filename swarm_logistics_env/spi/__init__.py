@@ -27,12 +27,9 @@ from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_in
 from .stalls import share_stalled
 from .summaries import (
     Interval,
-    interquartile_mean,
     mean_interval,
     pairing_correlation,
     prediction_interval,
-    probability_of_improvement,
-    worst_decile,
 )
 from .trials import Trial, Trials, read_trials
 
@@ -52,7 +49,6 @@ __all__ = [
     "equivalence",
     "fault_tolerance",
     "holm",
-    "interquartile_mean",
     "kaplan_meier",
     "look_alphas",
     "lower_decile_of_power",
@@ -61,7 +57,6 @@ __all__ = [
     "no_plan_because",
     "pairing_correlation",
     "prediction_interval",
-    "probability_of_improvement",
     "read_trials",
     "relative_change",
     "repair_times",
@@ -72,7 +67,6 @@ __all__ = [
     "seeds_for_equivalence",
     "seeds_for_power",
     "share_stalled",
-    "worst_decile",
 ]
 
 # Public names that went with 0.3.0, and where to look instead.
@@ -86,9 +80,12 @@ REMOVED = {
     "spi.compare_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.fault_budget": "use spi.robustness of each m, from 1 up",
     "spi.fit_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
+    "spi.interquartile_mean": "use scipy.stats.trim_mean(p, 0.25)",
     "spi.karp_flatt": "use spi.scalability: S = 1 where nothing is serial",
     "spi.mean_with_simulation": "use spi.mean_interval of the real runs alone",
+    "spi.probability_of_improvement": "use numpy.mean(p_new > p_o), or spi.relative_change",
     "spi.self_repair": "use spi.repair_times with spi.kaplan_meier",
+    "spi.worst_decile": "use numpy.sort(p)[: ceil(n / 10)].mean()",
     "testing.check_conservation": f"{_TWO_CHECKS}; verification/invariants.py counts items",
     "testing.check_determinism": _TWO_CHECKS,
     "testing.check_faults": f"{_TWO_CHECKS}; verification/invariants.py watches faults",

@@ -30,44 +30,6 @@ def test_prediction_interval_is_that_of_one_further_run() -> None:
 def test_one_run_has_no_interval() -> None:
     assert spi.mean_interval([39]) == (39.0, None, None)
     assert spi.prediction_interval([39]) == (39.0, None, None)
-    assert spi.probability_of_improvement([39], [40]) == (1.0, None, None)
-
-
-def test_interquartile_mean_drops_a_quarter_on_each_side() -> None:
-    from scipy.stats import trim_mean
-
-    assert spi.interquartile_mean([100, 1, 3, 0]) == 2.0
-    assert spi.interquartile_mean([5, 1, 9]) == 5.0
-    for n in range(1, 14):
-        p = np.random.default_rng(n).poisson(39, n)
-        assert spi.interquartile_mean(p) == pytest.approx(trim_mean(p, 0.25))
-
-
-def test_worst_decile_is_the_mean_of_the_worst_tenth() -> None:
-    assert spi.worst_decile(np.arange(20)) == 0.5
-    assert spi.worst_decile(np.arange(21)) == 1.0
-    assert spi.worst_decile([7, 3, 5]) == 3.0
-
-
-def test_probability_of_improvement_counts_pairs_and_halves_ties() -> None:
-    p_o = np.array([10, 10, 10, 10])
-    interval = spi.probability_of_improvement(p_o, [11, 12, 10, 9])
-    assert interval.value == 0.625
-    # The pairs decide, not the marginal order: each seed improves by 1 under a spread of 30.
-    seeds = np.array([10.0, 20, 30, 40])
-    assert spi.probability_of_improvement(seeds, seeds + 1).value == 1.0
-
-
-def test_its_interval_is_wilsons() -> None:
-    # 7 of 10: Wilson .397 to .892 (Newcombe 1998)
-    p_o = np.full(10, 5)
-    p_new = np.array([6] * 7 + [4] * 3)
-    _, low, high = spi.probability_of_improvement(p_o, p_new)
-    assert low == pytest.approx(0.3968, abs=1e-4)
-    assert high == pytest.approx(0.8922, abs=1e-4)
-    all_better = spi.probability_of_improvement(p_o, p_o + 1)
-    assert all_better.low == pytest.approx(0.7225, abs=1e-4)
-    assert all_better.high == 1.0
 
 
 def test_pairing_correlation() -> None:
@@ -80,7 +42,7 @@ def test_pairing_correlation() -> None:
 
 @pytest.mark.parametrize(
     "summary",
-    [spi.mean_interval, spi.prediction_interval, spi.interquartile_mean, spi.worst_decile],
+    [spi.mean_interval, spi.prediction_interval],
 )
 @pytest.mark.parametrize(("bad", "message"), [([], "empty"), ([1, -1], "negative")])
 def test_bad_samples_are_named(summary: Callable[..., Any], bad: list[int], message: str) -> None:
@@ -91,10 +53,8 @@ def test_bad_samples_are_named(summary: Callable[..., Any], bad: list[int], mess
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: spi.probability_of_improvement(P, P[:3]), "unequal seed sets"),
         (lambda: spi.pairing_correlation(P, P[:3]), "unequal seed sets"),
         (lambda: spi.mean_interval(P, confidence=95), "confidence = 95"),
-        (lambda: spi.probability_of_improvement(P, P, confidence=95), "confidence = 95"),
     ],
 )
 def test_bad_comparisons_are_named(call: Callable[[], Any], message: str) -> None:
