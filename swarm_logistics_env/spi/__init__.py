@@ -16,7 +16,6 @@ from .estimate import Estimate, Options, Verdict
 from .inputs import IndicatorError
 from .multiplicity import adjust, adjusted_p_values, holm, look_alphas
 from .power import (
-    lower_decile_of_power,
     minimum_detectable_effect,
     no_plan_because,
     seeds_against_stalls,
@@ -51,7 +50,6 @@ __all__ = [
     "holm",
     "kaplan_meier",
     "look_alphas",
-    "lower_decile_of_power",
     "mean_interval",
     "minimum_detectable_effect",
     "no_plan_because",
@@ -82,6 +80,7 @@ REMOVED = {
     "spi.fit_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.interquartile_mean": "use scipy.stats.trim_mean(p, 0.25)",
     "spi.karp_flatt": "use spi.scalability: S = 1 where nothing is serial",
+    "spi.lower_decile_of_power": "use spi.seeds_for_power of a larger power",
     "spi.mean_with_simulation": "use spi.mean_interval of the real runs alone",
     "spi.probability_of_improvement": "use numpy.mean(p_new > p_o), or spi.relative_change",
     "spi.self_repair": "use spi.repair_times with spi.kaplan_meier",
