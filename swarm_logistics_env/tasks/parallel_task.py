@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
@@ -227,7 +227,8 @@ class ParallelTask:
                 gains.append(float(self._gain(env, rewards, infos)))
         finally:
             env.close()
-        return self._outcome(gains, recorded.digest(gains), _failed(seed, n_robots, faults))
+        most = max((fault.robots for fault in faults), default=0)
+        return self._outcome(gains, recorded.digest(gains), failing_rows(seed, n_robots, most))
 
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
@@ -311,11 +312,6 @@ class _Recorded(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is u
             space = self.env.observation_space(agent)
             self._hash.update(np.asarray(flatten(space, observations[agent])).tobytes())
         self._hash.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
-
-
-def _failed(seed: int, n_robots: int, faults: Sequence[RobotFault]) -> tuple[int, ...]:
-    most = max((fault.robots for fault in faults), default=0)
-    return failing_rows(seed, n_robots, most)
 
 
 def environment_version(

@@ -70,9 +70,10 @@ class WarehouseTask:
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one episode; see `Task.play`."""
-        scenario, faults = _of_the_warehouse(case)
+        assert isinstance(case.scenario, Scenario)
+        faults = [fault for fault in case.faults if isinstance(fault, Fault)]
         # A policy of its own: one that remembers must not make rows depend on the order of runs.
-        episode = run_episode(scenario, case.policy.load(), seed, faults, policy_seed)
+        episode = run_episode(case.scenario, case.policy.load(), seed, faults, policy_seed)
         return Outcome(
             delivery_times=episode.delivery_times,
             ended_at=episode.ended_at,
@@ -81,11 +82,6 @@ class WarehouseTask:
             anchoring_seconds=episode.anchoring_seconds,
             digest=episode.digest,
         )
-
-
-def _of_the_warehouse(case: Case) -> tuple[Scenario, tuple[Fault, ...]]:
-    assert isinstance(case.scenario, Scenario)
-    return case.scenario, tuple(fault for fault in case.faults if isinstance(fault, Fault))
 
 
 WAREHOUSE = WarehouseTask()

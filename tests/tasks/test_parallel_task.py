@@ -83,7 +83,7 @@ def test_a_study_plays_sizes_parameters_and_failure_modes(study: Study) -> None:
     study.report()
     assert study.out is not None
     text = (study.out / "report.md").read_text()
-    assert "Performance P is the sum of the rewards." in text
+    assert "P is the sum of the rewards." in text
     assert "its actions are replaced by the task's no-op" in text
 
 
