@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
@@ -12,8 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import SetupError, TrainingError
+from swarm_logistics_env.policies import called, known_policies, load, read_card
+from swarm_logistics_env.report.section import bracketed
+from swarm_logistics_env.scenario import SOURCES
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.play import engine_named
+from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.train.training import preset_names
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.fault_text import text_of
 
 from .application import (
     Application,
@@ -25,6 +32,7 @@ from .application import (
     TrustPolicyOption,
     faults_of,
     scenario_of,
+    show_table,
 )
 from .judging import judge_command
 from .study_commands import ProcessesOption, study
@@ -32,7 +40,6 @@ from .watch import watch_command, write_film_of
 
 if TYPE_CHECKING:
     from swarm_logistics_env.attack import AttackResult
-    from swarm_logistics_env.warehouse import Fault
 
 PolicyArgument = Annotated[
     str, typer.Argument(metavar="POLICY", help="Name, path of a file, or package.module:Class.")
@@ -62,7 +69,6 @@ def attack_command(
     What it finds bounds the worst fault from one side: there may be worse ones.
     """
     from swarm_logistics_env.attack import MODES, Attack, attack
-    from swarm_logistics_env.studies.play import engine_named
 
     asked = Attack(
         policy=policy,
@@ -78,23 +84,14 @@ def attack_command(
     try:
         found = attack(asked, engine, place)
     except KeyboardInterrupt:
-        _stopped(place)
+        typer.echo(
+            f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
+        )
+        raise typer.Exit(130) from None
     _show_attack(found, policy, robots, fresh)
 
 
-def _stopped(place: Path) -> None:
-    typer.echo(
-        f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
-    )
-    raise typer.Exit(130) from None
-
-
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
-    from swarm_logistics_env.report.section import bracketed
-    from swarm_logistics_env.warehouse.fault_text import text_of
-
-    from .terminal_tables import show_table
-
     rows = [
         (
             found.by,
@@ -167,9 +164,13 @@ def _train(
     from swarm_logistics_env.train.training import load_training
 
     training = load_training(asked, **fields)
-    with _explained():
+    try:
         import_module("tensorboard")  # missed before anything is written
         from swarm_logistics_env.train.trainer import train
+    except ModuleNotFoundError as error:
+        raise TrainingError(
+            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
+        ) from error
     out = out or Path("results/train", training.name)
     log = shlex.quote(str(out / "tensorboard"))
     typer.echo(f"To follow it: tensorboard --logdir {log}")
@@ -179,10 +180,7 @@ def _train(
 
 
 def _show_training(path: Path) -> None:
-    from swarm_logistics_env.policies import read_card
     from swarm_logistics_env.train.curve import BEST, PICTURE
-
-    from .terminal_tables import show_table
 
     card = read_card(path)
     rows = tuple(
@@ -204,16 +202,6 @@ def _show_training(path: Path) -> None:
         )
     typer.echo(f"Curve: {path.parent / PICTURE}")
     typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
-
-
-@contextmanager
-def _explained() -> Iterator[None]:
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise TrainingError(
-            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
-        ) from error
 
 
 def run_command(
@@ -249,9 +237,6 @@ def run_command(
 ) -> None:
     """Play one episode and print what it delivered, or write it as a film."""
     import time
-
-    from swarm_logistics_env.episode import run_episode
-    from swarm_logistics_env.policies import called, load
 
     scenario = scenario_of(preset, scenario_file, changes)
     scheduled = faults_of(faults, scenario)
@@ -309,10 +294,6 @@ def list_command(
     ] = False,
 ) -> None:
     """List policies, faults (failure modes), studies, or every condition of a scenario."""
-    from swarm_logistics_env.scenario import SOURCES
-
-    from .terminal_tables import show_table
-
     if what is Listed.scenario:
         chosen = scenario_of(preset, scenario_file, changes)
         if as_json:
@@ -326,20 +307,13 @@ def list_command(
         columns = ("condition", "value", "unit, meaning; source")
         show_table(f"Preset {preset}", columns, chosen.conditions(), marks, sources)
     elif what is Listed.policies:
-        from swarm_logistics_env.policies import known_policies
-
         line = "Your own is package.module:Class, or the path of a file that `train` wrote."
         show_table("Policies", ("name", "kind", "about"), known_policies(), line)
     elif what is Listed.faults:
-        from swarm_logistics_env.warehouse import FAILURE_MODES
-
         rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
         line = "As --fault takes one: MODE:ROBOTS@ONSET, e.g. FM4:2@200"
         show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
     else:
-        from swarm_logistics_env.studies import Study
-        from swarm_logistics_env.studies.presets import PRESETS
-
         plans = [(name, Study.preset(name).plan()) for name in PRESETS]
         found = [
             (

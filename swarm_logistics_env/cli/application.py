@@ -1,25 +1,47 @@
-"""The application object, where errors become one sentence, and the options that commands share."""
+"""The application: errors in one sentence, options that commands share, tables at the terminal.
+
+Sections are drawn at a terminal, and Markdown elsewhere.
+"""
 
 from __future__ import annotations
 
 import errno
 import json
 import os
+import re
 import shlex
 import sys
 import traceback
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
 
-from swarm_logistics_env.errors import FaultError, ScenarioError
-from swarm_logistics_env.records import read_table
+from swarm_logistics_env import spi
+from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
+from swarm_logistics_env.policies import policy
+from swarm_logistics_env.records import plain, read_table
+from swarm_logistics_env.report.answer import MOST_LINES, Answer, answer, digest
+from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.section import NOTHING, WORDS, Section, number
+from swarm_logistics_env.report.write import (
+    how_to_get_figures,
+    missing_packages,
+    section_markdown,
+    write_report,
+)
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.spi.estimate import SIGNS
+from swarm_logistics_env.studies.play import Tally
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import POWER, Verdict
+from swarm_logistics_env.warehouse.fault_text import fault_of
+from swarm_logistics_env.warehouse.faults import Fault
 
 # A disk, a quota or a file that is full; a pipe that nobody reads.
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EPIPE)
@@ -83,10 +105,7 @@ def _sentence(error: Exception) -> str | None:
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
         return str(format_message())
-    from swarm_logistics_env.errors import SwarmLogisticsError
-    from swarm_logistics_env.spi import IndicatorError
-
-    if isinstance(error, SwarmLogisticsError | IndicatorError):
+    if isinstance(error, SwarmLogisticsError | spi.IndicatorError):
         return str(error)
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
@@ -97,8 +116,6 @@ def _sentence(error: Exception) -> str | None:
 
 def _of_a_policy(error: Exception) -> str | None:
     """Return what a user's own policy raised, and where; None if the error came from elsewhere."""
-    from swarm_logistics_env.policies import policy
-
     frames = traceback.extract_tb(error.__traceback__)
     calls = [number for number, frame in enumerate(frames) if frame.filename == policy.__file__]
     if not calls:
@@ -116,8 +133,6 @@ def _of_a_policy(error: Exception) -> str | None:
 
 
 def _complain(sentence: str, code: int) -> int:
-    from swarm_logistics_env.records import plain
-
     sys.stderr.write(f"swarm-logistics: {plain(sentence)}\n")  # it may repeat what was typed
     return code
 
@@ -182,8 +197,6 @@ def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
     Raises:
         FaultError: a text does not read so, there is no such fault, or the episode ends before.
     """
-    from swarm_logistics_env.warehouse.fault_text import fault_of
-
     faults = [fault_of(text) for text in texts or []]
     for fault, text in zip(faults, texts or []):
         if fault.onset >= scenario.duration:
@@ -191,3 +204,101 @@ def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
                 f"--fault {text}: should begin before the episode ends at {scenario.duration:g} s"
             )
     return faults
+
+
+_PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
+_COLOURS = {word: SIGNS[verdict].colour for verdict, word in WORDS.items()}
+_VERDICTS = re.compile(rf"(?<=  )({'|'.join(_COLOURS)})\b")
+
+
+def show(section: Section) -> None:
+    """Print one section."""
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        # No wrapping: whatever reads this knows no terminal width.
+        console.out(section_markdown(section), highlight=False)
+        return
+    console.rule(escape(plain(section.title)), align="left")
+    if section.columns:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for column in section.columns:
+            # Folded where a terminal is narrow: a number that is cut is another number.
+            table.add_column(escape(plain(column)), overflow="fold")
+        for row in section.rows:
+            table.add_row(*(escape(plain(value)) for value in row))
+        console.print(table)
+    for line in section.lines:
+        console.print(escape(plain(line)))
+    console.print()
+
+
+def show_table(
+    title: str, columns: Sequence[str], rows: Iterable[tuple[str, ...]], *lines: str
+) -> None:
+    """Print a table, and lines of text below it."""
+    show(Section(title, tuple(columns), tuple(rows), lines))
+
+
+def show_answer(found: Answer, *, whole: bool = False) -> None:
+    """Print the answer of a study on one screen, or with every line of it."""
+    console = Console(highlight=False)
+    width = console.width if console.is_terminal else _PLAIN_WIDTH
+    lines = digest(found, width, None if whole else MOST_LINES).split("\n")
+    shown = Text("\n".join(map(plain, lines)))
+    for word in _VERDICTS.finditer(shown.plain):
+        shown.stylize(_COLOURS[word[1]], *word.span())
+    console.print(shown, soft_wrap=True)
+
+
+def show_report(results: StudyResults, out: Path | None, *, full: bool = False) -> None:
+    """Print the answer of a study, the tables too if `full`, and write its report into `out`."""
+    whole = document(results)
+    for section in whole.summary if full else ():
+        show(section)
+    # Printed first: what was found is told even where no file can be written.
+    show_answer(answer(results, most=None) if full else whole.answer, whole=full)
+    if out:
+        typer.echo(f"Report: {write_report(results, out, whole)[0]}")
+        if missing := missing_packages():
+            typer.echo(how_to_get_figures(missing))
+
+
+def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
+    """Print the seeds that each comparison of a study needs for an effect, given or published."""
+    n_seeds, margin = len(results.plan.seeds), results.plan.specification.margin
+    columns = (
+        "policy", "verdict on", "assumed effect", f"seeds for {POWER:.0%} power",
+        f"distance that {n_seeds} seeds find", f"seeds for equivalent at {margin:.0%}",
+    )  # fmt: skip
+    hint = f"For another effect: swarm-logistics study plan {shlex.quote(asked)} --effect 0.2"
+    rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
+    show_table(f"Seeds needed, from {n_seeds} seeds", columns, rows, hint)
+
+
+def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
+    # Only the spread is taken from the runs, never the effect that they happened to show.
+    compared, estimate, same = test.compared, test.estimate, test.equivalence
+    seeds = test.problem or "no effect is named"
+    if estimate is not None and effect is not None:
+        seeds = spi.no_plan_because(estimate, effect) or str(
+            spi.seeds_for_power(estimate, effect, POWER)
+        )
+    return (
+        compared.policy,
+        f"{compared.indicator} > {compared.threshold:.3g}, {compared.label}",
+        number(effect),
+        seeds,
+        number(test.detectable),
+        NOTHING if same is None else number(spi.seeds_for_equivalence(same, POWER), 0),
+    )
+
+
+def in_one_line(tally: Tally, players: str) -> str:
+    """Return how many runs `players` have played, in which time."""
+    rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
+    error = plain(tally.error or "")
+    why = f", the first with {error}; study export has each traceback" if error else ""
+    return (
+        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
+        f"were kept from before; {tally.failed} failed{why}"
+    )

@@ -6,17 +6,26 @@ import json
 import os
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.policies import SUFFIXES, called, load
+from swarm_logistics_env.records import read_table
+from swarm_logistics_env.report.answer import in_a_sentence
+from swarm_logistics_env.report.section import slug
+from swarm_logistics_env.spi import mean_interval
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.declaration import StoredStudy
+from swarm_logistics_env.studies.importing import import_results
+from swarm_logistics_env.studies.play import engine_named
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.runs import FILE_NAME
+from swarm_logistics_env.studies.specification import FIRST_LOOK
 
-from .application import TrustPolicyOption
+from .application import TrustPolicyOption, in_one_line, show_report
 from .study_commands import FullOption, ProcessesOption, run_study, study_of
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.studies.results import StudyResults
 
 STUDY = "scorecard"
 JUDGE_SEEDS = 60  # of a policy that is judged
@@ -103,9 +112,6 @@ def judge_command(
             until_clear=until_clear, full=full, command=str(context.obj),
         )  # fmt: skip
         raise typer.Exit(1 if failed else 0)
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.declaration import StoredStudy
-    from swarm_logistics_env.studies.importing import import_results
 
     directory = out or _free(Path("results", "judged", Path(asked).stem))
     count = import_results(
@@ -124,8 +130,6 @@ def judge_command(
 
 def _free(directory: Path) -> Path:
     """Return a directory that holds no study yet: that one, or one with a number."""
-    from swarm_logistics_env.studies.runs import FILE_NAME
-
     number, free = 1, directory
     while (free / FILE_NAME).exists():
         number += 1
@@ -135,10 +139,6 @@ def _free(directory: Path) -> Path:
 
 def _finish(results: StudyResults, out: Path, *, full: bool) -> None:
     """Print the answer, a sentence for a paper, and what was written."""
-    from swarm_logistics_env.report.answer import in_a_sentence
-
-    from .terminal_tables import show_report
-
     show_report(results, out, full=full)
     typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
     typer.echo(f"For a paper: {in_a_sentence(results)}")
@@ -146,8 +146,6 @@ def _finish(results: StudyResults, out: Path, *, full: bool) -> None:
 
 def _stated(texts: list[str]) -> dict[str, str]:
     """Return the conditions that --setup states."""
-    from swarm_logistics_env.records import read_table
-
     stated: dict[str, str] = {}
     for text in texts:
         if "=" in text:
@@ -169,8 +167,6 @@ def _pair(option: str, text: str) -> tuple[str, str]:
 
 def names_policy(asked: str) -> bool:
     """Return whether the argument of `judge` is a policy, not a file of trials."""
-    from swarm_logistics_env.policies import SUFFIXES
-
     suffix = Path(asked).suffix
     if suffix in (*SUFFIXES, ".py"):
         return True
@@ -195,13 +191,6 @@ def _judge_policy(
 
     Every run is kept at once, so that the same command goes on after an interruption.
     """
-    from swarm_logistics_env.policies import called, load
-    from swarm_logistics_env.report.section import slug
-    from swarm_logistics_env.studies.play import engine_named
-    from swarm_logistics_env.studies.specification import FIRST_LOOK
-
-    from .terminal_tables import in_one_line
-
     load(asked, trust_code=trust_code)  # what is wrong with it is said before anything is written
     out = out or Path("results", "judged", slug(called(asked)))
     looks = until_clear and seeds > FIRST_LOOK
@@ -232,8 +221,6 @@ RECORDED = Path(__file__).parents[1] / "report" / "shipped_score_cards.json"
 
 def _rank(results: StudyResults) -> str | None:
     """Return the place of the policy among the shipped ones, where the intervals allow one."""
-    from swarm_logistics_env.spi import mean_interval
-
     mine = next(cell for cell in results.cells if cell.arm.setting.name == "none").mean
     told = json.loads(RECORDED.read_text(encoding="utf-8"))["policies"]
     beside = {name: mean_interval(one["p"]) for name, one in told.items()}

@@ -5,20 +5,25 @@ from __future__ import annotations
 import os
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.policies.files import SB3_SUFFIX
+from swarm_logistics_env.report.section import bracketed, said
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.declaration import merge
+from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
+from swarm_logistics_env.studies.plan import Shard
+from swarm_logistics_env.studies.play import Engine, Tally, engine_named
+from swarm_logistics_env.studies.runs import Runs, export
+from swarm_logistics_env.studies.specification import FIRST_LOOK
+from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
-if TYPE_CHECKING:
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.gate import GateAnswer
-    from swarm_logistics_env.studies.plan import Shard
-    from swarm_logistics_env.studies.play import Engine, Tally
+from .application import in_one_line, show_power, show_report, show_table
 
-SYMBOLS = tuple(DEFINITIONS)
 StudyArgument = Annotated[
     str,
     typer.Argument(
@@ -53,11 +58,6 @@ FullOption = Annotated[
 ]
 
 study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
-
-
-@study.callback()
-def group() -> None:
-    """Judge a swarm by its indicators."""
 
 
 @study.command("run")
@@ -105,13 +105,6 @@ def run_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Play the runs that are missing, then print the answer and write the report."""
-    from swarm_logistics_env.studies.plan import Shard
-    from swarm_logistics_env.studies.play import engine_named
-    from swarm_logistics_env.studies.specification import FIRST_LOOK
-    from swarm_logistics_env.studies.until_clear import MOST_SEEDS
-
-    from .terminal_tables import in_one_line, show_report
-
     part = Shard.parse(shard) if shard else None
     looks: dict[str, bool] = {}
     if until_clear:
@@ -147,9 +140,8 @@ def run_command(
             f"When all {part.count} shards are done: swarm-logistics study merge "
             f"{out}/shard-*-of-{part.count} --out {out}"
         )
-    players = {"local": "1 process", "ray": "Ray"}.get(
-        engine, f"{processes or os.cpu_count() or 1} processes"
-    )
+    count = f"{processes or os.cpu_count() or 1} processes"
+    players = {"local": "1 process", "ray": "Ray"}.get(engine, count)
     # The last line: where it is looked for after a report of many pages.
     typer.echo(in_one_line(tally, players))
     raise typer.Exit(1 if tally.failed else 0)
@@ -185,10 +177,6 @@ def plan_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print the conditions and count the runs; of a study that was run, the seeds that it needs."""
-    from swarm_logistics_env.studies import Study
-
-    from .terminal_tables import show_power, show_table
-
     if Path(asked).is_dir():
         if policies:
             raise StudyError("--policy: a study that was run has its own policies")
@@ -213,10 +201,6 @@ def report_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Print the answer and write the report of a study again, from its store alone."""
-    from swarm_logistics_env.studies import Study
-
-    from .terminal_tables import show_report
-
     stored = Study.stored(directory, trust_code=trust_code)
     typer.echo(f"{stored.plan()}\n")
     show_report(stored.findings(), stored.out, full=full)
@@ -234,7 +218,7 @@ def compare_command(
         list[str] | None,
         typer.Option(
             metavar="GATE",
-            help=f"[possibly] {'|'.join(SYMBOLS)} <|> NUMBER [at TEXT]; may be "
+            help=f"[possibly] {SUBJECTS} <|> NUMBER [at TEXT]; may be "
             "repeated. change is "
             "(P_new - P_old) / P_old; the others are NEW's. Plain: fails where it is so beyond "
             "chance; possibly: where that is not ruled out.",
@@ -243,9 +227,6 @@ def compare_command(
     trust_code: TrustCodeOption = False,
 ) -> None:
     """Compare two studies, condition by condition; end with 1 if a gate fails."""
-    from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.gate import Gate, answers, match
-
     gates = [Gate.parse(text) for text in fail_if or []]
     before, after = (
         Study.stored(directory, trust_code=trust_code).findings() for directory in (old, new)
@@ -264,10 +245,6 @@ def compare_command(
 
 
 def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str, ...]) -> None:
-    from swarm_logistics_env.report.section import bracketed, said
-
-    from .terminal_tables import show_table
-
     rows = []
     for answer in found:
         estimate = answer.estimate
@@ -287,8 +264,6 @@ def merge_command(
     out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
 ) -> None:
     """Make one store of those that shards or machines have filled."""
-    from swarm_logistics_env.studies.declaration import merge
-
     typer.echo(f"{merge(directories, out)} runs in {out}")
     typer.echo(f"Its report: swarm-logistics study report {shlex.quote(str(out))}")
 
@@ -299,8 +274,6 @@ def export_command(
     to: Annotated[Path, typer.Option(help="File to write, .csv.")],
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""
-    from swarm_logistics_env.studies.runs import Runs, export
-
     with Runs.existing(directory) as runs:
         count, digest = export(runs, to)
     typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
@@ -321,10 +294,6 @@ def study_of(
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
-    from swarm_logistics_env.policies import PolicySpec
-    from swarm_logistics_env.policies.files import SB3_SUFFIX
-    from swarm_logistics_env.studies import Study
-
     if seeds is not None:
         fields["seeds"] = seeds
     if first_seed is not None:

@@ -9,6 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm_logistics_env import policies
+from swarm_logistics_env.episode import Play
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.policies import Policy, called
+from swarm_logistics_env.records import becoming
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.faults import Fault
+
 from .application import (
     FaultOption,
     PolicyOption,
@@ -23,9 +31,6 @@ from .application import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from swarm_logistics_env.policies import Policy
-    from swarm_logistics_env.scenario import Scenario
-    from swarm_logistics_env.warehouse.faults import Fault
 
 FRAME_RATE = 25.0  # frames a second
 FILM_SIZE = 480  # longer side of each warehouse [px]
@@ -61,9 +66,6 @@ def watch_command(
     """Watch two runs side by side in the browser; inspect, break and repair robots."""
     import webbrowser
 
-    from swarm_logistics_env import policies
-    from swarm_logistics_env.errors import SetupError
-    from swarm_logistics_env.records import becoming
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.messages import recorded_page
     from swarm_logistics_env.watch.server import is_loopback, serve
@@ -122,14 +124,12 @@ def write_film_of(
     from rich.console import Console
     from rich.progress import Progress
 
-    from swarm_logistics_env.errors import SetupError
     from swarm_logistics_env.rendering.renderer import check_film, load_pygame, write_film
 
     if twin and not faults:
         raise SetupError("--twin: shows the run without its faults, so --fault should be given")
     check_film(out)
     load_pygame()
-    from swarm_logistics_env.episode import Play
     from swarm_logistics_env.watch.film import Film, Take
 
     takes = []
@@ -148,8 +148,6 @@ def write_film_of(
 
 
 def _short(policy: str) -> str:
-    from swarm_logistics_env.policies import called
-
     policy = called(policy)
     # A long path of a user's own policy is cut at its beginning.
     return policy if len(policy) <= 24 else f"…{policy[-23:]}"

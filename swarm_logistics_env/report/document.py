@@ -13,10 +13,9 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
-from .fault_sections import fault_sections
 from .figures import forest_figure, indicator_figures
 from .section import Figure, Section, sentence
-from .tables import policy_sections, tables, warnings
+from .tables import fault_sections, policy_sections, tables, warnings
 
 
 @dataclass(frozen=True)

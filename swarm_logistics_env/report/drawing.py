@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from swarm_logistics_env.studies.measures import RateCurve, RepairCurve
+from swarm_logistics_env.studies.measures import RateCurve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
 Draw: TypeAlias = "Callable[[Canvas], None]"
-Curve = TypeVar("Curve", RateCurve, RepairCurve)
 
 INK, PAPER = "#1b1b1b", "#ffffff"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
@@ -239,7 +238,8 @@ def rates(
         onset: when the fault begins [s].
         y_label: label of the axis of the rates.
     """
-    for axes, curves in _over_time(canvas, panels, "end of the window [s]", y_label):
+    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
+    for axes, (title, curves) in zip(grid[:, 0], panels.items()):
         for index, curve in enumerate(curves):
             colour = COLOURS[index % len(COLOURS)]
             if not np.isnan(curve.low).any():
@@ -249,42 +249,11 @@ def rates(
             line.set(linestyle=LINES[index % len(LINES)], marker=MARKERS[index % len(MARKERS)])
             line.set(markevery=(index * 4, 12), markersize=4.5)
         axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
+        axes.set(ylabel=y_label, title=title)
+    grid[-1, 0].set_xlabel("end of the window [s]")
+    _legend(canvas, grid[0, 0], lines=True)
     # After the last panel, as this fixes the scale, which all panels share.
     axes.set_ylim(bottom=0.0)
-
-
-def repairs(canvas: Canvas, panels: Mapping[str, Sequence[RepairCurve]]) -> None:
-    """Draw the share of runs that are not back, one panel below the other, on one scale."""
-    for axes, curves in _over_time(canvas, panels, "time from the onset [s]", "share not back"):
-        # The fault's colour is that of the rates; the null's is none of theirs.
-        for curve, colour, line in zip(curves, (COLOURS[2], INK), LINES):
-            seconds, share, low, high = (
-                np.concatenate([[first], column, column[-1:] if column.size else [first]])
-                for first, column in zip((0.0, 1.0, 1.0, 1.0), curve.curve)
-            )
-            seconds[-1] = curve.followed
-            # Once all runs are back no interval is defined, so the last one ends there.
-            known = int(np.count_nonzero(share > 0.0))
-            ends = [*range(known), known - 1]
-            until = np.append(seconds[:known], seconds[min(known, seconds.size - 1)])
-            band = until, low[ends], high[ends]
-            axes.fill_between(*band, step="post", color=colour, alpha=0.14, linewidth=0)
-            axes.step(seconds, share, line, where="post", color=colour, label=curve.runs)
-            if curve.censored:
-                axes.plot(seconds[-1], share[-1], "x", color=colour, markersize=6, clip_on=False)
-        axes.set(xlim=(0.0, None), ylim=(0.0, 1.05))
-
-
-def _over_time(
-    canvas: Canvas, panels: Mapping[str, Sequence[Curve]], x_label: str, y_label: str
-) -> Iterator[tuple[Axes, Sequence[Curve]]]:
-    """Yield the axes of each panel to draw on, then label them."""
-    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
-    for axes, (title, curves) in zip(grid[:, 0], panels.items()):
-        yield axes, curves
-        axes.set(ylabel=y_label, title=title)
-    grid[-1, 0].set_xlabel(x_label)
-    _legend(canvas, grid[0, 0], lines=True)
 
 
 def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:

@@ -1,4 +1,4 @@
-"""Figures of the indicators: what each shows, as a table and as a drawing."""
+"""Figures: what each shows, as a table and as a drawing."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
+from swarm_logistics_env.studies.comparison import Comparison
+from swarm_logistics_env.studies.measures import RateCurve, mid_run_faults, rate_curves, window_of
 from swarm_logistics_env.studies.results import StudyResults, frame_of_verdicts
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 
@@ -158,3 +160,37 @@ def _once(results: StudyResults) -> list[Verdict]:
 
     alike = grouped(results.verdicts, same).values()
     return [min(tests, key=lambda t: t.compared.threshold) for tests in alike]
+
+
+def rate_figures(results: StudyResults) -> Iterator[Figure]:
+    """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
+    import pandas as pd
+
+    def place(one: Comparison) -> tuple[str, str, int, str, float]:
+        setting = one.changed.setting
+        return one.policy, one.table, one.n_robots, setting.name, setting.onset
+
+    for compared in grouped(mid_run_faults(results), place).values():
+        one, setting, window = compared[0], compared[0].changed.setting, window_of(compared[0])
+        panels = {f"m = {c.changed.setting.value:g}": rate_curves(results, c) for c in compared}
+        rows = [
+            (title, curve.runs, *point)
+            for title, curves in panels.items()
+            for curve in curves
+            for point in zip(*curve[1:])
+        ]
+        if rows:
+            yield Figure(
+                slug("deliveries", one.policy, one.table, setting.name, f"{setting.onset:g}s"),
+                f"{one.policy}, {one.table}, N = {one.n_robots}: deliveries in the trailing "
+                f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
+                f"line). Mean over {seeds_text(results)} with pointwise 95 % t-intervals.",
+                pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:]]),
+                0.6 + 2.3 * len(panels),
+                partial(
+                    drawing.rates,
+                    panels=panels,
+                    onset=setting.onset,
+                    y_label=f"deliveries in {window:g} s",
+                ),
+            )

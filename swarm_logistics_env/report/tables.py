@@ -1,23 +1,28 @@
-"""Tables of results, claims, agreement with published values, policies side by side; warnings."""
+"""Tables: results, agreement with published values, policies side by side, faults; warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
+from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.measures import (
     Agreement,
     CellAgainstBaseline,
     IndicatorAgainstBaseline,
+    RepairCurve,
+    Resilience,
     agreements,
     cells_against_baseline,
     indicators_against_baseline,
+    resiliences,
 )
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
 from . import section
+from .figures import rate_figures
 from .section import NOTHING, Section
 
 CellColumn = tuple[str, Callable[[Cell], str]]
@@ -189,3 +194,75 @@ def _cells_beside(table: str, cells: Sequence[CellAgainstBaseline], baseline: st
             (f"P / {baseline}'s [95 %]", lambda one: section.bracketed(one.ratio, 2)),
         ],
     )
+
+
+_SINGLE_TEXT = (
+    "Until the first window in which a run delivers as much again as the paired run with the "
+    "robots removed; those that never do are censored (Kaplan and Meier). Deliveries scatter, so "
+    "what counts is the distance from the null: pairs without a fault that differ in behaviour."
+)
+
+
+def fault_sections(results: StudyResults) -> Iterator[Section]:
+    """Yield the measures of faults in mid-run, and the curves of what is delivered around them."""
+    found = list(resiliences(results))
+    if not found:
+        return
+    who: list[tuple[str, Callable[[Resilience], str]]] = [
+        ("policy", lambda one: one.compared.policy),
+        ("fault", lambda one: str(one.compared.changed.setting)),
+    ]
+    yield Section.table(
+        "Resilience: deliveries after the onset",
+        found,
+        [
+            *who,
+            ("over the removed robots' [95 %]", lambda r: section.bracketed(r.against_removed, 3)),
+            ("above 1", lambda one: _verdict(one.against_removed)),
+            ("over the whole swarm's [95 %]", lambda one: section.bracketed(one.against_whole, 3)),
+            ("above 1 - m/N", lambda one: _verdict(one.against_whole)),
+        ],
+        "Deliveries after the onset over those of the paired reference. Reference with the robots "
+        "removed at the onset: fault tolerance local in time; whole swarm: robustness local in "
+        f"time. Verdicts unadjusted; {section.seeds_text(results)}.",
+    )
+    figures = tuple(rate_figures(results))
+    if figures:
+        yield Section("", figures=figures)
+    single = [one for one in found if one.single]
+    problems = [
+        f"{one.compared.policy}, {one.compared.changed.setting}: no time to come back: "
+        f"{one.problem}."
+        for one in found
+        if one.problem
+    ]
+    yield Section.table(
+        "Time until single runs are back",
+        single,
+        [
+            *who,
+            ("median [s]", lambda one: _median(one.single[0])),
+            ("not back", lambda one: _not_back(one.single[0])),
+            ("null's median [s]", lambda one: _median(one.single[1])),
+            ("null not back", lambda one: _not_back(one.single[1])),
+        ],
+        _SINGLE_TEXT,
+        *problems,
+    )
+
+
+def _verdict(estimate: Estimate | None) -> str:
+    if estimate is None:
+        return "undefined"
+    if estimate.identical:
+        return section.UNAFFECTED
+    return section.said(estimate.verdict) + section.SATURATED * ("capped" in estimate.flags)
+
+
+def _median(curve: RepairCurve) -> str:
+    median = curve.curve.median()
+    return "not reached" if median is None else f"{median:g}"
+
+
+def _not_back(curve: RepairCurve) -> str:
+    return f"{curve.censored} of {curve.total} runs"

@@ -30,14 +30,12 @@ class RepairCurve(NamedTuple):
     Attributes:
         runs: which runs: "fault", or "no fault" for the null pair.
         curve: share of runs that are not back yet.
-        followed: until when the runs were watched, from the onset [s].
         censored: how many were not back by then.
         total: of how many.
     """
 
     runs: str
     curve: SurvivalCurve
-    followed: float
     censored: int
     total: int
 
@@ -145,7 +143,7 @@ def _repair_curves(comparison: Comparison, pair: Pair, null: Pair) -> tuple[Repa
         seconds, back = spi.repair_times(*times, onset=onset, end=end, window=window)
         curve = spi.kaplan_meier(seconds, back)
         censored = int(np.count_nonzero(~back))
-        curves.append(RepairCurve(runs, curve, end - onset - window, censored, back.size))
+        curves.append(RepairCurve(runs, curve, censored, back.size))
     return tuple(curves)
 
 

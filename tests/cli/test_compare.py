@@ -38,8 +38,6 @@ PLAYED: dict[str, dict[str, Any]] = {
     "old": {},
     "same": {},
     "still": {"policies": [Still()]},
-    "more policies": {"policies": [Still(), "swarm-dt"]},
-    "later seeds": {"first_seed": 3},
     "fresh seeds": {"first_seed": 1000},
 }
 
@@ -72,26 +70,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
         # Another policy in the place of the judged one is named.
         ("still", ["change < 0"], 1, ["| mine -> Still: change, N = 6 (Scalability) | -1.000"]),
         ("still", ["change > 0"], 0, ["Gate 'change > 0' passes"]),
-        (
-            "more policies",
-            ["change < 0"],
-            1,
-            [
-                "policy 'Still' of the new study has no match: the old study judges 'mine'",
-                "policy 'mine' of the old study has no match: the new study judges 'Still', 'swa",
-            ],
-        ),
-        ("more policies", [], 0, ["Change of P"]),  # without a gate nothing fails
-        (
-            "later seeds",
-            ["possibly change < 0"],
-            0,
-            [
-                "exact: the runs of both studies are the same",
-                "Only in the old study, and left out: seeds 0 to 2. Runs are paired over the shar",
-                "Only in the new study, and left out: seeds 6 to 8.",
-            ],
-        ),
+        ("still", [], 0, ["Change of P"]),  # without a gate nothing fails
         ("fresh seeds", ["change < 0"], 1, ["share no seed: the old one has 0 to 5, the new one"]),
     ],
 )
@@ -109,8 +88,6 @@ def test_gates_end_with_their_code_and_name_what_they_are_about(
     printed = capsys.readouterr().out
     for part in words:
         assert part in printed
-    # Whatever an ablation takes beside it is not judged.
-    assert "random-walk" not in printed
 
 
 TABLE = "fault,faulty,robots,seed,delivered\n"
@@ -140,7 +117,6 @@ def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(
         ([new, old, "--fail-if", "R < 0", "--fail-if", "change < 0"], 0, "passes"),
         # Seeds 2 and 3: 44 + 41 instead of 43 + 42. By their places it would be another change.
         ([old, late, "--fail-if", "change < 0 at FM1"], 0, "robustness) | 0.000 ["),
-        ([old, late], 0, "Only in the old study, and left out: seeds 0 to 1."),
     ):
         assert app.run(["study", "compare", *arguments]) == code
         assert words in capsys.readouterr().out

@@ -186,7 +186,7 @@ def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
         for number in range(2)
     ]
     with makers[0], makers[1]:
-        for attempt in range(15):
+        for attempt in range(8):
             directory = tmp_path / str(attempt)
             directory.mkdir()
             for maker in makers:
