@@ -11,9 +11,8 @@ from tables import table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
-from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.estimate import SIGNS, Estimate
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.spi.verdict_signs import SIGNS
 from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
 from swarm_logistics_env.studies.measures import (
     cells_against_baseline,

@@ -22,7 +22,7 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import Policy, decide, start
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.spi.removed import refuse
+from swarm_logistics_env.spi import refuse
 
 Moment = dict[str, Any]  # what each agent got at one moment
 

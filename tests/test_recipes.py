@@ -288,8 +288,7 @@ def presence(world: Warehouse, before: Before) -> Earned:
 
 
 def test_an_indicator(copy: Copy) -> None:
-    copy.insert("spi/indicators.py", "def scalability(", INDICATOR)
-    copy.replace("spi/definitions.py", ", relative_change,", ", kept, relative_change,")
+    copy.insert("spi/definitions.py", "def scalability(", INDICATOR)
     copy.insert("spi/definitions.py", '        Definition(\n            symbol="S"', DEFINITION)
     report = copy.run("-c", STUDY)
     assert "swarm-dt, alive? Failure mode FM4, m = 1 of N = 4." in report

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import vmas
 from numpy.typing import NDArray
+from tuple_env import TupleEnv
 
-from swarm_logistics_env.tasks import ParallelTask, SumOfRewards, TupleEnv
+from swarm_logistics_env.tasks import ParallelTask, SumOfRewards
 
 STILL = np.zeros(2, dtype=np.float32)
 GAIN = 3.0  # of the push by the distance, so that robots slow down near the food

@@ -14,9 +14,10 @@ import numpy as np
 from gymnasium.spaces import Tuple
 from numpy.typing import NDArray
 from rware.warehouse import RewardType, Warehouse
+from tuple_env import TupleEnv
 
 from swarm_logistics_env import streams
-from swarm_logistics_env.tasks import ParallelTask, TupleEnv
+from swarm_logistics_env.tasks import ParallelTask
 from swarm_logistics_env.tasks.parallel_policies import Env
 
 Cell = tuple[int, int]  # column, row

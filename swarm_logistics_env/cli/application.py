@@ -36,7 +36,7 @@ from swarm_logistics_env.report.write import (
     write_report,
 )
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
-from swarm_logistics_env.spi.verdict_signs import SIGNS
+from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.studies.play import Tally
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, Verdict

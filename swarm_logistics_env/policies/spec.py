@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
@@ -226,26 +226,18 @@ def _loaded(name: str, parameters: str, trusted: bool) -> Policy:
     return load(name, trust_code=trusted, **json.loads(parameters))
 
 
-class KnownPolicy(NamedTuple):
-    """A policy that `load` knows by name: how it decides, and a sentence about it."""
-
-    name: str
-    kind: str
-    about: str
-
-
-def known_policies() -> Iterator[KnownPolicy]:
-    """Yield the policies of the package, then those that installed packages declare."""
+def known_policies() -> Iterator[tuple[str, str, str]]:
+    """Yield name, kind and a sentence of each policy of the package, then of those installed."""
     for name, make in SCRIPTED.items():
         given = make.keywords if isinstance(make, functools.partial) else {}
         kind = make.func if isinstance(make, functools.partial) else make
         about = (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")
         with_ = "".join(f" {field} = {value}." for field, value in given.items())
-        yield KnownPolicy(name, "scripted", about + with_)
+        yield name, "scripted", about + with_
     for path in sorted(WEIGHTS.glob(f"*{SUFFIX}")):
-        yield KnownPolicy(path.stem, "trained", read_card(path).about)
+        yield path.stem, "trained", read_card(path).about
     for point in entry_points(group=ENTRY_POINTS):
-        yield KnownPolicy(point.name, "installed", point.value)
+        yield point.name, "installed", point.value
 
 
 def called(name: str) -> str:

@@ -105,12 +105,8 @@ class SwarmDT:
         self._constants = StepConstants(
             widest_turn=math.sqrt(3.0 * parameters.diffusion * period),
             drop_probability=-math.expm1(-parameters.drop_rate * period),
-            avoidance_gain=parameters.avoidance_gain,
-            avoidance_range=parameters.avoidance_range,
-            wall_distance=parameters.wall_distance,
-            taxis_gain=parameters.taxis_gain,
-            heading_follows=parameters.heading_follows,
             widest_step=scenario.max_turn_rate * period if is_differential else 0.0,
+            **parameters.model_dump(exclude={"diffusion", "drop_rate"}),
         )
 
     def reset(self, n_robots: int, seed: int) -> None:

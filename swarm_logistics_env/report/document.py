@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
-from swarm_logistics_env.spi.bootstrap import MIN_SEEDS
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
+from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped

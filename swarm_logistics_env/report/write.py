@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import becoming, plain
-from swarm_logistics_env.spi.verdict_signs import SIGNS
+from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.studies.results import StudyResults, frame_of_cells, frame_of_verdicts
 from swarm_logistics_env.studies.runs import write_csv
 

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from .equivalence import Equivalence, equivalence
-from .estimate import Estimate, Options, Verdict
-from .indicators import (
-    FaultBudget,
+from .definitions import (
     adaptability,
-    fault_budget,
     fault_tolerance,
     relative_change,
     robustness,
     scalability,
 )
+from .equivalence import Equivalence, equivalence
+from .estimate import Estimate, Options, Verdict
 from .inputs import IndicatorError
-from .multiplicity import adjust, adjusted_p_values, holm
+from .multiplicity import (
+    FaultBudget,
+    Spending,
+    adjust,
+    adjusted_p_values,
+    fault_budget,
+    holm,
+    look_alphas,
+)
 from .power import (
     lower_decile_of_power,
     minimum_detectable_effect,
@@ -25,9 +31,7 @@ from .power import (
     seeds_for_equivalence,
     seeds_for_power,
 )
-from .removed import refuse
 from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
-from .sequential import Spending, look_alphas
 from .stalls import share_stalled
 from .summaries import (
     Interval,
@@ -83,6 +87,33 @@ __all__ = [
     "share_stalled",
     "worst_decile",
 ]
+
+# Public names that went with 0.3.0, and where to look instead.
+_TWO_CHECKS = "use check_policy, or check_wrapper"
+REMOVED = {
+    "spi.ScalingFit": "fit a law to P over N with scipy.optimize.curve_fit",
+    "spi.SelfRepair": "use spi.repair_times with spi.kaplan_meier",
+    "spi.Simulation": "judge the real runs alone",
+    "spi.compare_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
+    "spi.fit_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
+    "spi.karp_flatt": "use spi.scalability: S = 1 where nothing is serial",
+    "spi.mean_with_simulation": "use spi.mean_interval of the real runs alone",
+    "spi.self_repair": "use spi.repair_times with spi.kaplan_meier",
+    "testing.check_conservation": f"{_TWO_CHECKS}; verification/invariants.py counts items",
+    "testing.check_determinism": _TWO_CHECKS,
+    "testing.check_faults": f"{_TWO_CHECKS}; verification/invariants.py watches faults",
+    "testing.check_overlap": f"{_TWO_CHECKS}; verification/invariants.py measures overlaps",
+    "testing.check_spaces": "use check_wrapper",
+}
+
+
+def refuse(module: str, name: str) -> NoReturn:
+    """Raise ImportError with what to use instead of a removed name, else AttributeError."""
+    place = f"{module.partition('.')[2]}.{name}"
+    if place in REMOVED:
+        raise ImportError(f"{place} was removed in 0.3.0: {REMOVED[place]}")
+    raise AttributeError(f"module {module!r} has no attribute {name!r}")
+
 
 if not TYPE_CHECKING:
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypedDict
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .bootstrap import MIN_SEEDS
 from .inputs import (
     IndicatorError,
     Numbers,
@@ -20,13 +19,38 @@ from .inputs import (
     positive_mean,
     same_seeds,
 )
-from .ratio import RatioTest, paired_ratio
+from .ratio import MIN_SEEDS, RatioTest, Term, paired_ratio, unpaired_ratio
 from .stalls import at_stake
 from .summaries import pairing_correlation
-from .unpaired import Term, unpaired_ratio
-from .verdict_signs import SIGNS
 
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
+
+
+class Sign(NamedTuple):
+    """How a verdict is shown.
+
+    Attributes:
+        mark: one character, which tells it without colour.
+        word: what the mark is called in a legend.
+        colour: of a terminal, by ANSI's names.
+        light, dark: hexadecimal colours on white and on black paper, after Okabe and Ito.
+    """
+
+    mark: str
+    word: str
+    colour: str
+    light: str
+    dark: str
+
+
+SIGNS = {
+    "supported": Sign("✓", "supported", "green", "#006b4c", "#3fc79a"),
+    "refuted": Sign("✗", "refuted", "red", "#a84300", "#f5915a"),
+    "equivalent": Sign("≈", "equivalent", "cyan", "#005b94", "#6cb8ee"),
+    "inconclusive": Sign("?", "open", "yellow", "#5b6068", "#a9afb8"),
+    "unaffected": Sign("=", "same runs", "default", "#5b6068", "#a9afb8"),
+    "blocked": Sign("!", "blocked", "magenta", "#a84300", "#f5915a"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +121,7 @@ class Estimate:
     def answer(self) -> Verdict:
         """The verdict; of identical runs what their exact value says, which is no evidence.
 
-        Gates and fault budgets ask for it: "is it above the threshold?" has an answer there.
+        Gates ask for it: "is it above the threshold?" has an answer there.
         """
         if not self.identical:
             return self.verdict

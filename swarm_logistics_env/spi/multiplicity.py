@@ -1,19 +1,23 @@
-"""Error control over a declared family of verdicts (Holm 1979)."""
+"""Error control over a declared family of verdicts, and over looks at a growing study."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .equivalence import Equivalence
 from .estimate import Estimate, Verdict
-from .inputs import IndicatorError, Numbers, numbers
+from .inputs import IndicatorError, Numbers, between_0_and_1, count, numbers
 
 
 def holm(p_values: ArrayLike) -> Numbers:
-    """Holm's adjusted p-values, in the order given, shape (k,).
+    """Holm's (1979) adjusted p-values, in the order given, shape (k,).
 
     Rejecting where the adjusted p < alpha keeps the chance of any false rejection in the family
     below alpha, whatever the dependence.
@@ -60,3 +64,127 @@ def adjusted_p_values(estimates: Sequence[Estimate | Equivalence]) -> tuple[floa
         holm([1.0 if e.p_value is None else e.p_value for e in estimates if not e.identical])
     )
     return tuple(None if e.identical else float(next(adjusted)) for e in estimates)
+
+
+Spending = Literal["obrien-fleming", "linear"]
+_REACH = 9.0  # standard deviations that the integration grid covers
+_GRID = 801  # its points: the boundaries are then right to five digits
+
+
+def look_alphas(
+    looks: Sequence[int], alpha: float = 0.05, *, spending: Spending = "obrien-fleming"
+) -> tuple[float, ...]:
+    """Two-sided p below which to stop at each declared look, in order.
+
+    Lan and DeMets' (1983) spending of alpha on both sides, with the share of the final number of
+    seeds as information. A single look gives (alpha,).
+
+    Args:
+        looks: Numbers of seeds at which the study is looked at, rising.
+        alpha: Chance of any false verdict over all looks, in (0, 1).
+        spending: "obrien-fleming" leaves nearly all of alpha to the last look; "linear" spends it
+            in proportion to the seeds (Kim and DeMets 1987), so that clear cases stop early.
+
+    Raises:
+        IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1); no such spending.
+    """
+    if spending not in get_args(Spending):
+        raise IndicatorError(
+            f"spending = {spending!r}: should be one of {', '.join(get_args(Spending))}"
+        )
+    between_0_and_1("alpha", alpha)
+    seeds = [count("look", look) for look in looks]
+    if not seeds or any(later <= earlier for earlier, later in pairwise(seeds)):
+        raise IndicatorError(f"looks = {tuple(looks)}: should be rising numbers of seeds")
+    return _boundaries(tuple(seeds), alpha, spending)
+
+
+@functools.lru_cache(maxsize=256)
+def _boundaries(seeds: tuple[int, ...], alpha: float, spending: Spending) -> tuple[float, ...]:
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    # The sum process is Brownian motion on [0, 1]; `density` is that of paths not stopped so far,
+    # on the points of the last look, where they start.
+    points, density, weights = np.zeros(1), np.ones(1), np.ones(1)
+    alphas, information, spent = [], 0.0, 0.0
+    for look in seeds:
+        now = look / seeds[-1]
+        step = math.sqrt(now - information)
+        to_spend = _spent(now, alpha, spending) - spent
+
+        def stopped(
+            boundary: float,
+            to_spend: float = to_spend,
+            step: float = step,
+            start: Numbers = points,
+            mass: Numbers = weights * density,
+        ) -> float:
+            """Chance of a first crossing here, over both sides, less what may be spent."""
+            return 2.0 * float((mass * ndtr((start - boundary) / step)).sum()) - to_spend
+
+        reach = _REACH * math.sqrt(now)
+        boundary = reach if stopped(reach) >= 0.0 else float(brentq(stopped, 0.0, reach))
+        alphas.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
+        start, mass = points, weights * density
+        points = np.linspace(-boundary, boundary, _GRID)
+        steps = (points[:, np.newaxis] - start) / step
+        density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
+        weights = _simpson(points)
+        information, spent = now, spent + to_spend
+    return tuple(alphas)
+
+
+def _spent(information: float, alpha: float, spending: Spending) -> float:
+    """Error spent, over both sides, when `information` in (0, 1] of the seeds are in."""
+    if spending == "linear":
+        return alpha * information
+    from scipy.special import ndtr, ndtri
+
+    return 4.0 * float(ndtr(ndtri(alpha / 4.0) / math.sqrt(information)))
+
+
+def _simpson(points: Numbers) -> Numbers:
+    weights = np.full(points.size, 2.0)
+    weights[1::2] = 4.0
+    weights[[0, -1]] = 1.0
+    return weights * (float(points[1] - points[0]) / 3.0)
+
+
+class FaultBudget(NamedTuple):
+    """Robots that may fail by one mode, and the m that ended the search.
+
+    `limit` is None where every m tested was supported: the budget is then a lower bound.
+    """
+
+    robots: int
+    limit: int | None
+
+
+def fault_budget(robustness_by_m: Mapping[int, Estimate]) -> FaultBudget:
+    """Largest m with R > 0 supported at every m' <= m, for one failure mode.
+
+    Tested in the order m = 1, 2, 3, ... and stopped at the first that is not supported, or not
+    there: a fixed sequence, so the unadjusted verdicts keep the family's error. A swarm that a
+    fault does not reach (identical runs) is robust to it exactly: R = m/N.
+
+    Args:
+        robustness_by_m: Number of faulty robots m to its estimate of R.
+
+    Raises:
+        IndicatorError: No estimates, m below 1, or an estimate of another indicator.
+    """
+    if not robustness_by_m:
+        raise IndicatorError("robustness_by_m is empty: should hold R at m = 1 at least")
+    for m, estimate in robustness_by_m.items():
+        if m < 1:
+            raise IndicatorError(f"m = {m}: should be at least 1")
+        if estimate.indicator != "R":
+            raise IndicatorError(f"indicator at m = {m} is {estimate.indicator}: should be R")
+    robots = 0
+    while robots + 1 in robustness_by_m:
+        if robustness_by_m[robots + 1].answer != "supported":
+            return FaultBudget(robots, robots + 1)
+        robots += 1
+    untested = robots < max(robustness_by_m)
+    return FaultBudget(robots, robots + 1 if untested else None)

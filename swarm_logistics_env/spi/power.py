@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .bootstrap import MIN_SEEDS
 from .equivalence import Equivalence
 from .estimate import Estimate
 from .inputs import IndicatorError, Numbers, between_0_and_1, count, finite
+from .ratio import MIN_SEEDS
 from .stalls import MARGIN, critical_with_hidden
 
 MAX_SEEDS = 1_000_000

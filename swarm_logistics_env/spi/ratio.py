@@ -1,23 +1,29 @@
-"""Inference on theta = mean(num) / mean(den) + offset over paired seeds.
+"""Inference on theta = mean(num) / mean(den) + offset over paired seeds, or over separate samples.
 
 Fieller's pivot mean(D)/se(D), D = num - (theta - offset) den, is judged by Student's distribution
 and, from ten seeds on, by its studentised bootstrap too: p is the larger of the two, always, and
 the interval holds every theta that this test keeps. A bootstrap only where the differences look
 skewed would be a pretest, and err. Stalled runs that these seeds may hide raise p further; the
-interval is that of the runs seen.
+interval is that of the runs seen. Samples that share no seeds have Welch's test, inverted exactly.
 """
 
 from __future__ import annotations
 
+import functools
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .bootstrap import MIN_SEEDS, critical_value, resampled_pivots, upper_p
 from .inputs import Numbers
 from .stalls import p_with_hidden
 
+MIN_SEEDS = 10  # below, too few distinct resamples to studentise
+RESAMPLES = 9_999  # p is a whole number of ten-thousandths
+# A resample whose variance is this far below the largest square is flat: the rest is rounding.
+_FLAT = 1e-12
 # Differences this far below the numbers they are taken from are rounding, not spread between seeds.
 ROUNDING = 1e-12
 
@@ -152,3 +158,164 @@ def fieller_limits(
     high, high_unbounded = limit(t_high, 1)
     unbounded = low_unbounded | high_unbounded
     return np.where(unbounded, -np.inf, low), np.where(unbounded, np.inf, high), unbounded
+
+
+def resampled_pivots(residual: Numbers) -> Numbers:
+    """Return sqrt(n) mean / sd of resampled seeds, in ascending order.
+
+    Dividing by the deviation of each resample is what keeps the error at alpha at ten seeds;
+    percentile and BCa intervals lose it. The same seeds are drawn at every call, so that equal
+    data give equal verdicts.
+
+    Args:
+        residual: num - value den over seeds, mean 0, shape (..., n), n >= MIN_SEEDS.
+
+    Returns:
+        Shape (RESAMPLES, ...); -inf or inf where a resample shows no spread but a mean.
+    """
+    n = residual.shape[-1]
+    drawn = _times_drawn(n)
+    flattened = residual.reshape(-1, n).T
+    mean = drawn @ flattened / n
+    variance = (drawn @ flattened**2 - n * mean**2) / (n - 1)
+    largest = np.abs(flattened).max(axis=0)
+    flat = variance <= _FLAT * largest**2
+    # A resample without spread is as far out as its sign says: leaving it out would narrow.
+    sign_alone = np.where(np.abs(mean) <= _FLAT * largest, 0.0, np.copysign(np.inf, mean))
+    pivots = np.where(flat, sign_alone, np.sqrt(n) * mean / np.sqrt(np.where(flat, 1.0, variance)))
+    return np.sort(pivots, axis=0).reshape(RESAMPLES, *residual.shape[:-1])
+
+
+def upper_p(pivots: Numbers, statistic: Numbers) -> Numbers:
+    """Return the one-sided p of a statistic (...), from pivots of shape (RESAMPLES, ...)."""
+    return np.asarray((1 + (pivots >= statistic).sum(axis=0)) / (RESAMPLES + 1))
+
+
+def critical_value(pivots: Numbers, alpha: float) -> Numbers:
+    """Return the statistic above which `upper_p` is below alpha / 2; inf: no statistic is.
+
+    Args:
+        pivots: Ascending along the first axis, shape (RESAMPLES, ...).
+        alpha: Two-sided error of the test, in (0, 1).
+    """
+    # upper_p < alpha / 2 exactly where at most `most` pivots lie at or above the statistic.
+    most = int(np.ceil(alpha * (RESAMPLES + 1) / 2 - 1)) - 1
+    if most < 0:
+        return np.full(pivots.shape[1:], np.inf)
+    return np.asarray(pivots[RESAMPLES - 1 - most])
+
+
+@functools.lru_cache(maxsize=8)
+def _times_drawn(n: int) -> Numbers:
+    """Return how often each resample holds each of n seeds, shape (RESAMPLES, n)."""
+    generator = np.random.Generator(np.random.Philox(key=n))
+    drawn = generator.multinomial(n, np.full(n, 1 / n), size=RESAMPLES)
+    return np.asarray(drawn, dtype=np.float64)
+
+
+class Term(NamedTuple):
+    """One sample of performances and its weights in numerator and denominator of the ratio."""
+
+    sample: Numbers
+    in_num: float
+    in_den: float
+
+    def weight(self, theta: float) -> float:
+        """Weight of the sample in D = num - theta den; what is but rounding counts as 0."""
+        weight = self.in_num - theta * self.in_den
+        return 0.0 if abs(weight) <= ROUNDING * (1.0 + abs(self.in_num)) else weight
+
+
+class _Difference(NamedTuple):
+    """mean(D), its squared standard error and Welch's degrees of freedom at one value of theta."""
+
+    mean: float
+    variance: float
+    degrees_of_freedom: float
+
+
+def unpaired_ratio(
+    terms: Sequence[Term], *, offset: float = 0.0, threshold: float = 0.0, confidence: float = 0.95
+) -> RatioTest:
+    """Interval and test of theta from independent samples of at least two seeds each.
+
+    D = sum over samples of (in_num - theta in_den) mean: the variance of each sample enters once,
+    with its whole weight, which is Fieller's form with cov(num, den) = -var(P_o)/n_o times the
+    numerator's weight (0 for fault tolerance). The interval holds every theta that the Welch test
+    at theta keeps, so that verdict and interval agree at any threshold.
+    """
+    from scipy.special import stdtr
+
+    mean_den = sum(term.in_den * float(term.sample.mean()) for term in terms)
+    value = sum(term.in_num * float(term.sample.mean()) for term in terms) / mean_den
+    null = threshold - offset
+    at_null = _difference(terms, null)
+    scale = sum(
+        (abs(term.in_num) + abs(null * term.in_den)) * float(term.sample.max()) for term in terms
+    )
+    degenerate = math.sqrt(at_null.variance) <= ROUNDING * scale
+    if degenerate:
+        p_value, low, high = 1.0, -math.inf, math.inf
+        # No spread leaves no Welch formula; the smallest sample bounds it from below.
+        df = float(min(term.sample.size for term in terms) - 1)
+    else:
+        df = at_null.degrees_of_freedom
+        p_value = 2.0 * float(stdtr(df, -abs(at_null.mean) / math.sqrt(at_null.variance)))
+        low, high = _limits(terms, value, mean_den, 0.5 + confidence / 2)
+    n = min(term.sample.size for term in terms)
+    return RatioTest(
+        value=np.asarray(value + offset),
+        low=np.asarray(low + offset),
+        high=np.asarray(high + offset),
+        probability=probability_of(np.asarray(p_value), np.asarray(at_null.mean)),
+        p_value=np.asarray(p_value),
+        difference_sd=np.asarray(0.0 if degenerate else math.sqrt(at_null.variance * n)),
+        mean_denominator=np.asarray(mean_den),
+        degrees_of_freedom=df,
+        degenerate=np.asarray(degenerate),
+        unbounded=np.asarray(math.isinf(low) and not degenerate),
+        p_seen=np.asarray(p_value),
+    )
+
+
+def _difference(terms: Sequence[Term], theta: float) -> _Difference:
+    mean, variance, welch = 0.0, 0.0, 0.0
+    for term in terms:
+        sample, weight = term.sample, term.weight(theta)
+        share = weight**2 * float(sample.var(ddof=1)) / sample.size
+        mean += weight * float(sample.mean())
+        variance += share
+        welch += share**2 / (sample.size - 1)
+    return _Difference(mean, variance, variance**2 / welch if welch > 0.0 else math.inf)
+
+
+def _limits(
+    terms: Sequence[Term], value: float, mean_den: float, quantile: float
+) -> tuple[float, float]:
+    from scipy.optimize import brentq
+    from scipy.special import stdtrit
+
+    def outside(theta: float) -> float:
+        """Positive where the test at theta rejects."""
+        mean, variance, df = _difference(terms, theta)
+        if variance == 0.0:
+            return abs(mean)
+        return abs(mean) - float(stdtrit(df, quantile)) * math.sqrt(variance)
+
+    # Far out only the denominator's sample is left; the interval ends if its mean is clear of 0.
+    far = _difference([Term(sample, in_den, 0.0) for sample, _, in_den in terms], 0.0)
+    if far.variance > 0.0 and mean_den <= float(
+        stdtrit(far.degrees_of_freedom, quantile)
+    ) * math.sqrt(far.variance):
+        return -math.inf, math.inf
+    spread = math.sqrt(_difference(terms, value).variance) / mean_den
+    if spread == 0.0:
+        return value, value
+
+    def limit(side: int) -> float:
+        inner, step = value, spread
+        while outside(value + side * step) <= 0.0:
+            inner, step = value + side * step, 2.0 * step
+        return float(brentq(outside, inner, value + side * step, xtol=1e-12))
+
+    return limit(-1), limit(1)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Collection, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .estimate import Estimate, judge
+from .estimate import Estimate, Options, judge
 from .inputs import IndicatorError, Numbers, between_0_and_1, delivery_times, finite, numbers
 
 
@@ -19,11 +19,7 @@ def resilience_index(
     reference: Sequence[ArrayLike],
     *,
     onset: float,
-    threshold: float = 1.0,
-    confidence: float = 0.95,
-    paired: bool = True,
-    saturated: Collection[str] = (),
-    identical: bool = False,
+    **options: Unpack[Options],
 ) -> Estimate:
     """Deliveries after the onset over the paired reference's, as a ratio of means over seeds.
 
@@ -34,17 +30,14 @@ def resilience_index(
         faulty: Delivery times [s] of each seed's run with faults.
         reference: Delivery times [s] of the same seeds' reference runs.
         onset: When the faults begin [s]; later deliveries count.
-        threshold: What the index is tested against.
-        confidence: Of the interval, in (0, 1).
-        paired: Whether both share their seeds, run by run.
-        saturated: "faulty" or "reference", or both: where a run delivered every item.
-        identical: Whether both are the same runs, seed by seed.
+        options: Threshold (1 if not given), confidence, pairing and the like: see `Options`.
 
     Raises:
         IndicatorError: No seeds, unequal numbers of seeds, a time negative or not finite, or no
             delivery after the onset in any reference run.
     """
     finite("onset", onset)
+    options.setdefault("threshold", 1.0)
 
     def after_onset(name: str, runs: Sequence[ArrayLike]) -> Numbers:
         times = delivery_times(name, runs)
@@ -57,11 +50,7 @@ def resilience_index(
             "reference": (after_onset("reference", reference), 0.0, 1.0),
         },
         offset=0.0,
-        threshold=threshold,
-        confidence=confidence,
-        paired=paired,
-        saturated=saturated,
-        identical=identical,
+        **options,
     )
 
 

@@ -1,4 +1,4 @@
-"""Raw performance P over seeds: intervals, robust means, and the comparison of two samples."""
+"""Raw performance P over seeds: intervals, and what pairing achieved."""
 
 from __future__ import annotations
 

@@ -149,7 +149,11 @@ def read_trials(
 
 
 def _runs(table: Table, duration: float | None) -> list[Trial]:
-    table.need("performance", "or time, for one delivery a row")
+    if "performance" not in table.places:
+        raise IndicatorError(
+            f"{table.path} has no column 'performance', or time, for one delivery a row: it has "
+            f"{', '.join(map(repr, table.header))}; say which it is by --column performance=NAME"
+        )
     rows: list[Trial] = []
     labels: dict[object, int] = {}
     for line in range(len(table.rows)):

@@ -53,15 +53,6 @@ class Table:
     lines: tuple[int, ...]
     decimal: str = "."
 
-    def need(self, column: str, otherwise: str = "") -> None:
-        """Raise unless there is such a column."""
-        if column not in self.places:
-            raise IndicatorError(
-                f"{self.path} has no column {column!r}{', ' + otherwise if otherwise else ''}: it "
-                f"has {', '.join(map(repr, self.header))}; say which it is by "
-                f"--column {column}=NAME (columns={{{column!r}: NAME}})"
-            )
-
     def text(self, row: int, column: str) -> str:
         """Return a cell; empty where there is none."""
         return self.rows[row][self.places[column]] if column in self.places else ""

@@ -110,7 +110,7 @@ def _index(
             onset=onset,
             threshold=threshold,
             paired=paired,
-            saturated=[name for name, runs in named.items() if any(r.capped for r in runs)],
+            saturated=[name for name, runs in named.items() if any(r.all_delivered for r in runs)],
             identical=same_runs([r.digest for r in faulty], [r.digest for r in reference]),
         )
     except spi.IndicatorError:  # nothing is delivered after the onset in the reference
@@ -129,7 +129,7 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
     if null is None or original is None or other is None:
         raise StudyError("the runs of the no-fault null are missing")
     arms = (*comparison.arms, null)
-    if any(outcome.capped for arm in arms for outcome in results.outcomes_of(arm) or ()):
+    if any(outcome.all_delivered for arm in arms for outcome in results.outcomes_of(arm) or ()):
         raise StudyError("the items ran out, and the rate with them: use restock")
     return original, other
 

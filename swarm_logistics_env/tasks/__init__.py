@@ -5,11 +5,9 @@ from __future__ import annotations
 from swarm_logistics_env.policies.files import StableBaselinesModel
 
 from .failing_robots import FailingRobots, RobotFault
-from .parallel_policies import RandomActions
+from .parallel_policies import RandomActions, SumOfInfos, SumOfRewards
 from .parallel_task import ParallelTask
-from .performance import SumOfInfos, SumOfRewards
 from .task import Case, Outcome, Run, Task
-from .tuple_env import TupleEnv
 
 __all__ = [
     "Case",
@@ -23,5 +21,4 @@ __all__ = [
     "SumOfInfos",
     "SumOfRewards",
     "Task",
-    "TupleEnv",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
@@ -23,13 +23,17 @@ from swarm_logistics_env.records import Record
 from .failing_robots import FAILURE_MODES, REMOVED, FailingRobots, RobotFault, failing_rows
 from .parallel_policies import (
     Env,
+    Gain,
     RandomActions,
+    SumOfRewards,
     Value,
     agent_actions,
     agents_by_row,
+    in_words,
+    name_of,
     observation_rows,
+    performance_of,
 )
-from .performance import Gain, SumOfRewards, in_words, name_of, performance_of
 from .task import Case, Fields, Outcome, TaskScenario
 
 # These files decide what a run in somebody else's environment gives.
@@ -38,8 +42,6 @@ ENVIRONMENT_SOURCES = (
     "tasks/failing_robots.py",
     "tasks/parallel_policies.py",
     "tasks/parallel_task.py",
-    "tasks/performance.py",
-    "tasks/tuple_env.py",
 )
 _environments: dict[str, str] = {}
 
@@ -225,7 +227,8 @@ class ParallelTask:
                 gains.append(float(self._gain(env, rewards, infos)))
         finally:
             env.close()
-        return self._outcome(gains, recorded.digest(gains), _failed(seed, n_robots, faults))
+        most = max((fault.robots for fault in faults), default=0)
+        return self._outcome(gains, recorded.digest(gains), failing_rows(seed, n_robots, most))
 
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
@@ -309,11 +312,6 @@ class _Recorded(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is u
             space = self.env.observation_space(agent)
             self._hash.update(np.asarray(flatten(space, observations[agent])).tobytes())
         self._hash.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
-
-
-def _failed(seed: int, n_robots: int, faults: Sequence[RobotFault]) -> tuple[int, ...]:
-    most = max((fault.robots for fault in faults), default=0)
-    return failing_rows(seed, n_robots, most)
 
 
 def environment_version(

@@ -73,9 +73,10 @@ class WarehouseTask:
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one episode; see `Task.play`."""
-        scenario, faults = _of_the_warehouse(case)
+        assert isinstance(case.scenario, Scenario)
+        faults = [fault for fault in case.faults if isinstance(fault, Fault)]
         # A policy of its own: one that remembers must not make rows depend on the order of runs.
-        episode = run_episode(scenario, case.policy.load(), seed, faults, policy_seed)
+        episode = run_episode(case.scenario, case.policy.load(), seed, faults, policy_seed)
         return Outcome(
             delivery_times=episode.delivery_times,
             ended_at=episode.ended_at,
@@ -117,11 +118,6 @@ class ClearingTask(WarehouseTask):
         """Play one episode; see `Task.play`."""
         outcome = super().play(case, seed, policy_seed)
         return replace(outcome, untimed=60.0 * len(outcome.delivery_times) / outcome.ended_at)
-
-
-def _of_the_warehouse(case: Case) -> tuple[Scenario, tuple[Fault, ...]]:
-    assert isinstance(case.scenario, Scenario)
-    return case.scenario, tuple(fault for fault in case.faults if isinstance(fault, Fault))
 
 
 WAREHOUSE = WarehouseTask()

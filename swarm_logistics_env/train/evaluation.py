@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +11,7 @@ from copy import deepcopy
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,50 +106,30 @@ FIRST_SEED = 1_000_000
 REFERENCES = ("swarm-dt", "homing")  # scripted policies that a training is shown beside
 
 
-class Evaluated(NamedTuple):
-    """What was delivered on the evaluation's seeds.
+def evaluate(
+    policy: Policy, scenario: Scenario, asked: Evaluation, threads: int = 1
+) -> dict[str, float]:
+    """Return what `policy` delivers on the evaluation's seeds, without faults and with each.
 
-    Attributes:
-        n_robots: the swarm size N.
-        faults: mode -> number m of faulty robots.
-        p_o: P_o of each seed, without faults (seeds,) [items].
-        p_f: mode -> P_F of each seed (seeds,) [items].
+    Returns:
+        "P": the mean P_o [items]; of each mode, as "P_FM1" and "R_FM1", the mean P_F and R, which
+        is nan where nothing was delivered without faults.
     """
-
-    n_robots: int
-    faults: dict[str, int]
-    p_o: NDArray[np.float64]
-    p_f: dict[str, NDArray[np.float64]]
-
-    def robustness(self, mode: str) -> float:
-        """Return R; nan where nothing was delivered without faults."""
-        if not self.p_o.any():
-            return float("nan")
-        return spi.robustness(self.p_o, self.p_f[mode], n=self.n_robots, m=self.faults[mode]).value
-
-    def means(self) -> dict[str, float]:
-        """Return the mean P, and for each mode the mean P_F and R: "P", "P_FM1", "R_FM1"."""
-        means = {"P": float(self.p_o.mean())}
-        for mode, p_f in self.p_f.items():
-            means |= {f"P_{mode}": float(p_f.mean()), f"R_{mode}": self.robustness(mode)}
-        return means
-
-
-def evaluate(policy: Policy, scenario: Scenario, asked: Evaluation, threads: int = 1) -> Evaluated:
-    """Play `policy` on the evaluation's seeds, without faults and with each of its faults."""
     scenario = scenario.replace(n_robots=asked.n_robots)
     kinds: list[Sequence[Fault]] = [(), *((Fault(m, k),) for m, k in asked.faults.items())]
     seeds = range(FIRST_SEED, FIRST_SEED + asked.seeds)
-    p_o, *p_f = performances(policy, scenario, kinds, seeds, threads)
-    return Evaluated(asked.n_robots, asked.faults, p_o, dict(zip(asked.faults, p_f)))
+    p_o, *others = performances(policy, scenario, kinds, seeds, threads)
+    means = {"P": float(p_o.mean())}
+    for (mode, m), p_f in zip(asked.faults.items(), others):
+        r = spi.robustness(p_o, p_f, n=asked.n_robots, m=m).value if p_o.any() else math.nan
+        means |= {f"P_{mode}": float(p_f.mean()), f"R_{mode}": r}
+    return means
 
 
 def reference_means(training: Training) -> dict[str, dict[str, float]]:
     """Return what the scripted policies measure on the evaluation's seeds, by their names."""
     asked, threads = training.evaluation, training.threads
-    return {
-        name: evaluate(load(name), training.scenario, asked, threads).means() for name in REFERENCES
-    }
+    return {name: evaluate(load(name), training.scenario, asked, threads) for name in REFERENCES}
 
 
 def performances(

@@ -46,32 +46,18 @@ class Conditions(Part):
     """Episodes of one kind, among those that a training mixes.
 
     Args:
-        weight: the frequency of this kind, relative to the others; above 0 without `final_weight`.
-        final_weight: the frequency at the end of the training; it changes evenly from `weight` on,
-            for episodes that are too hard at first, or too easy at last. None: it stays.
+        weight: the frequency of this kind, relative to the others.
         modes: failure modes, one of them drawn for each episode; "removed" is the reference P_S.
         robots: numbers m of faulty robots, one of them drawn.
         onset: (earliest, latest) time at which they fail [s], drawn evenly.
         scenario: fields of the scenario with the values that are drawn from.
     """
 
-    weight: NonNegativeFloat = 1.0
-    final_weight: NonNegativeFloat | None = None
+    weight: PositiveFloat = 1.0
     modes: Modes = ()
     robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
     onset: tuple[NonNegativeFloat, NonNegativeFloat] = (0.0, 0.0)
     scenario: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _played(self) -> Self:
-        if not self.weight and not self.final_weight:
-            raise ValueError("weight: should be above 0, or `final_weight` should")
-        return self
-
-    def weight_at(self, done: float) -> float:
-        """Return the weight once a share `done` of the training is over."""
-        last = self.weight if self.final_weight is None else self.final_weight
-        return self.weight + done * (last - self.weight)
 
     @field_validator("onset")
     @classmethod
@@ -119,18 +105,13 @@ class Indicators(Part):
 
     Args:
         weights: "R", "FT", "S", "A" and "P" with their weights.
-        references: "running": means of the episodes played under each condition; P_o [items]; or
-            the directory of a study that holds the performances.
-        window: the number of last episodes that the means are over.
-        initial: the P_o that counts before any was measured [items].
+        references: P_o of the policy to improve on [items].
         credit: the robots that are paid for a delivery: "team", "deliverer" or "carriers".
         constant: whether to pay an indicator's constant.
     """
 
     weights: Annotated[dict[str, float], Field(min_length=1)]
-    references: PositiveFloat | str = "running"
-    window: PositiveInt = 50
-    initial: PositiveFloat = 30.0
+    references: PositiveFloat
     credit: Literal["team", "deliverer", "carriers"] = "team"
     constant: bool = True
 

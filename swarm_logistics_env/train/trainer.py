@@ -19,8 +19,9 @@ from swarm_logistics_env.errors import PolicyError, TrainingError
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
+from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.train.curve import BEST, PICTURE, LiveTable, TrainingLog
+from swarm_logistics_env.train.curve import BEST, PICTURE, TrainingLog
 from swarm_logistics_env.train.evaluation import (
     enter,
     evaluate,
@@ -41,7 +42,7 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
     view_of,
 )
-from swarm_logistics_env.train.training import Training, follow_progress, make_worlds
+from swarm_logistics_env.train.training import Training, make_worlds
 
 CHECKPOINT_EVERY = 20.0  # seconds
 
@@ -102,10 +103,10 @@ def train(
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
         log.references = log.references or reference_means(training)
-        with _live_table(training, learner.num_timesteps, log) as table:
-            callback = TrainingCallback(training, view, log, out, table, kept)
-            left = training.agent_steps - learner.num_timesteps
-            learner.learn(left, [callback, *callbacks], reset_num_timesteps=False)
+        total, done = training.agent_steps, learner.num_timesteps
+        with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
+            callback = TrainingCallback(training, view, log, out, progress, kept)
+            learner.learn(total - done, [callback, *callbacks], reset_num_timesteps=False)
             callback.end()
     view.close()
     asked = training.evaluation
@@ -123,19 +124,6 @@ def train(
 
 def _new_view(training: Training) -> NetworkView:
     return NetworkView(make_worlds(training), training.scenario, training.network)
-
-
-def _live_table(training: Training, done: int, log: TrainingLog) -> LiveTable:
-    asked = training.evaluation
-    return LiveTable(
-        training.name,
-        training.agent_steps,
-        "agent-steps",
-        done=done,
-        about=f"N = {asked.n_robots}, {asked.seeds} seeds",
-        references=log.references,
-        before=[(int(row["agent_steps"]), log.measures(row)) for row in log.curve],
-    )
 
 
 def _tensors_of_start(training: Training, name: str) -> Mapping[str, NDArray[np.float32]]:
@@ -174,18 +162,18 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         view: NetworkView,
         log: TrainingLog,
         out: Path,
-        table: LiveTable,
+        progress: ProgressBar,
         kept: Mapping[str, NDArray[np.float32]],
     ) -> None:
         super().__init__()
         self._training, self._view, self._log, self._kept = training, view, log, kept
-        self._out, self._table = out, table
+        self._out, self._progress = out, progress
         self._start, self._saved_at = time.monotonic(), -math.inf
         self._before = log.seconds
         self._cpu = time.process_time()
 
     def _on_step(self) -> bool:
-        self._table.reach(self.num_timesteps)
+        self._progress.reach(self.num_timesteps)
         return True
 
     def _on_rollout_start(self) -> None:
@@ -199,7 +187,6 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         # The first layer's weights hold those of `learn_inputs`; `make_learner` keeps the others.
         linears(policy)[0].weight.requires_grad_(is_free)
         done = min(1.0, self.num_timesteps / self._training.agent_steps)
-        follow_progress(self._view.venv, done)
         floor = self._training.ppo.floor(done)
         with torch.no_grad():
             policy.log_std.clamp_(min=math.log(floor))
@@ -237,7 +224,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         card = _card(training, self.num_timesteps, log)
         means = evaluate(
             LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads
-        ).means()
+        )
         row = {
             "agent_steps": self.num_timesteps,
             "seconds": round(self._before + time.monotonic() - self._start, 1),
@@ -246,7 +233,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         log.curve.append({**row, **means})
         for name, value in means.items():
             self.logger.record(f"evaluation/{name}", value)
-        self._table.measured(means)
+        self._progress.say(log.sentence(means))
         log.write(self._out)
         if log.best is log.curve[-1]:
             write_policy(self._out / BEST, card, tensors)

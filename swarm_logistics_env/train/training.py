@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
-from swarm_logistics_env.adapters.worlds import layers_of
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import faults_among, scenario_fields
 from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
-from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, TrainingError, suggest
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.records import FileName, each_of, one_of, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
-from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
@@ -30,8 +28,7 @@ from swarm_logistics_env.train.settings import (
     WorldKind,
 )
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.wrappers import Condition, IndicatorReward, RunningMeans, Wrapper
-from swarm_logistics_env.wrappers.wrapper import changes_of
+from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
 
 if TYPE_CHECKING:
     from swarm_logistics_env.adapters import SwarmVecEnv
@@ -108,12 +105,6 @@ class Training(Part):
             self.scenario.replace(n_robots=size)
         for world in self.worlds:
             mixed = world.conditions or self.conditions
-            for done, name in ((0.0, "weight"), (1.0, "final_weight")):
-                if mixed and not sum(kind.weight_at(done) for kind in mixed):
-                    raise ValueError(
-                        f"conditions.{name}: should be above 0 for one kind at least of those that "
-                        f"worlds of {world.n_robots} robots mix"
-                    )
             most = max((max(kind.robots) for kind in mixed if kind.modes), default=0)
             if most > world.n_robots:
                 raise ValueError(
@@ -187,9 +178,6 @@ def load_training(asked: str, **fields: object) -> Training:
         raise TrainingError(f"{path.name}: {error}") from error
 
 
-References = RunningMeans | dict[Condition, float] | float
-
-
 def make_worlds(training: Training) -> SwarmVecEnv:
     """Return the worlds of a training, not yet begun.
 
@@ -198,13 +186,13 @@ def make_worlds(training: Training) -> SwarmVecEnv:
     """
     from swarm_logistics_env.adapters import SwarmVecEnv  # loads torch
 
-    make_env: Callable[[int], Wrapper] = partial(_make_env, training, _references(training))
+    make_env: Callable[[int], Wrapper] = partial(_make_env, training)
     return SwarmVecEnv(
         make_env=make_env, n_worlds=len(training.world_scenarios), threads=training.threads
     )
 
 
-def _make_env(training: Training, references: References, world: int) -> Wrapper:
+def _make_env(training: Training, world: int) -> Wrapper:
     scenario = training.world_scenarios[world]
     env = EpisodeMix(
         SwarmLogisticsEnv(scenario, rewards=training.reward_weights),
@@ -216,22 +204,11 @@ def _make_env(training: Training, references: References, world: int) -> Wrapper
     return IndicatorReward(
         env,
         asked.weights,
-        references=references,
+        references=asked.references,
         credit=asked.credit,
         constant=asked.constant,
         own_reward=1.0,
     )
-
-
-def _references(training: Training) -> References:
-    asked = training.indicators
-    if asked is None or asked.references == "running":
-        window, initial = (asked.window, asked.initial) if asked else (1, 1.0)
-        # All worlds share one, so that each reference episode serves them all.
-        return RunningMeans(window=window, initial=initial)
-    if isinstance(asked.references, str):
-        return performances_of_study(asked.references, training.scenario)
-    return asked.references
 
 
 class EpisodeMix(Wrapper):
@@ -248,17 +225,13 @@ class EpisodeMix(Wrapper):
     def __init__(self, env: SwarmLogisticsEnv | Wrapper, kinds: Sequence[Conditions]) -> None:
         super().__init__(env)
         self._kinds = tuple(kinds)
-        self.follow(0.0)
+        weights = np.array([kind.weight for kind in kinds])
+        self._shares = weights / weights.sum()
         own = self.unwrapped.scenario
         for kind in kinds:
             for name, values in kind.scenario.items():
                 for value in values:
                     self.env.declare_spaces(own.replace(**{name: value}))
-
-    def follow(self, done: float) -> None:
-        """Mix what begins from now on as it is due after a share `done` of the training."""
-        weights = np.array([kind.weight_at(done) for kind in self._kinds])
-        self._shares = weights / weights.sum()
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's conditions among them."""
@@ -275,56 +248,3 @@ class EpisodeMix(Wrapper):
             robots = kind.robots[int(rng.integers(len(kind.robots)))]
             faults = (*faults, Fault(mode, robots, onset=float(rng.uniform(*kind.onset))))
         return {**options, "scenario": {**drawn, **scenario_fields(options)}, "faults": faults}
-
-
-def follow_progress(worlds: SwarmVecEnv, done: float) -> None:
-    """Mix the episodes of all worlds as it is due after a share `done` of the training."""
-    for world in worlds.worlds:
-        for layer in layers_of(world):
-            if isinstance(layer, EpisodeMix):
-                layer.follow(done)
-
-
-def performances_of_study(directory: str | Path, own: Scenario) -> dict[Condition, float]:
-    """Return the mean P [items] of every condition that the study in `directory` ran.
-
-    Args:
-        directory: the directory of a study of one policy, the policy to improve on.
-        own: the scenario of the training; conditions are relative to it.
-
-    Raises:
-        TrainingError: there is no such study, or it is of several policies.
-    """
-    try:
-        results = Study.stored(directory).findings()
-    except StudyError as error:
-        raise TrainingError(f"indicators.references: {error}") from error
-    if len(results.policies) != 1:
-        raise TrainingError(
-            f"indicators.references: the study in {directory} is of "
-            f"{', '.join(sorted(results.policies))}: should be of one policy"
-        )
-    performances: dict[Condition, float] = {}
-    for cell in results.cells:
-        case = cell.arm.case
-        if cell.n_seeds and not case.behaviour and isinstance(case.scenario, Scenario):
-            faults = tuple(fault for fault in case.faults if isinstance(fault, Fault))
-            performances[_met(case.scenario, faults, own)] = cell.mean.value
-    return performances
-
-
-def _met(scenario: Scenario, faults: tuple[Fault, ...], own: Scenario) -> Condition:
-    counts = {fault.mode: _count(fault) for fault in faults}
-    removed = counts.pop("removed", 0)
-    return Condition(
-        scenario.n_robots,
-        tuple(sorted(counts)),
-        # The sets of one seed are nested, so the largest is all of them.
-        n_failed=max(counts.values(), default=0),
-        n_removed=removed,
-        changes=changes_of(scenario, own),
-    )
-
-
-def _count(fault: Fault) -> int:
-    return len(fault.robots) if isinstance(fault.robots, tuple) else fault.robots

@@ -19,17 +19,6 @@ from swarm_logistics_env.streams import row_keys
 Tensors = dict[str, NDArray[np.float32]]
 
 
-def test_a_robot_decides_alike_in_any_swarm(
-    card: PolicyCard, tensors: Tensors, rows: NDArray[np.float32]
-) -> None:
-    large, small = LearnedPolicy(card, tensors), LearnedPolicy(card, tensors)
-    large.reset(7, seed=4)
-    small.reset(3, seed=4)
-    for step in range(5):
-        seen = rows + np.float32(step)
-        assert large.act(seen)[:3].tobytes() == small.act(seen[:3]).tobytes()
-
-
 def test_an_episode_follows_from_its_seed(
     card: PolicyCard, tensors: Tensors, rows: NDArray[np.float32]
 ) -> None:

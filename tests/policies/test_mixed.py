@@ -18,12 +18,6 @@ from swarm_logistics_env.watch import Session
 SMALL = Scenario(n_robots=10, n_items=20, duration=20.0)
 
 
-def test_parts_of_one_policy_are_that_policy() -> None:
-    alone = run_episode(SMALL, policies.load("swarm-dt"), 3, [Fault("FM1", 2)])
-    parts = run_episode(SMALL, policies.load("swarm-dt=6,swarm-dt=4"), 3, [Fault("FM1", 2)])
-    assert parts.digest == alone.digest
-
-
 def test_each_robot_does_what_its_policy_does_upon_the_same_rows() -> None:
     world = Warehouse(SMALL)
     rows = world.reset(0)

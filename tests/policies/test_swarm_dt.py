@@ -64,7 +64,7 @@ def hearing(rows: NDArray[np.float32], x: float, y: float) -> NDArray[np.float32
     return changed
 
 
-@pytest.mark.parametrize("period", [0.02, 0.1, 0.2])
+@pytest.mark.parametrize("period", [0.02, 0.2])
 def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> None:
     policy = SwarmDT()
     policy.configure(Scenario(control_period=period))

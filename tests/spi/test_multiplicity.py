@@ -64,3 +64,18 @@ def test_identical_runs_stand_outside_the_family() -> None:
     same = spi.robustness(p_o, p_o, n=25, m=1, identical=True)
     assert spi.adjusted_p_values([same, close, same]) == (None, close.p_value, None)
     assert spi.adjust([same, close])[0] == "inconclusive"
+
+
+def test_linear_looks_spend_alpha_in_proportion_to_the_seeds() -> None:
+    from scipy.special import ndtr
+
+    looks = (5, 12, 20)
+    steps = np.random.default_rng(7).normal(size=(100_000, 20)).cumsum(axis=1)
+    p = 2 * ndtr(-np.abs(steps[:, [look - 1 for look in looks]] / np.sqrt(looks)))
+    alphas = spi.look_alphas(looks, spending="linear")
+    crossed = np.logical_or.accumulate(p < np.array(alphas), axis=1).mean(axis=0)
+    # Alpha is spent in proportion to the seeds.
+    assert crossed == pytest.approx(0.05 * np.array(looks) / 20, abs=0.002)
+    assert (p < 0.05).any(axis=1).mean() > 0.1
+    assert alphas[0] == pytest.approx(0.05 * 5 / 20)
+    assert spi.look_alphas((20,), alpha=0.1) == pytest.approx((0.1,))

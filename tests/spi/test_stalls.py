@@ -61,8 +61,7 @@ def test_where_a_run_stalled_the_spread_tells() -> None:
 
 
 # `python -m verification.verdict_errors` simulates 3,000 studies of each.
-@pytest.mark.parametrize("stalled", ["3% stall", "5% stall", "10% stall"])
-@pytest.mark.parametrize("n", [10, 20, 30])
+@pytest.mark.parametrize(("stalled", "n"), [("3% stall", 30), ("5% stall", 20), ("10% stall", 10)])
 def test_verdicts_hold_their_level_though_some_runs_stall(stalled: str, n: int) -> None:
     wrong = wrong_verdicts(stalled, [n], 600)
     assert max(wrong.above, wrong.below) <= 0.06

@@ -1,4 +1,4 @@
-"""Wrappers of parallel environments: robots that fail, and spaces that are tuples."""
+"""Robots of any parallel environment that fail."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import warnings
 from itertools import pairwise
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, Tuple
 
 from swarm_logistics_env.errors import FaultError, SetupError
-from swarm_logistics_env.tasks import FailingRobots, RobotFault, TupleEnv
+from swarm_logistics_env.tasks import FailingRobots, RobotFault
 from swarm_logistics_env.tasks.failing_robots import failing_rows
 from tests.tasks.lane import FAILURES, STAY, WALK, Lane
 
@@ -91,14 +90,13 @@ def test_structures_are_blinded_and_whole_numbers_bear_no_noise() -> None:
         env.reset(seed=0)
 
 
-def test_both_are_parallel_environments_and_seeds_are_counted() -> None:
+def test_it_is_a_parallel_environment_and_seeds_are_counted() -> None:
     faults = [RobotFault(mode="silent", robots=2)]
     with warnings.catch_warnings():
         # PettingZoo's tests load environments of PettingZoo's in a way that it deprecates.
         warnings.simplefilter("ignore", DeprecationWarning)
         conformance = importlib.import_module("pettingzoo.test")
     conformance.parallel_api_test(FailingRobots(Lane(3), faults, FAILURES), num_cycles=20)
-    conformance.parallel_api_test(TupleEnv(Pair()), num_cycles=5)
     one, two = (FailingRobots(Lane(3), faults, FAILURES) for _ in range(2))
     one.reset(seed=0)
     two.reset(seed=1)
@@ -119,54 +117,3 @@ def test_both_are_parallel_environments_and_seeds_are_counted() -> None:
 def test_faults_that_cannot_be(fault: dict[str, Any], words: str) -> None:
     with pytest.raises(FaultError, match=words):
         FailingRobots(Lane(3), [RobotFault(**{"robots": 1, **fault})], FAILURES)
-
-
-class Pair(gymnasium.Env[Any, Any]):
-    """Two agents that count their own actions; it ends after five steps."""
-
-    observation_space = Tuple([Box(0, 9, (1,), np.float32)] * 2)
-    action_space = Tuple([Discrete(2)] * 2)
-    shared = False
-
-    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, Any]:
-        super().reset(seed=seed)
-        self.counts, self.steps = [0, 0], 0
-        return self._seen(), {"agent_0": {"own": 0}, "agent_1": {"own": 1}}
-
-    def step(self, actions: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        self.steps += 1
-        self.counts = [count + action for count, action in zip(self.counts, actions)]
-        rewards: Any = 1.5 if self.shared else list(actions)
-        return self._seen(), rewards, False, self.steps == 5, {"all": self.steps}
-
-    def _seen(self) -> tuple[Any, ...]:
-        return tuple(np.array([count], dtype=np.float32) for count in self.counts)
-
-
-def test_each_agent_has_its_own_part() -> None:
-    env = TupleEnv(Pair())
-    observations, infos = env.reset(seed=0)
-    assert infos == {"agent_0": {"own": 0}, "agent_1": {"own": 1}}
-    observations, rewards, _, truncated, infos = env.step({"agent_1": 1, "agent_0": 0})
-    assert {agent: value.tolist() for agent, value in observations.items()} == {
-        "agent_0": [0.0], "agent_1": [1.0],
-    }  # fmt: skip
-    assert rewards == {"agent_0": 0.0, "agent_1": 1.0}
-    assert infos == {"agent_0": {"all": 1}, "agent_1": {"all": 1}}
-    assert truncated == {"agent_0": False, "agent_1": False}
-    for _ in range(4):
-        _, _, _, truncated, _ = env.step(dict.fromkeys(env.agents, 0))
-    assert all(truncated.values())
-    assert env.agents == []
-
-
-def test_one_reward_is_given_to_each_and_other_spaces_are_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(Pair, "shared", True)
-    env = TupleEnv(Pair())
-    env.reset()
-    assert env.step(dict.fromkeys(env.agents, 0))[1] == {"agent_0": 1.5, "agent_1": 1.5}
-    monkeypatch.setattr(Pair, "action_space", Discrete(2))
-    with pytest.raises(SetupError, match=r"space Discrete\(2\) should be a Tuple"):
-        TupleEnv(Pair())

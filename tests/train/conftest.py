@@ -13,7 +13,7 @@ from swarm_logistics_env.train import Training
 from swarm_logistics_env.train.settings import Evaluation, PPOSettings, Scores
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def small() -> Any:
     """Return a maker of trainings that take a second."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from swarm_logistics_env import Fault, Scenario, policies, run_episode
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.studies.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
+from swarm_logistics_env.train.curve import TrainingLog
 from swarm_logistics_env.train.settings import Evaluation
 
 SCENARIO = Scenario(
@@ -52,3 +55,20 @@ def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPat
     evaluation.evaluate(policies.load("swarm-dt"), SCENARIO, asked)
     assert len(seeds) == 3
     assert seeds.isdisjoint(range(MOST_SEEDS))
+
+
+def test_the_best_evaluation_is_the_highest_and_the_curve_is_written(tmp_path: Path) -> None:
+    rows = [(0, 1.0), (500, 40.0), (1000, 90.0), (1500, 80.0)]
+    log = TrainingLog(
+        [{"agent_steps": steps, "seconds": 2.0 * steps, "P": p} for steps, p in rows],
+        {"swarm-dt": {"P": 37.0}, "homing": {"P": 146.0}},
+    )
+    told = log.sentence({"P": 49.5, "R_FM4": 0.25})
+    assert told == "P = 49.5 (swarm-dt 37, homing 146), R_FM4 = 0.25"
+    assert log.best["agent_steps"] == 1000
+    log.write(tmp_path)
+    with (tmp_path / "curve.csv").open(newline="") as file:
+        assert [float(row["P"]) for row in csv.DictReader(file)] == [1.0, 40.0, 90.0, 80.0]
+    pytest.importorskip("matplotlib")
+    log.draw(tmp_path / "curve.png", "ppo", seeds=4)
+    assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")

@@ -44,6 +44,7 @@ robots = [1]
 
 [indicators]
 weights = { R = 1.0, P = 0.1 }
+references = 5.0
 
 [network]
 hidden = [8]

@@ -35,6 +35,12 @@ def same(one: Path, other: Path) -> bool:
     return all(first[name].tobytes() == second[name].tobytes() for name in first)
 
 
+@pytest.fixture(scope="module")
+def done(small: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The policy file of the small training."""
+    return train(small(), tmp_path_factory.mktemp("done"))
+
+
 def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> None:
     scores = Scores(seeds=2, sizes=(2, 3), modes=("FM4",), robots=(1,), n_robots=3)
     path = train(small(scores=scores), tmp_path, command="the command")
@@ -123,14 +129,6 @@ def test_the_view_trains_what_the_policy_plays(small: Any) -> None:
         assert (frame.read(view.observations) == inputs[:, : len(INPUTS)]).all()
 
 
-def test_the_same_seed_gives_the_same_policy(small: Any, tmp_path: Path) -> None:
-    paths = [
-        train(small(seed=seed), tmp_path / f"{number}") for number, seed in enumerate([0, 0, 1])
-    ]
-    assert same(paths[0], paths[1])
-    assert not same(paths[0], paths[2])
-
-
 class Stops(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
     """Notes what is logged at the end of each rollout, and stops after so many steps."""
 
@@ -145,23 +143,21 @@ class Stops(BaseCallback):  # type: ignore[misc]  # not in the environment of th
         return bool(self.num_timesteps < self.after)
 
 
-def test_callbacks_see_a_training_and_may_stop_it_for_the_next_call(
-    small: Any, tmp_path: Path
+def test_a_policy_follows_from_its_seed_whatever_callbacks_see_or_stop(
+    small: Any, done: Path, tmp_path: Path
 ) -> None:
     seeing, stopping = Stops(math.inf), Stops(320)
-    whole = train(small(), tmp_path / "whole", callbacks=[seeing])
+    assert same(train(small(), tmp_path / "seen", callbacks=[seeing]), done)
     assert seeing.seen == 640
-    path = train(small(), tmp_path / "cut", callbacks=[stopping])
+    path = train(small(seed=1), tmp_path / "cut", callbacks=[stopping])
     assert policies.read_card(path).agent_steps == 320
-    train(small(), tmp_path / "cut")
+    assert not same(train(small(seed=1), tmp_path / "cut"), done)
     assert policies.read_card(path).agent_steps == 640
-    assert same(train(small(), tmp_path / "plain"), whole)
 
 
-def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> None:
-    train(small(), tmp_path)
+def test_another_training_is_not_gone_on_with(small: Any, done: Path) -> None:
     with pytest.raises(TrainingError, match="holds a training with another seed, worlds"):
-        train(small(seed=1, worlds=[{"n_robots": 5}, {"n_robots": 3}]), tmp_path)
+        train(small(seed=1, worlds=[{"n_robots": 5}, {"n_robots": 3}]), done.parent)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +165,7 @@ def test_another_training_is_not_gone_on_with(small: Any, tmp_path: Path) -> Non
     [
         ({}, "gpu", "device = 'gpu': should be 'cpu' or 'cuda'"),
         ({}, "cuda", "device = 'cuda': torch finds no GPU here"),
-        ({"indicators": Indicators(weights={"Q": 1.0})}, "cpu", "no indicator 'Q'"),
+        ({"indicators": Indicators(weights={"Q": 1.0}, references=9.0)}, "cpu", "no indicator 'Q'"),
         ({"start": "homing"}, "cpu", "start = 'homing': should be a trained policy"),
         ({"start": "ppo-delivery"}, "cpu", "start = 'ppo-delivery': its tensors lack .* and have"),
     ],
@@ -213,25 +209,23 @@ def test_a_missing_library_is_told_before_anything_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_checkpoint_that_is_cut_short_is_refused(small: Any, tmp_path: Path) -> None:
-    train(small(), tmp_path)
-    path = tmp_path / "checkpoint.pt"
-    path.write_bytes(path.read_bytes()[:1000])
+def test_a_checkpoint_that_is_cut_short_is_refused(small: Any, done: Path, tmp_path: Path) -> None:
+    for name, end in (("training.json", None), ("checkpoint.pt", 1000)):
+        (tmp_path / name).write_bytes((done.parent / name).read_bytes()[:end])
     with pytest.raises(TrainingError, match=r"cannot be read .*: train into a new directory"):
         train(small(), tmp_path)
 
 
-def test_a_training_goes_on_from_a_trained_policy(small: Any, tmp_path: Path) -> None:
-    first = train(small(), tmp_path / "first")
+def test_a_training_goes_on_from_a_trained_policy(small: Any, done: Path, tmp_path: Path) -> None:
     frozen = small().ppo.replace(value_warmup=100)
-    again = train(small(start=str(first), seed=1, ppo=frozen), tmp_path / "again")
-    layers = [name for name in load_file(first) if name.startswith("layers")]
-    assert all((load_file(first)[name] == load_file(again)[name]).all() for name in layers)
-    assert policies.read_card(again).training["start"] == str(first)
+    again = train(small(start=str(done), seed=1, ppo=frozen), tmp_path)
+    layers = [name for name in load_file(done) if name.startswith("layers")]
+    assert all((load_file(done)[name] == load_file(again)[name]).all() for name in layers)
+    assert policies.read_card(again).training["start"] == str(done)
 
 
 def test_inputs_that_are_learned_alone_leave_every_other_decision_as_it_was(
-    small: Any, tmp_path: Path
+    small: Any, tmp_path: Path, stopped_after: Any
 ) -> None:
     older = small().network.replace(inputs=88)
     first = train(small(network=older), tmp_path / "first")
@@ -249,23 +243,8 @@ def test_inputs_that_are_learned_alone_leave_every_other_decision_as_it_was(
     assert all((after[n] == before[n]).all() for n in before if n != "layers.0.weight")
     assert new[:, 0].any(), "cannot_lift"
     assert not new[:, 1:].any()
-
-
-def test_a_training_of_some_inputs_goes_on_to_the_same_bits(
-    small: Any, tmp_path: Path, stopped_after: Any
-) -> None:
-    first = train(small(network=small().network.replace(inputs=88)), tmp_path / "first")
-    training = small(
-        start=str(first),
-        learn_inputs=("cannot_lift",),
-        conditions=(
-            Conditions(modes=("FM2",), robots=(2,), final_weight=0.5),
-            Conditions(weight=0.1, final_weight=1.0),
-        ),
-    )
-    whole = train(training, tmp_path / "whole")
     stopped_after(3, lambda: train(training, tmp_path / "cut"))
-    assert same(train(training, tmp_path / "cut"), whole)
+    assert same(train(training, tmp_path / "cut"), path)
 
 
 def test_inputs_that_cannot_be_learned_alone_are_refused(small: Any, tmp_path: Path) -> None:

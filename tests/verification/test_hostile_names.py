@@ -113,27 +113,16 @@ def test_labels_are_refused_or_reported() -> None:
 
 
 def table(column: str, names: list[str]) -> str:
-    """Return trials in which `column` has these names, or the header has them."""
+    """Return trials in which `column` has these names."""
     text = io.StringIO()
     writer = csv.writer(text)
-    header = names if column == "header" else [column]
-    writer.writerow(["delivered", "robots", "faulty", *header, *(["fault"] * (column != "fault"))])
-    for name in names:
-        for fault in ("none", "jam"):
-            values = (
-                ["1" if fault == "none" else "2"] * len(names) if column == "header" else [name]
-            )
-            extra = [fault] if column != "fault" else []
-            if column == "fault":
-                values = ["none"] if fault == "none" else [name]
+    writer.writerow(["delivered", "robots", "faulty", "fault", *([column] * (column != "fault"))])
+    faults = ["none", *names] if column == "fault" else ["none", "jam"]
+    for name in [""] if column == "fault" else names:
+        for fault in faults:
             for trial in range(3):
-                writer.writerow([trial + 5, 8, int(fault != "none"), *values, *extra])
-        if column in ("header", "fault"):
-            break
-    if column == "fault":
-        for name in names[1:]:
-            for trial in range(3):
-                writer.writerow([trial + 4, 8, 1, name])
+                extra = [name] if column != "fault" else []
+                writer.writerow([trial + 5, 8, int(fault != "none"), fault, *extra])
     return text.getvalue()
 
 

@@ -31,16 +31,6 @@ def test_no_random_world_breaks_a_promise(number: int) -> None:
     play(random.Random(number), 80, Tally())
 
 
-def test_the_soak_says_how_far_it_went() -> None:
-    command = [sys.executable, "-m", "verification.soak", "--first", "1"]
-    command += ["--worlds", "6", "--steps", "30"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    last = done.stdout.splitlines()[-1]  # a slow machine tells of every minute before
-    assert last.startswith("no promise broken: ")
-    assert "of 6 worlds" in last
-
-
 def test_the_watch_accuses_nobody_who_was_repaired_for_a_moment() -> None:
     world = Warehouse(Scenario(n_robots=1))
     world.reset(0, [Fault("dead", (0,))])
