@@ -24,10 +24,15 @@ class WaitingPlaces:
     """Gives each robot an item to wait under, spread out, or a place at the wall.
 
     Unladen robots drive under items, which laden ones have to go around anyway.
+
+    Args:
+        n_robots: rows of robots.
+        laden_wait: whether robots that carry an item wait for a place to wait as well.
     """
 
-    def __init__(self, n_robots: int) -> None:
-        self._item = np.full(n_robots, NOBODY)
+    def __init__(self, n_robots: int, laden_wait: bool = True) -> None:
+        self._laden_wait = laden_wait
+        self.item = np.full(n_robots, NOBODY)  # that each robot waits under
 
     def places(
         self, state: WarehouseState, worker: int, scenario: Scenario
@@ -40,10 +45,10 @@ class WaitingPlaces:
         free = state.item_status == STORED
         if state.requested != NOBODY:
             free[state.requested] = False
-        waits = state.robot_present.copy()
+        waits = state.robot_present & (self._laden_wait | (state.robot_item == NOBODY))
         if worker != NOBODY:
             waits[worker] = False
-        item = self._item
+        item = self.item
         item[~waits | ~free[item]] = NOBODY
         is_taken = np.zeros(len(free), np.bool_)
         is_taken[item[item != NOBODY]] = True
@@ -132,12 +137,22 @@ class Central:
             )
         worker = self._assign(state)
         goals, is_under_item = self._waiting.places(state, worker, self._scenario)
-        velocity = self._drift(state, goals, is_under_item, worker)
         gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
+        self._stock(state, worker, goals, gripper)
+        velocity = self._drift(state, goals, is_under_item, worker)
         if worker != NOBODY:
             velocity[worker] = self._on_its_way(state, worker)
             gripper[worker] = 1.0 if self._may_hold(state, worker) else 0.0
         return self._steer(state, velocity, gripper)
+
+    def _stock(
+        self,
+        state: WarehouseState,
+        worker: int,
+        goals: NDArray[np.float64],
+        gripper: NDArray[np.float64],
+    ) -> None:
+        """Change what robots without a request do: where they go [m] and what they hold."""
 
     # -- who -----------------------------------------------------------------------------------
 
@@ -212,26 +227,13 @@ class Central:
         return self._towards(state.robot_position[worker], np.array(waypoint))
 
     def _plan(self, state: WarehouseState, worker: int) -> None:
-        scenario, (item, carries) = self._scenario, self._task
+        item, carries = self._task
         others = state.robot_present.copy()
         others[worker] = False
-        discs = [_discs(state.robot_position[others], scenario.robot_radius, CROWDED)]
-        discs += [_discs(state.obstacle_position, scenario.obstacle_radius, BLOCKED)]
+        self._cost = self._costs(state, carries, others)
+        goal: NDArray[np.bool_] = np.zeros_like(self._cost, np.bool_)
         if carries:
-            stored = state.item_position[state.item_status == STORED]
-            discs += [_discs(stored, scenario.item_radius, BLOCKED)]
-        around = np.vstack(discs)
-        around[:, 2] += scenario.robot_radius + MARGIN
-        self._cost = costmap(
-            scenario.warehouse_width,
-            scenario.warehouse_height,
-            CELL,
-            scenario.robot_radius,
-            around,
-        )
-        goal = np.zeros(self._cost.shape, np.bool_)
-        if carries:
-            goal[:, int(scenario.storage_width / CELL) :] = True
+            goal[:, int(self._scenario.storage_width / CELL) :] = True
         else:
             x, y = state.item_position[item].tolist()
             goal[min(int(y / CELL), goal.shape[0] - 1), min(int(x / CELL), goal.shape[1] - 1)] = (
@@ -239,6 +241,26 @@ class Central:
             )
         self._far = cost_to_go(self._cost, goal)
         self._planned_at = state.time
+
+    def _costs(
+        self, state: WarehouseState, carries: bool, robots: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        """Return the cost of each cell for a robot that carries an item or not, among `robots`."""
+        scenario = self._scenario
+        discs = [_discs(state.robot_position[robots], scenario.robot_radius, CROWDED)]
+        discs += [_discs(state.obstacle_position, scenario.obstacle_radius, BLOCKED)]
+        if carries:
+            stored = state.item_position[state.item_status == STORED]
+            discs += [_discs(stored, scenario.item_radius, BLOCKED)]
+        around = np.vstack(discs)
+        around[:, 2] += scenario.robot_radius + MARGIN
+        return costmap(
+            scenario.warehouse_width,
+            scenario.warehouse_height,
+            CELL,
+            scenario.robot_radius,
+            around,
+        )
 
     # -- how -----------------------------------------------------------------------------------
 

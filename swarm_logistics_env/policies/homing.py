@@ -71,12 +71,24 @@ class Homing:
                 f"observations of {len(observations)} robots: reset was told "
                 f"{len(self._frame.keys)}"
             )
-        frame, period = self._frame, self._period
+        frame = self._frame
         frame.read(observations)
-        numbers = ((frame.counts - 1) * period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+        numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
         commands = np.zeros((len(observations), 4))
-        decide_homing(observations, frame.memory, frame.keys, numbers, period, commands)
+        self._decide(observations, frame, numbers, commands)
         return frame.command(frame.outputs_for(commands))
+
+    def _decide(
+        self,
+        observations: NDArray[np.float32],
+        frame: MotionFrame,
+        random_headings: NDArray[np.int64],
+        commands: NDArray[np.float64],
+    ) -> None:
+        """Fill the commands (N, 4), in the robots' own frames."""
+        decide_homing(
+            observations, frame.memory, frame.keys, random_headings, self._period, commands
+        )
 
 
 @kernel

@@ -19,6 +19,7 @@ from pydantic import Field, JsonValue, field_validator, model_serializer
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
+from swarm_logistics_env.policies.central_stock import CentralStock
 from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,
@@ -28,6 +29,7 @@ from swarm_logistics_env.policies.files import (
     read_policy,
 )
 from swarm_logistics_env.policies.homing import Homing
+from swarm_logistics_env.policies.homing_stock import HomingStock
 from swarm_logistics_env.policies.policy import Mixed, Policy, identity
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.records import Record, canonical_json
@@ -43,7 +45,9 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
     # This is Swarm D-T without its taxis, for ablations.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
     "homing": Homing,
+    "homing-stock": HomingStock,
     "central": Central,
+    "central-stock": CentralStock,
 }
 
 NAMES: dict[str, Callable[..., Policy]] = {
