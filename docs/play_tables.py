@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import front_page
+from play_ladder import draw_ladder, ladder_block, ladder_studies, leans_block
 from play_paper import draw_figures, paper_block, paper_studies, sentences_block
 from tables import rewritten, table
 
@@ -168,10 +169,14 @@ def main() -> None:
     """Play, rewrite the page of results, then the README, and record P of the shipped swarms."""
     paper = play(paper_studies(OUT, FIRST_SEED))
     draw_figures(paper, MEDIA)
+    cleared, restocked, leans = play(ladder_studies(OUT))
+    draw_ladder(restocked, MEDIA / "ladder.svg")
     blocks = {
         "clearing": clearing_block(*play([clearing_study(OUT)])),
         "paper": paper_block(paper),
         "sentences": sentences_block(paper),
+        "ladder": ladder_block(cleared, restocked),
+        "leans": leans_block(leans),
         "policies": policies_block(*play(policy_studies(OUT))),
     }
     if BENCHMARK.exists():

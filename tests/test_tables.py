@@ -33,6 +33,8 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "Before.\n\n<!-- tables: paper -->\n<!-- end of tables -->\n\nBetween.\n\n"
         "<!-- tables: clearing -->\n<!-- end of tables -->\n"
         "<!-- tables: sentences -->\n<!-- end of tables -->\n"
+        "<!-- tables: ladder -->\n<!-- end of tables -->\n"
+        "<!-- tables: leans -->\n<!-- end of tables -->\n"
         "<!-- tables: policies -->\nold\n<!-- end of tables -->\nAfter.\n"
     )
     short: dict[str, Any] = {"seeds": 2, "first_seed": 3, "scenario": {"duration": 40.0}}
@@ -64,6 +66,17 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             Study(out=out / "skewed", policies=policies[:1], **{**small, "seeds": 3}),
         )
 
+    def ladder_studies(out: Path) -> tuple[Study, ...]:
+        slow = [{"policy": "swarm-dt", "title": "slow", "scenario": {"handling_time": 1.0}}]
+        fields: dict[str, Any] = {
+            "policies": ["swarm-dt", "homing"],
+            "ablations": [{"policy": "swarm-dt", "title": "fast"}, *slow],
+            "seeds": 2,
+            "scenario": {"n_items": 6, "duration": 100.0},
+        }
+        tasks = "clearing", "warehouse", "warehouse"
+        return tuple(Study(out=out / f"l{i}", task=task, **fields) for i, task in enumerate(tasks))
+
     monkeypatch.setattr(tables, "PAGE", page)
     monkeypatch.setattr(tables.front_page, "main", lambda: None)
     monkeypatch.setattr(tables, "record_scores", lambda out: None)
@@ -73,6 +86,7 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(tables, "paper_studies", paper_studies)
     monkeypatch.setattr(tables, "policy_studies", policy_studies)
     monkeypatch.setattr(tables, "clearing_study", clearing_study)
+    monkeypatch.setattr(tables, "ladder_studies", ladder_studies)
     monkeypatch.setattr(tables, "MEDIA", tmp_path)
     return page
 
@@ -100,7 +114,7 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     assert small.read_text() == first
     drawn = {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")}
     assert drawn == {"S", "FT", "A"}
-    assert played == [0] * 7
+    assert played == [0] * 10
     # Nor does what is played anew change a digit.
     monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
     tables.main()
@@ -113,22 +127,18 @@ def test_its_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -
     first = tables.FIRST_SEED
     paper = tables.paper_studies(out, first)
     studies = (*paper, *tables.policy_studies(out), tables.clearing_study(out))
+    studies = (*studies, *tables.ladder_studies(out))
     for study in studies:
         seeds = study.plan().seeds
         assert min(seeds) >= 20_000
         assert max(seeds) < FIRST_OF_TRAININGS
-    assert [len(one.plan().seeds) for one in studies] == [20, 100, 100, 20, 100, 20, 100, 30]
+    assert [len(one.plan().seeds) for one in studies] == [20, 100, 100, 20, 100, 20, 100, *[30] * 4]
 
 
 @pytest.mark.parametrize("page", [PAGE, README], ids=["results.md", "README.md"])
 def test_no_table_is_typed_by_hand(page: str) -> None:
-    assert [name for name, _ in BLOCK.findall(PAGE)] == [
-        "clearing",
-        "paper",
-        "sentences",
-        "policies",
-        "costs",
-    ]
+    named = [name for name, _ in BLOCK.findall(PAGE)]
+    assert named == ["clearing", "paper", "sentences", "ladder", "leans", "policies", "costs"]
     rest = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
     assert not [line for line in rest.splitlines() if line.startswith("|")]
     # Nor is a value with its interval: "9.2 [8.3, 10.1]".

@@ -109,10 +109,7 @@ def decide_homing_stock(
     stockers: float,
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) from rows (N, D) and memories (N, memory.N_COLUMNS).
-
-    `random_headings` (N,) are the numbers of the random directions whose turn it is.
-    """
+    """Fill the commands (N, 4) from rows (N, D), memories and the numbers of random headings."""
     for robot in range(rows.shape[0]):
         sensed, own = rows[robot], memory[robot]
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5

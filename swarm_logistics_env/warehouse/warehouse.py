@@ -41,8 +41,7 @@ class Warehouse:
         state: what is true now, see `WarehouseState`.
         faults: what affects whom in this episode.
         n_removed: how many robots were taken out of the arena so far.
-        is_eventful: whether something happened in the last step that observations do not tell, as
-            a delivery, see `stepping.step`.
+        is_eventful: whether something happened that observations do not tell (`stepping.step`).
 
     Example:
         >>> world = Warehouse(Scenario(n_robots=3))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -81,6 +82,18 @@ def test_a_robot_speeds_up_to_its_top_speed_and_stops_again(
     assert world.state.robot_velocity[0, 0] == pytest.approx(0.0, abs=1e-3)
 
 
+def test_a_laden_robot_does_not_drive_through_an_item(build: Build) -> None:
+    world = build([(2.0, 5.0)], [FAR, (2.0, 5.1), (3.0, 5.0)], pickup_range=0.15)
+    steps(world, HOLD)
+    for _ in range(20):
+        steps(world, EAST)
+        away = np.linalg.norm(world.state.robot_position[0] - [3.0, 5.0])
+        assert away >= DIAMETER - CLOSING / 2
+    assert world.state.robot_item[0] == 1
+    assert world.state.robot_position[0, 0] == pytest.approx(2.75, abs=SUSTAINED)
+    assert world.state.item_position[2].tolist() == [3.0, 5.0]  # it stays put
+
+
 def test_a_robot_that_lifts_above_other_items_is_not_pushed_off_them(build: Build) -> None:
     above = [(2.0, 5.1), (2.1, 5.15), (1.9, 5.15), (2.0, 4.8)]
     world = build([(2.0, 5.0)], [FAR, *above], pickup_range=0.15)
@@ -157,3 +170,17 @@ def test_a_removed_robot_is_in_nobodys_way(build: Build) -> None:
         steps(world, EAST, STAY)
         free.step([EAST])
     np.testing.assert_array_equal(world.state.robot_position[0], free.state.robot_position[0])
+
+
+def test_the_mirror_image_of_a_world_moves_as_its_mirror_image(build: Build) -> None:
+    # No order of robots is favoured beyond rounding while nothing touches.
+    rng = np.random.default_rng(0)
+    places = np.array(list(itertools.product((2.0, 4.0, 6.0), (2.0, 5.0, 8.0))))
+    commands = rng.uniform(-0.5, 0.5, (9, 4))
+    world, mirrored = build(places, [FAR]), build(places[::-1], [FAR])
+    for _ in range(5):
+        world.step(commands)
+        mirrored.step(commands[::-1])
+    np.testing.assert_allclose(
+        world.state.robot_position, mirrored.state.robot_position[::-1], atol=1e-9
+    )

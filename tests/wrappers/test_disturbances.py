@@ -169,6 +169,8 @@ OTHER: dict[str, Any] = {
     "position_noise": 0.1,
     "sensor_dropout": 0.2,
     "radio_loss": 0.2,
+    "demand": "zipf",
+    "dock_capacity": 0.5,
 }
 
 
