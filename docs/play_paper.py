@@ -49,7 +49,7 @@ def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
         "paper-faults": faults,
         "paper-send": {**faults, "faults": send},
         "paper-no-drift": {**rest, "scenario": NO_DRIFT, "sizes": large, "ablations": ()},
-        "paper-faults-no-drift": {**faults, "scenario": NO_DRIFT},
+        "paper-faults-no-drift": {**faults, "seeds": SEEDS, "scenario": NO_DRIFT},
     }
     return tuple(
         Study.preset("paper", out=out / name, first_seed=first_seed, **fields)

@@ -84,9 +84,6 @@ PAPER_FAULTS = {
     "FM3": (40, 41, 40),
     "FM4": (39, 15, 12),
 }
-# "Cannot communicate with their neighbours" has two readings; this one was added after the tables
-# were seen, and its published values are those of FM3.
-PAPER_FAULTS["FM3_send"] = PAPER_FAULTS["FM3"]
 
 # Table III, N = 25: value -> P, x_o first. The printed widths .5 to 2 m cannot be metres (25
 # robots cover 1.2 m^2): the warehouse's are read in units of the stated arena's 10 m, the
@@ -107,6 +104,9 @@ PAPER_PERFORMANCE: dict[Setting, float] = {
     **{size(n): p for n, p in PAPER_SIZES.items()},
     NO_FAULT: PAPER_NO_FAULT,
     **{fault(mode, m): p for mode, row in PAPER_FAULTS.items() for m, p in enumerate(row, start=1)},
+    # "Cannot communicate with their neighbours" has two readings; this one was added after the
+    # tables were seen.
+    **{fault("FM3_send", m): p for m, p in enumerate(PAPER_FAULTS["FM3"], start=1)},
     **{parameter(name, x): p for name, row in PAPER_PARAMETERS.items() for x, p in row.items()},
 }
 

@@ -22,6 +22,7 @@ from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.specification import looks_up_to
+from swarm_logistics_env.studies.until_clear import SPENDING
 from swarm_logistics_env.studies.verdict import Verdict
 from swarm_logistics_env.tasks.task import Outcome, Run
 from tests.studies.made_up import delivered
@@ -107,7 +108,7 @@ def test_a_comparison_is_judged_by_its_own_seeds_and_its_repeated_interval(
     for test in study.findings().verdicts:
         estimate = test.estimate
         assert estimate is not None
-        alpha = spi.look_alphas(looks)[looks.index(estimate.n_seeds)]
+        alpha = spi.look_alphas(looks, spending=SPENDING)[looks.index(estimate.n_seeds)]
         assert estimate.confidence == pytest.approx(1 - alpha)
         p_o, p_f = (
             [
@@ -142,7 +143,10 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
         for n_seeds, p, verdict in sorted(found, key=lambda one: (one[0], one[1] or 0.0)):
             assert p is not None
             look = looks.index(n_seeds)
-            alone, level = (spi.look_alphas(looks, alpha)[look] for alpha in (0.05, 0.05 / n_open))
+            alone, level = (
+                spi.look_alphas(looks, alpha, spending=SPENDING)[look]
+                for alpha in (0.05, 0.05 / n_open)
+            )
             is_clear = verdict != "inconclusive"
             assert is_clear == (p < level)
             softened += level <= p < alone
