@@ -267,7 +267,7 @@ def show_report(results: StudyResults, out: Path | None, *, full: bool = False) 
             typer.echo(how_to_get_figures(missing))
         else:
             typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
-        if not full:
+        if not full and any(len(line.tests) > 1 for line in whole.answer.lines):
             again = f"swarm-logistics study report {shlex.quote(str(out))} --full"
             typer.echo(f"Each question on a line of its own: {again}")
     typer.echo(f"For a paper: {plain(in_a_sentence(results))}")

@@ -120,7 +120,10 @@ def judge_command(
         )  # fmt: skip
         raise typer.Exit(1 if failed else 0)
 
-    directory = out or _free(Path("results", "judged", Path(asked).stem))
+    usual = Path("results", "judged", Path(asked).stem)
+    directory = out or _free(usual)
+    if directory not in (out, usual):
+        typer.echo(f"{usual} holds an earlier judgement, so this one goes into {directory}")
     count = import_results(
         Path(asked),
         directory,

@@ -14,7 +14,7 @@ from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
-from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, read_trials
+from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials, read_trials
 from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, RecordedScenario
 from swarm_logistics_env.tasks.task import Case, Outcome
 
@@ -67,7 +67,7 @@ def import_results(
         seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
         setup=tuple((setup or {}).items()),
         trials=tuple(replace(rows[0], times=None) for rows in conditions.values()),
-        notes=trials.notes,
+        notes=(*trials.notes, *_without_removed(trials)),
     )
     specification = Specification(
         name=file_name(file.stem),
@@ -90,6 +90,15 @@ def import_results(
         declared = Declaration.model_validate(specification)
         note(runs, specification, RECORDED.code(), {}, declared, origin)
     return len(trials.rows)
+
+
+def _without_removed(trials: Trials) -> Iterator[str]:
+    """Yield why FT is not asked, where robots failed and none were taken away."""
+    faults = {row.fault for row in trials.rows} - {NO_FAULT, REPEATED}
+    if faults and RECORDED.removed not in faults:
+        yield (
+            f"No FT: it needs trials without the robots, fault = {RECORDED.removed}; R is asked."
+        )
 
 
 def imported_plan(specification: Specification, origin: Origin) -> Plan:

@@ -208,3 +208,14 @@ def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(
     assert "Time until all items are delivered" in report
     assert "items delivered per minute" in report
     assert app.run(["judge", "lab.csv", "--clearing"]) == 2
+
+
+def test_trials_without_removed_robots_and_a_second_judgement_are_named(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert app.run(["judge", "lab.csv", "--column", "performance=boxes"]) == 0
+    assert "No FT: it needs trials without the robots, fault = removed" in capsys.readouterr().out
+    assert app.run(["judge", "lab.csv", "--column", "performance=boxes"]) == 0
+    assert "earlier judgement, so this one goes into results/judged/lab-2" in (
+        capsys.readouterr().out
+    )
