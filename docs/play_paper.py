@@ -22,6 +22,7 @@ from swarm_logistics_env.studies.presets import PAPER, PAPER_SIZES
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
+NEAR = "Mean of |ln(ours / paper's)|, and published values in the 95 % interval of our mean"
 SEEDS, SEEDS_WHERE_SKEWED = 20, 100
 NO_DRIFT = {"heading_drift": 0.0}
 FAULTS = {
@@ -77,9 +78,8 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
         table(("", "paper's P", "ours, mean [95 %]", "seeds"), rows),
         "",
         f"Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.",
-        f"{_near(found)}.",
-        f"With FM3_send in the place of FM3: {_near(send)}.",
-        f"Without drift of headings, which changes P by {_change(parts):+.1%}: {_near(exact)}.",
+        f"{NEAR}: {_near(found)}; with FM3_send in the place of FM3 {_near(send)}; without drift "
+        f"of headings {_near(exact)}, and P changes by {_change(parts):+.1%} on average.",
         f"{len(missed)} lie outside the 95 % prediction interval of one of our runs (bold).",
     ]
     if any(cell.saturated for cell in with_drift.values()):
@@ -119,10 +119,8 @@ def _agreement(cells: Mapping[Setting, Cell], reading: str = "FM3") -> Agreement
 
 def _near(found: Agreement) -> str:
     """Return how near the published values are to ours, in words."""
-    return (
-        f"Mean of |ln(ours / paper's)| {found.mean_log_error or 0.0:.3f} over {len(found.cells)} "
-        f"published values, {len(found.met or ())} of them inside the 95 % interval of our mean"
-    )
+    inside = f"{len(found.met or ())} of {len(found.cells)}"
+    return f"{found.mean_log_error or 0.0:.3f}, {inside}"
 
 
 def _change(parts: Sequence[StudyResults]) -> float:
