@@ -78,8 +78,8 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
         table(("", "paper's P", "ours, mean [95 %]", "seeds"), rows),
         "",
         f"Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.",
-        f"{NEAR}: {_near(found)}; with FM3_send in the place of FM3 {_near(send)}; without drift "
-        f"of headings {_near(exact)}, and P changes by {_change(parts):+.1%} on average.",
+        f"{NEAR}: {_near(found)}; with FM3_send in the place of FM3 {_near(send)};",
+        f"without drift of headings {_near(exact)}, and P changes by {_change(parts):+.1%}.",
         f"{len(missed)} lie outside the 95 % prediction interval of one of our runs (bold).",
     ]
     if any(cell.saturated for cell in with_drift.values()):
