@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import film_colours
 from swarm_logistics_env.watch import Session
+from swarm_logistics_env.watch.film import Film, Take
 from swarm_logistics_env.watch.messages import recorded_page
 from verification.browser import Browser
 
@@ -59,6 +61,23 @@ def browser_view(name: str) -> None:
     Image.open(MEDIA / name).convert("RGB").save(MEDIA / name, optimize=True)
 
 
+def collapse(name: str) -> None:
+    """Film one seed of a learned swarm without faults and with two robots that deliver nothing."""
+    scenario, load = Scenario(restock=True), policies.load
+    takes = [
+        Take(title, Play(scenario, load("ppo-delivery"), 0, faults))
+        for title, faults in (
+            ("25 robots, no fault", ()),
+            ("two of them deliver nothing (FM4)", ("FM4:2",)),
+        )
+    ]
+    film = Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400)
+    frames = [Image.fromarray(frame) for frame in film.frames()]
+    colours = frames[-1].quantize(48)
+    first, *rest = (one.quantize(palette=colours, dither=Image.Dither.NONE) for one in frames)
+    first.save(MEDIA / name, save_all=True, append_images=rest, duration=80, loop=0, optimize=True)
+
+
 def save(picture: NDArray[np.uint8], name: str) -> None:
     """Write a picture in the colours that films have: a third of the size, and none shifts."""
     colours = film_colours()
@@ -74,4 +93,5 @@ if __name__ == "__main__":
     save(scene(60.0, (Fault("FM1", 2), Fault("FM4", [0, 5]))), "faults.png")
     learned = scene(300.0, scenario=Scenario(restock=True), name="ppo-delivery")
     save(learned, "stock.png")
+    collapse("fm4.gif")
     browser_view("watch.png")

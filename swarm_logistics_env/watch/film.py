@@ -69,7 +69,7 @@ class Film:
         self._period, self._frame_rate = speed / frame_rate, frame_rate
         self._pictures = [Picture(take.play.world.scenario, size) for take in takes]
         self._text_height = max(13, round(size / 26))
-        self._head = 2 * self._text_height
+        self._head = 2 * round(1.5 * self._text_height)
         self._tall = max(picture.height for picture in self._pictures)
         self._width = sum(picture.width for picture in self._pictures)
         self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last
@@ -103,9 +103,13 @@ class Film:
         x = 0
         for take, picture in zip(self._takes, self._pictures, strict=True):
             world = take.play.world
+            room = pygame.Rect(x, 0, picture.width, self._head).inflate(-self._text_height, 0)
+            # Large, so that it can be read where the film is small.
+            count = words(str(world.state.delivered), round(2.4 * self._text_height), INK)
+            canvas.blit(count, count.get_rect(midright=room.midright))
             name = words(take.name, self._text_height + 4, INK)
-            place = name.get_rect(center=(x + picture.width // 2, round(0.6 * self._head)))
-            canvas.blit(name, place.clamp(pygame.Rect(x, 0, picture.width, self._head)))
+            room.width -= count.get_width()
+            canvas.blit(name, name.get_rect(midleft=room.midleft), (0, 0, *room.size))
             canvas.blit(picture.draw(world.state, world.scenario), (x, self._head))
             x += picture.width
         return to_array(canvas)
