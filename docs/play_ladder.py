@@ -112,6 +112,6 @@ def draw_ladder(restocked: StudyResults, path: Path) -> None:
             axes.plot([], [], drawing.MARKERS[shift], color=colour, label=name)
         axes.set_yticks(list(places), restocked.policies)
         axes.set(xlabel="P, items delivered in 500 s where items come back", xlim=(0.0, None))
-        axes.legend(loc="lower right")
+        axes.legend(loc="upper right")
 
     path.write_text(drawing.images(draw, 2.9)[0], encoding="utf-8")
