@@ -149,7 +149,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(
     assert f"For a paper: homing: P at N = 4, no fault: {p:.1f} [" in printed
     assert "P of the shipped policies here: " in printed
     shipped = printed.split("P of the shipped policies here: ")[1].splitlines()[0]
-    assert "homing" not in shipped  # not ranked by itself
+    assert " homing " not in shipped  # not ranked by itself
     others = set(json.loads(RECORDED.read_text())["policies"]) - {"homing"}
     assert shipped.endswith(f"; rank {len(others) + 1} of {len(others) + 1}.")
     assert "from the start: swarm-logistics judge homing --seeds" in printed
