@@ -246,16 +246,13 @@ def _last(results: StudyResults) -> str:
     parts.append("verdicts are Holm-adjusted")
     if any("assumes_normal" in test.flags for test in tests):
         few = "below ten seeds" if results.plan.paired else "unpaired"
-        parts.append(f"provisional ({few} they assume normal differences)")
+        parts.append(f"provisional ({few} they assume normality)")
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared")
     if any(test.saturated for test in tests):
-        parts.append(
-            f"{section.SATURATED} P is capped, as every item was delivered: more seeds tell "
-            "nothing there, but --clearing or --restock does"
-        )
+        parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
-        parts.append("some runs stalled, see the report")
+        parts.append("some runs stalled")
     claims = [said(test.claim_verdict_holm) for test in tests if test.claim]
     if claims:
         where = " in the paper's text" if reference else ""
