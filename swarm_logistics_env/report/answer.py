@@ -271,7 +271,7 @@ def in_a_sentence(results: StudyResults) -> str:
     if known:
         worst = min(known, key=lambda test: test.value or 0.0)
         line = _line([worst], (0,))
-        told += f"; the lowest is {line.question} = {line.value} {line.interval}"
+        told += f"; the lowest is {line.question} = {line.value} {line.interval}".rstrip()
     return f"{', '.join(results.policies)}: {told}."
 
 
