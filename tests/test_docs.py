@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer.main
 
-from swarm_logistics_env.cli import app
+from swarm_logistics_env.cli.app import command_line
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -63,7 +62,7 @@ def test_what_a_page_names_exists(name: str) -> None:
 
 def parse(arguments: list[str]) -> None:
     """Parse a command line down to its last command, without running it."""
-    command: Any = typer.main.get_command(app)
+    command: Any = command_line()
     context = None
     while True:
         context = command.make_context(command.name, list(arguments), parent=context)

@@ -1,343 +1,103 @@
-"""`swarm-logistics run`, `list`, `attack` and `train`; the other commands are added here."""
+"""The application: which commands there are, errors in one sentence, options that they share."""
 
 from __future__ import annotations
 
+import errno
+import json
+import os
 import shlex
+import sys
+import traceback
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 
-from swarm_logistics_env.episode import run_episode
-from swarm_logistics_env.errors import SetupError, TrainingError
-from swarm_logistics_env.policies import called, known_policies, load, read_card
-from swarm_logistics_env.report.section import bracketed
-from swarm_logistics_env.scenario import SOURCES
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.play import engine_named
-from swarm_logistics_env.studies.presets import PRESETS
-from swarm_logistics_env.train.training import preset_names
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.fault_text import text_of
+from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
+from swarm_logistics_env.records import plain, read_table
+from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
+from swarm_logistics_env.warehouse.fault_text import fault_of
+from swarm_logistics_env.warehouse.faults import Fault
 
-from .application import (
-    Application,
-    FaultOption,
-    PresetOption,
-    ScenarioOption,
-    SeedOption,
-    SetOption,
-    TrustPolicyOption,
-    faults_of,
-    scenario_of,
-    show_table,
-)
-from .judging import judge_command
-from .study_commands import ProcessesOption, study
-from .watch import watch_command, write_film_of
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.attack import AttackResult
-
-PolicyArgument = Annotated[
-    str, typer.Argument(metavar="POLICY", help="Name, path of a file, or package.module:Class.")
-]
+# In the order of use, as the help shows them. A module is imported when its command is called.
+COMMANDS = {
+    "watch": ("playing", "watch_command"),
+    "run": ("playing", "run_command"),
+    "train": ("train_command", "train_command"),
+    "judge": ("judging", "judge_command"),
+    "attack": ("judging", "attack_command"),
+    "list": ("playing", "list_command"),
+    "study": ("study_commands", "study"),
+}
+# A disk, a quota or a file that is full; a pipe that nobody reads.
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EPIPE)
 
 
-def attack_command(
-    policy: PolicyArgument,
-    robots: Annotated[int, typer.Option(min=1, help="How many robots fail.")] = 2,
-    modes: Annotated[
-        list[str] | None,
-        typer.Option("--mode", help="Mode to search; may be repeated."),
-    ] = None,
-    budget: Annotated[int, typer.Option(min=10, help="Runs of faults in the search.")] = 200,
-    fresh: Annotated[int, typer.Option(min=3, help="Other seeds, for the estimates.")] = 30,
-    seed: Annotated[int, typer.Option(help="Of the search's own choices.")] = 0,
-    preset: PresetOption = "paper",
-    file: ScenarioOption = None,
-    changes: SetOption = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Directory; results/attack-POLICY if not given.")
-    ] = None,
-    processes: ProcessesOption = None,
-) -> None:
-    """Search for the fault that costs most: mode, role at the onset, time and duration.
+class Application:
+    """The command line. A call ends the process with 0 (done), 2 (bad input) or 130 (Ctrl-C).
 
-    What it finds bounds the worst fault from one side: there may be worse ones.
+    A command ends otherwise by raising `typer.Exit(code)`.
     """
-    from swarm_logistics_env.attack import MODES, Attack, attack
 
-    asked = Attack(
-        policy=policy,
-        scenario=scenario_of(preset, file, changes),
-        robots=robots,
-        modes=tuple(modes) if modes else MODES,
-        budget=budget,
-        fresh=fresh,
-        seed=seed,
+    def __call__(self) -> None:
+        """Run the command line in `sys.argv`."""
+        code = self.run()
+        try:
+            sys.stdout.flush()
+        except OSError:  # what is left in the buffer would be tried again
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(code)
+
+    def run(self, arguments: list[str] | None = None) -> int:
+        """Run a command line and return the exit code."""
+        # A user's own policy lies in the folder in which the command is run. The folder comes last,
+        # so that its modules hide no installed ones.
+        if "" not in sys.path:
+            sys.path.append("")
+        typed = sys.argv[1:] if arguments is None else arguments
+        try:
+            command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)
+            _show_help_well(command)
+            # What made a file is recorded in it: the command line is the context's object.
+            words = shlex.join(["swarm-logistics", *typed])
+            code = command(arguments, standalone_mode=False, obj=words)
+            sys.stdout.flush()
+        except (KeyboardInterrupt, typer.Abort):
+            return _complain("stopped", 130)
+        except Exception as error:
+            sentence = _sentence(error)
+            if sentence is None:
+                raise
+            if not sentence:  # no command was named: the help has been printed
+                return 2
+            return _complain(sentence, 2)
+        return code if isinstance(code, int) else 0
+
+
+app = Application()
+
+
+def command_line(names: Iterable[str] = COMMANDS) -> Any:
+    """Return the command line with these commands: click's object, which parses it."""
+    found = typer.Typer(
+        name="swarm-logistics",
+        help="A warehouse for robot swarms, and the measure of how they cope.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
     )
-    engine = engine_named("local" if processes == 1 else "process", processes)
-    place = out or Path("results") / f"attack-{Path(policy).stem}"
-    try:
-        found = attack(asked, engine, place)
-    except KeyboardInterrupt:
-        typer.echo(
-            f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
-        )
-        raise typer.Exit(130) from None
-    _show_attack(found, policy, robots, fresh)
-
-
-def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
-    rows = [
-        (
-            found.by,
-            _in_words(found.fault),
-            bracketed(found.robustness, 3),
-            str(found.runs),
-        )
-        for found in result.found
-    ]
-    worst = min(result.found, key=lambda found: found.robustness.value)
-    text = text_of(worst.fault)
-    played = f" `run` and `watch` play it with --fault {shlex.quote(text)}." if text else ""
-    capped = (
-        "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
-        "shown. --set restock=true has no cap."
-    )
-    show_table(
-        f"{policy}: worst faults found",
-        ("found by", "fault", "R [95 %]", "runs"),
-        rows,
-        f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
-        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.{played}",
-        f"{result.tried} of {result.searched} faults were tried. What is found bounds "
-        "the worst from one side: it proves no other fault harmless.",
-        *([capped] if result.is_capped else ()),
-    )
-
-
-def _in_words(fault: Fault) -> str:
-    who = "by the seed" if fault.role is None else fault.role.replace("_", " ")
-    until = "" if fault.duration is None else f" for {fault.duration:g} s"
-    return f"{fault.mode} of {fault.robots} ({who}) from {fault.onset:g} s{until}"
-
-
-def train_command(
-    context: typer.Context,
-    preset: Annotated[
-        str,
-        typer.Argument(
-            metavar="PRESET|FILE",
-            help=f"Training preset ({', '.join(preset_names())}), or TOML file of one.",
-        ),
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Directory; results/train/NAME if not given.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of everything random.")] = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="Agent-steps to learn from.")] = None,
-    device: Annotated[
-        str | None, typer.Option(help="cpu or cuda; the GPU where there is one if not given.")
-    ] = None,
-) -> None:
-    """Train a policy; the same command goes on where it was stopped."""
-    changed = {"seed": seed, "agent_steps": steps}
-    fields = {name: value for name, value in changed.items() if value is not None}
-    try:
-        path = _train(preset, out, str(context.obj), device, fields)
-    except KeyboardInterrupt:
-        typer.echo("\nStopped. The same command goes on.", err=True)
-        raise typer.Exit(130) from None
-    typer.echo(f"Written: {path}")
-    typer.echo(f"Watch it: swarm-logistics watch --policy {shlex.quote(str(path))}")
-    typer.echo(f"Judge it: swarm-logistics judge {shlex.quote(str(path))}")
-
-
-def _train(
-    asked: str, out: Path | None, command: str, device: str | None, fields: dict[str, Any]
-) -> Path:
-    """Train a preset, or what a TOML file describes, and show it; return the policy file's path."""
-    from swarm_logistics_env.train.training import load_training
-
-    training = load_training(asked, **fields)
-    try:
-        import_module("tensorboard")  # missed before anything is written
-        from swarm_logistics_env.train.trainer import train
-    except ModuleNotFoundError as error:
-        raise TrainingError(
-            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
-        ) from error
-    out = out or Path("results/train", training.name)
-    log = shlex.quote(str(out / "tensorboard"))
-    typer.echo(f"To follow it: tensorboard --logdir {log}")
-    path = train(training, out, command=command, device=device)
-    _show_training(path)
-    return path
-
-
-def _show_training(path: Path) -> None:
-    from swarm_logistics_env.train.curve import BEST, PICTURE
-
-    card = read_card(path)
-    rows = tuple(
-        (
-            score.measure,
-            score.condition,
-            f"{score.value:.3g}",
-            *("-" if limit is None else f"{limit:.3g}" for limit in (score.low, score.high)),
-            str(score.seeds),
-        )
-        for score in card.scores
-    )
-    if rows:
-        show_table(
-            f"{card.name}: scores on seeds it was not trained on",
-            ("measure", "condition", "value", "low", "high", "seeds"),
-            rows,
-            "low, high: limits of the 95 % interval",
-        )
-    typer.echo(f"Curve: {path.parent / PICTURE}")
-    typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
-
-
-def run_command(
-    policies: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--policy",
-            help="Name (`list policies`), path of a policy file, or package.module:Class; swarm-dt "
-            "if not given. With --film it may be repeated.",
-        ),
-    ] = None,
-    seed: SeedOption = 0,
-    preset: PresetOption = "paper",
-    scenario_file: ScenarioOption = None,
-    changes: SetOption = None,
-    faults: FaultOption = None,
-    film: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.mp4|FILE.gif",
-            help="Write the episode as a film; several policies stand side by side.",
-        ),
-    ] = None,
-    twin: Annotated[
-        bool,
-        typer.Option("--twin", help="In the film beside the same seed without its faults."),
-    ] = False,
-    until: Annotated[
-        float | None, typer.Option(help="Where the film ends [s]; with the episode if not given.")
-    ] = None,
-    speed: Annotated[float, typer.Option(help="How many times real time the film plays.")] = 4.0,
-    trust_code: TrustPolicyOption = False,
-) -> None:
-    """Play one episode and print what it delivered, or write it as a film."""
-    import time
-
-    scenario = scenario_of(preset, scenario_file, changes)
-    scheduled = faults_of(faults, scenario)
-    names = policies or ["swarm-dt"]
-    if film is not None:
-        write_film_of(
-            film, scenario, names, seed, scheduled, until, speed,
-            twin=twin, load=lambda name: load(name, trust_code=trust_code),
-        )  # fmt: skip
-        return
-    if twin or until is not None or len(names) > 1:
-        raise SetupError("--twin, --until, several --policy: are for a film, with --film FILE.mp4")
-    player = load(names[0], trust_code=trust_code)
-    # This compiles the kernels, so that the time below is that of the episode alone.
-    run_episode(scenario.replace(duration=scenario.control_period), player, seed)
-    start = time.perf_counter()
-    episode = run_episode(scenario, player, seed, scheduled)
-    wall = time.perf_counter() - start
-    times = episode.delivery_times
-    of = "" if scenario.restock else f" of {scenario.n_items}"
-    typer.echo(
-        f"P = {episode.delivered} items delivered{of} in {episode.ended_at:g} s "
-        f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
-    )
-    if len(times):
-        gaps = [after - before for before, after in zip([0.0, *times], times)]
-        typer.echo(
-            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, "
-            f"{sum(gaps) / len(gaps):.1f} s apart on average, at most {max(gaps):.1f} s"
-        )
-    if episode.failed_robots:
-        typer.echo(
-            f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
-            f"them for {episode.anchoring_seconds:.1f} robot-seconds"
-        )
-    typer.echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")
-
-
-LISTED = ("policies", "faults", "studies", "scenario")
-
-
-def list_command(
-    what: Annotated[str, typer.Argument(metavar="|".join(LISTED), help="What to list.")],
-    preset: PresetOption = "paper",
-    scenario_file: ScenarioOption = None,
-    changes: SetOption = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Of a scenario: JSON, which --scenario reads.")
-    ] = False,
-) -> None:
-    """List policies, faults (failure modes), studies, or every condition of a scenario."""
-    if what not in LISTED:
-        raise SetupError(f"list {what}: should be {', '.join(LISTED[:-1])} or {LISTED[-1]}")
-    if what == "scenario":
-        chosen = scenario_of(preset, scenario_file, changes)
-        if as_json:
-            typer.echo(chosen.to_json())
-            return
-        marks = (
-            "fitted: chosen to bring the paper's tables closest. chosen: without a source. "
-            "off: added here, left out."
-        )
-        sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
-        columns = ("condition", "value", "unit, meaning; source")
-        show_table(f"Preset {preset}", columns, chosen.conditions(), marks, sources)
-    elif what == "policies":
-        line = "Your own is package.module:Class, or the path of a file that `train` wrote."
-        show_table("Policies", ("name", "kind", "about"), known_policies(), line)
-    elif what == "faults":
-        rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
-        line = "As --fault takes one: MODE:ROBOTS@ONSET, e.g. FM4:2@200"
-        show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
-    else:
-        plans = [(name, Study.preset(name).plan()) for name in PRESETS]
-        found = [
-            (
-                name,
-                str(len(plan.seeds)),
-                str(len(plan.runs)),
-                "; ".join(dict.fromkeys(table for _, table, _ in plan.cells)),
-            )
-            for name, plan in plans
-        ]
-        line = "swarm-logistics study plan NAME prints its conditions; study run NAME plays it."
-        show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)
-
-
-app = Application(
-    name="swarm-logistics",
-    help="A warehouse for robot swarms, and the measure of how they cope.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-# In the order of use, as the help shows them.
-app.command("watch")(watch_command)
-app.command("run")(run_command)
-app.command("train")(train_command)
-app.command("judge")(judge_command)
-app.command("attack")(attack_command)
-app.command("list")(list_command)
-app.add_typer(study)
+    found.callback()(_options)
+    for name in names:
+        module, attribute = COMMANDS[name]
+        command = getattr(import_module(f"{__package__}.{module}"), attribute)
+        if isinstance(command, typer.Typer):
+            found.add_typer(command)
+        else:
+            found.command(name)(command)
+    return typer.main.get_command(found)
 
 
 def _print_version(wanted: bool) -> None:
@@ -348,8 +108,7 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
-def options(
+def _options(
     version: Annotated[
         bool,
         typer.Option(
@@ -358,3 +117,125 @@ def options(
     ] = False,
 ) -> None:
     """Take the options that stand before a command."""
+
+
+def _show_help_well(command: Any) -> None:
+    """Escape the help of a command and of those below it: Rich reads `[px]` as a style."""
+    command.help = escape(command.help or "")
+    for parameter in command.get_params(typer.Context(command)):
+        parameter.help = escape(getattr(parameter, "help", None) or "")
+        if getattr(parameter, "is_flag", False):
+            parameter.metavar = " "  # a flag takes no value, though Typer shows its type
+    for below in getattr(command, "commands", {}).values():
+        _show_help_well(below)
+
+
+def _sentence(error: Exception) -> str | None:
+    """Return what to tell the user, or None for a bug of ours, whose traceback should be seen."""
+    from swarm_logistics_env.spi import IndicatorError
+
+    # These are Typer's own errors of usage, whichever click they come from.
+    format_message = getattr(error, "format_message", None)
+    if format_message is not None:
+        return str(format_message())
+    if isinstance(error, SwarmLogisticsError | IndicatorError):
+        return str(error)
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        return f"cannot write {error.filename or 'the output'}: {error.strerror}"
+    return _of_a_policy(error)
+
+
+def _of_a_policy(error: Exception) -> str | None:
+    """Return what a user's own policy raised, and where; None if the error came from elsewhere."""
+    from swarm_logistics_env.policies import policy
+
+    frames = traceback.extract_tb(error.__traceback__)
+    calls = [number for number, frame in enumerate(frames) if frame.filename == policy.__file__]
+    if not calls:
+        return None
+    beyond = frames[calls[-1] + 1 :]
+    where = ""
+    if beyond:
+        its_file = beyond[0].filename
+        if Path(its_file).is_relative_to(Path(policy.__file__).parents[1]):
+            return None
+        line = [frame.lineno for frame in beyond if frame.filename == its_file][-1]
+        where = f" ({its_file}, line {line})"
+    said = " ".join(str(error).split())
+    return f"the policy raised {type(error).__name__}: {said}{where}"
+
+
+def _complain(sentence: str, code: int) -> int:
+    sys.stderr.write(f"swarm-logistics: {plain(sentence)}\n")  # it may repeat what was typed
+    return code
+
+
+PresetOption = Annotated[
+    str, typer.Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
+]
+ScenarioOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--scenario",
+        metavar="FILE",
+        help="TOML or JSON file of fields to change, as `list scenario --json` writes it.",
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
+]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        metavar="FAULT",
+        help="MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200; may be repeated.",
+    ),
+]
+PolicyOption = Annotated[
+    str,
+    typer.Option(help="Name (`list policies`), path of a policy file, or package.module:Class."),
+]
+SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
+TrustPolicyOption = Annotated[
+    bool, typer.Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
+]
+
+
+def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
+    """Return the scenario that `--preset`, `--scenario` and `--set` describe.
+
+    A file changes fields of the preset, and `--set` those of both.
+
+    Raises:
+        ScenarioError: no such preset, file or field, or a value that cannot be.
+    """
+    fields = {} if file is None else read_table(file, "file of --scenario", ScenarioError)
+    preset = str(fields.pop("preset", preset))
+    for change in changes or []:
+        name, equals, value = change.partition("=")
+        if not equals:
+            raise ScenarioError(f"--set {change}: should be FIELD=VALUE")
+        try:
+            fields[name] = json.loads(value)
+        except (json.JSONDecodeError, RecursionError):
+            fields[name] = value
+    return Scenario.preset(preset).replace(**fields)
+
+
+def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
+    """Return the faults that `--fault` describes, see `fault_text`.
+
+    Raises:
+        FaultError: a text does not read so, there is no such fault, or the episode ends before.
+    """
+    faults = [fault_of(text) for text in texts or []]
+    for fault, text in zip(faults, texts or []):
+        if fault.onset >= scenario.duration:
+            raise FaultError(
+                f"--fault {text}: should begin before the episode ends at {scenario.duration:g} s"
+            )
+    return faults

@@ -1,4 +1,4 @@
-"""`swarm-logistics judge`: trials of real robots, or a policy."""
+"""`swarm-logistics judge`: trials of real robots, or a policy; `attack`, its worst fault."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import json
 import os
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, called, load
 from swarm_logistics_env.records import read_table
-from swarm_logistics_env.report.section import slug
+from swarm_logistics_env.report.section import bracketed, slug
 from swarm_logistics_env.spi import mean_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
@@ -22,8 +22,10 @@ from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
+from swarm_logistics_env.warehouse.fault_text import text_of
+from swarm_logistics_env.warehouse.faults import Fault
 
-from .application import TrustPolicyOption, in_one_line, show_report
+from .app import PresetOption, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
 from .study_commands import (
     ClearingOption,
     FullOption,
@@ -32,6 +34,10 @@ from .study_commands import (
     study_of,
     until_cleared,
 )
+from .terminal import in_one_line, show_report, show_table
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.attack import AttackResult
 
 STUDY = "scorecard"
 JUDGE_SEEDS = 60  # of a policy that is judged
@@ -240,3 +246,88 @@ def _rank(results: StudyResults) -> str | None:
     others = ", ".join(f"{name} {p.value:.0f}" for name, p in ordered)
     rank = f"; rank {above + 1} of {len(beside) + 1}" if above + below == len(beside) else ""
     return f"P of the shipped policies here: {others}{rank}."
+
+
+PolicyArgument = Annotated[
+    str, typer.Argument(metavar="POLICY", help="Name, path of a file, or package.module:Class.")
+]
+
+
+def attack_command(
+    policy: PolicyArgument,
+    robots: Annotated[int, typer.Option(min=1, help="How many robots fail.")] = 2,
+    modes: Annotated[
+        list[str] | None,
+        typer.Option("--mode", help="Mode to search; may be repeated."),
+    ] = None,
+    budget: Annotated[int, typer.Option(min=10, help="Runs of faults in the search.")] = 200,
+    fresh: Annotated[int, typer.Option(min=3, help="Other seeds, for the estimates.")] = 30,
+    seed: Annotated[int, typer.Option(help="Of the search's own choices.")] = 0,
+    preset: PresetOption = "paper",
+    file: ScenarioOption = None,
+    changes: SetOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; results/attack-POLICY if not given.")
+    ] = None,
+    processes: ProcessesOption = None,
+) -> None:
+    """Search for the fault that costs most: mode, role at the onset, time and duration.
+
+    What it finds bounds the worst fault from one side: there may be worse ones.
+    """
+    from swarm_logistics_env.attack import MODES, Attack, attack
+
+    asked = Attack(
+        policy=policy,
+        scenario=scenario_of(preset, file, changes),
+        robots=robots,
+        modes=tuple(modes) if modes else MODES,
+        budget=budget,
+        fresh=fresh,
+        seed=seed,
+    )
+    engine = engine_named("local" if processes == 1 else "process", processes)
+    place = out or Path("results") / f"attack-{Path(policy).stem}"
+    try:
+        found = attack(asked, engine, place)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
+        )
+        raise typer.Exit(130) from None
+    _show_attack(found, policy, robots, fresh)
+
+
+def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
+    rows = [
+        (
+            found.by,
+            _in_words(found.fault),
+            bracketed(found.robustness, 3),
+            str(found.runs),
+        )
+        for found in result.found
+    ]
+    worst = min(result.found, key=lambda found: found.robustness.value)
+    text = text_of(worst.fault)
+    played = f" `run` and `watch` play it with --fault {shlex.quote(text)}." if text else ""
+    capped = (
+        "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
+        "shown. --set restock=true has no cap."
+    )
+    show_table(
+        f"{policy}: worst faults found",
+        ("found by", "fault", "R [95 %]", "runs"),
+        rows,
+        f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
+        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.{played}",
+        f"{result.tried} of {result.searched} faults were tried. What is found bounds "
+        "the worst from one side: it proves no other fault harmless.",
+        *([capped] if result.is_capped else ()),
+    )
+
+
+def _in_words(fault: Fault) -> str:
+    who = "by the seed" if fault.role is None else fault.role.replace("_", " ")
+    until = "" if fault.duration is None else f" for {fault.duration:g} s"
+    return f"{fault.mode} of {fault.robots} ({who}) from {fault.onset:g} s{until}"

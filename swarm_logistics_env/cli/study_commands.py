@@ -22,7 +22,7 @@ from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
-from .application import in_one_line, show_power, show_report, show_table
+from .terminal import in_one_line, show_power, show_report, show_table
 
 StudyArgument = Annotated[
     str,

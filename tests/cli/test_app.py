@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
 import swarm_logistics_env
 from swarm_logistics_env import SCENARIO_PRESETS, Scenario, policies
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.cli.application import show
+from swarm_logistics_env.cli.app import command_line
+from swarm_logistics_env.cli.terminal import show
 from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.train import preset_names
@@ -95,7 +95,7 @@ def command_lines(command: Any, *names: str) -> Iterator[tuple[list[str], Any]]:
         yield from command_lines(below, *names, name)
 
 
-@pytest.mark.parametrize(("arguments", "command"), list(command_lines(typer.main.get_command(app))))
+@pytest.mark.parametrize(("arguments", "command"), list(command_lines(command_line())))
 def test_a_help_page_shows_each_help_text_in_full(
     arguments: list[str],
     command: Any,
@@ -180,7 +180,7 @@ def test_a_scenario_is_read_from_a_file_wherever_fields_are_set(
         Path("bad.toml").write_text(text)
         assert app.run(["run", "--scenario", "bad.toml"]) == 2
         assert words in capsys.readouterr().err
-    commands: Any = typer.main.get_command(app)
+    commands: Any = command_line()
     for name, command in commands.commands.items():
         options = {option for parameter in command.params for option in parameter.opts}
         assert ("--scenario" in options) == ("--set" in options), name

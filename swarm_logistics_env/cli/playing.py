@@ -1,0 +1,285 @@
+"""`swarm-logistics run`, `watch` and `list`; films."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_logistics_env.episode import Play, run_episode
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.policies import Policy, called, known_policies, load
+from swarm_logistics_env.records import becoming
+from swarm_logistics_env.scenario import SOURCES, Scenario
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+
+from .app import (
+    FaultOption,
+    PolicyOption,
+    PresetOption,
+    ScenarioOption,
+    SeedOption,
+    SetOption,
+    TrustPolicyOption,
+    faults_of,
+    scenario_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+
+FRAME_RATE = 25.0  # frames a second
+FILM_SIZE = 480  # longer side of each warehouse [px]
+
+
+def run_command(
+    policies: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--policy",
+            help="Name (`list policies`), path of a policy file, or package.module:Class; swarm-dt "
+            "if not given. With --film it may be repeated.",
+        ),
+    ] = None,
+    seed: SeedOption = 0,
+    preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
+    changes: SetOption = None,
+    faults: FaultOption = None,
+    film: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mp4|FILE.gif",
+            help="Write the episode as a film; several policies stand side by side.",
+        ),
+    ] = None,
+    twin: Annotated[
+        bool,
+        typer.Option("--twin", help="In the film beside the same seed without its faults."),
+    ] = False,
+    until: Annotated[
+        float | None, typer.Option(help="Where the film ends [s]; with the episode if not given.")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="How many times real time the film plays.")] = 4.0,
+    trust_code: TrustPolicyOption = False,
+) -> None:
+    """Play one episode and print what it delivered, or write it as a film."""
+    scenario = scenario_of(preset, scenario_file, changes)
+    scheduled = faults_of(faults, scenario)
+    names = policies or ["swarm-dt"]
+    if film is not None:
+        write_film_of(
+            film, scenario, names, seed, scheduled, until, speed,
+            twin=twin, load=lambda name: load(name, trust_code=trust_code),
+        )  # fmt: skip
+        return
+    if twin or until is not None or len(names) > 1:
+        raise SetupError("--twin, --until, several --policy: are for a film, with --film FILE.mp4")
+    player = load(names[0], trust_code=trust_code)
+    # This compiles the kernels, so that the time below is that of the episode alone.
+    run_episode(scenario.replace(duration=scenario.control_period), player, seed)
+    start = time.perf_counter()
+    episode = run_episode(scenario, player, seed, scheduled)
+    wall = time.perf_counter() - start
+    times = episode.delivery_times
+    of = "" if scenario.restock else f" of {scenario.n_items}"
+    typer.echo(
+        f"P = {episode.delivered} items delivered{of} in {episode.ended_at:g} s "
+        f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
+    )
+    if len(times):
+        gaps = [after - before for before, after in zip([0.0, *times], times)]
+        typer.echo(
+            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, "
+            f"{sum(gaps) / len(gaps):.1f} s apart on average, at most {max(gaps):.1f} s"
+        )
+    if episode.failed_robots:
+        typer.echo(
+            f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
+            f"them for {episode.anchoring_seconds:.1f} robot-seconds"
+        )
+    typer.echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")
+
+
+def watch_command(
+    policy: PolicyOption = "ppo-delivery",
+    against: Annotated[
+        str | None,
+        typer.Option(help="Policy of the run beside it; left out: the same without faults."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
+    preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
+    changes: SetOption = None,
+    faults: FaultOption = None,
+    speed: Annotated[float, typer.Option(help="How many times real time it plays.")] = 8.0,
+    port: Annotated[
+        int,
+        typer.Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free."),
+    ] = 8765,
+    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
+    no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser.")] = False,
+    save: Annotated[
+        Path | None,
+        typer.Option(help="Play to the end and write a page that replays it; serve nothing."),
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option(help="With --save: time at which the replay ends [s].")
+    ] = None,
+    trust_code: TrustPolicyOption = False,
+) -> None:
+    """Watch two runs side by side in the browser; inspect, break and repair robots."""
+    import webbrowser
+
+    from swarm_logistics_env.watch import Session
+    from swarm_logistics_env.watch.messages import recorded_page
+    from swarm_logistics_env.watch.server import is_loopback, serve
+
+    if until is not None and (save is None or not until > 0.0):
+        raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
+    if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
+        raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
+    scenario = scenario_of(preset, scenario_file, changes)
+    given = {called(name): name for name in filter(None, (policy, against))}
+    session = Session(
+        scenario,
+        called(policy),
+        None if against is None else called(against),
+        seed,
+        faults_of(faults, scenario),
+        speed,
+        lambda name: load(given.get(name, name), trust_code=trust_code),
+    )
+    if save is None:
+        if not is_loopback(host):
+            told = "whoever learns the address can watch and steer; nothing is encrypted"
+            typer.echo(f"Warning: --host {host}: {told}.", err=True)
+        shows = not no_open and sys.stdout.isatty() and _has_screen()
+        serve(session, port, typer.echo, host, webbrowser.open if shows else None)
+        return
+    page = recorded_page(session, session.scenario.duration if until is None else until)
+    with becoming(save, SetupError) as part:
+        part.write_text(page, encoding="utf-8")
+    typer.echo(f"{save}: {session.run.world.state.time:g} s, {len(page) / 1e6:.2f} MB")
+
+
+def _has_screen() -> bool:
+    """Return whether a browser has a window to open; one in text would take the terminal."""
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    return sys.platform in ("darwin", "win32") or any(map(os.environ.get, names))
+
+
+def write_film_of(
+    out: Path,
+    scenario: Scenario,
+    policies: Sequence[str],
+    seed: int,
+    faults: Sequence[Fault],
+    until: float | None,
+    speed: float,
+    *,
+    twin: bool,
+    load: Callable[[str], Policy],
+) -> None:
+    """Write episodes as a film, one policy, or with and without faults, beside the other.
+
+    Raises:
+        SetupError: the file's name or the extra for films does not do, or there is no fault.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from swarm_logistics_env.rendering.renderer import check_film, load_pygame, write_film
+
+    if twin and not faults:
+        raise SetupError("--twin: shows the run without its faults, so --fault should be given")
+    check_film(out)
+    load_pygame()
+    from swarm_logistics_env.watch.film import Film, Take
+
+    takes = []
+    for name in policies:
+        for these in ((), faults) if twin else (faults,):
+            title = _title(name, these) if faults else _short(name)
+            takes.append(Take(title, Play(scenario, load(name), seed, these)))
+    end = scenario.duration if until is None else until
+    film = Film(takes, end, speed, FRAME_RATE, FILM_SIZE)
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        frames = progress.track(film.frames(), total=film.n_frames, description=out.name)
+        count = write_film(out, frames, FRAME_RATE)
+    size = out.stat().st_size / 1e6
+    typer.echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
+
+
+def _short(policy: str) -> str:
+    policy = called(policy)
+    # A long path of a user's own policy is cut at its beginning.
+    return policy if len(policy) <= 24 else f"…{policy[-23:]}"
+
+
+def _title(policy: str, faults: Sequence[Fault]) -> str:
+    counts = [
+        f"{fault.mode} × {fault.robots if isinstance(fault.robots, int) else len(fault.robots)}"
+        for fault in faults
+    ]
+    return f"{_short(policy)}, {', '.join(counts) or 'no fault'}"
+
+
+LISTED = ("policies", "faults", "studies", "scenario")
+
+
+def list_command(
+    what: Annotated[str, typer.Argument(metavar="|".join(LISTED), help="What to list.")],
+    preset: PresetOption = "paper",
+    scenario_file: ScenarioOption = None,
+    changes: SetOption = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Of a scenario: JSON, which --scenario reads.")
+    ] = False,
+) -> None:
+    """List policies, faults (failure modes), studies, or every condition of a scenario."""
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.presets import PRESETS
+
+    from .terminal import show_table
+
+    if what not in LISTED:
+        raise SetupError(f"list {what}: should be {', '.join(LISTED[:-1])} or {LISTED[-1]}")
+    if what == "scenario":
+        chosen = scenario_of(preset, scenario_file, changes)
+        if as_json:
+            typer.echo(chosen.to_json())
+            return
+        marks = (
+            "fitted: chosen to bring the paper's tables closest. chosen: without a source. "
+            "off: added here, left out."
+        )
+        sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
+        columns = ("condition", "value", "unit, meaning; source")
+        show_table(f"Preset {preset}", columns, chosen.conditions(), marks, sources)
+    elif what == "policies":
+        line = "Your own is package.module:Class, or the path of a file that `train` wrote."
+        show_table("Policies", ("name", "kind", "about"), known_policies(), line)
+    elif what == "faults":
+        rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
+        line = "As --fault takes one: MODE:ROBOTS@ONSET, e.g. FM4:2@200"
+        show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
+    else:
+        plans = [(name, Study.preset(name).plan()) for name in PRESETS]
+        found = [
+            (
+                name,
+                str(len(plan.seeds)),
+                str(len(plan.runs)),
+                "; ".join(dict.fromkeys(table for _, table, _ in plan.cells)),
+            )
+            for name, plan in plans
+        ]
+        line = "swarm-logistics study plan NAME prints its conditions; study run NAME plays it."
+        show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)

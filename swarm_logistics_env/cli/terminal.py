@@ -1,0 +1,139 @@
+"""Sections, tables and answers at a terminal, and Markdown elsewhere."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.records import plain
+from swarm_logistics_env.report.answer import MOST_LINES, Answer, answer, digest, in_a_sentence
+from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.section import NOTHING, WORDS, Section, number
+from swarm_logistics_env.report.write import (
+    how_to_get_figures,
+    missing_packages,
+    section_markdown,
+    write_report,
+)
+from swarm_logistics_env.spi.estimate import SIGNS
+from swarm_logistics_env.studies.play import Tally
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import POWER, Verdict
+
+_PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
+_COLOURS = {word: SIGNS[verdict].colour for verdict, word in WORDS.items()}
+_VERDICTS = re.compile(rf"(?<=  )({'|'.join(_COLOURS)})\b")
+
+
+def show(section: Section) -> None:
+    """Print one section."""
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        # No wrapping: whatever reads this knows no terminal width.
+        console.out(section_markdown(section), highlight=False)
+        return
+    console.rule(escape(plain(section.title)), align="left")
+    if section.columns:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for column in section.columns:
+            # Folded where a terminal is narrow: a number that is cut is another number.
+            table.add_column(escape(plain(column)), overflow="fold")
+        for row in section.rows:
+            table.add_row(*(escape(plain(value)) for value in row))
+        console.print(table)
+    for line in section.lines:
+        console.print(escape(plain(line)))
+    console.print()
+
+
+def show_table(
+    title: str, columns: Sequence[str], rows: Iterable[tuple[str, ...]], *lines: str
+) -> None:
+    """Print a table, and lines of text below it."""
+    show(Section(title, tuple(columns), tuple(rows), lines))
+
+
+def show_answer(found: Answer, *, whole: bool = False) -> None:
+    """Print the answer of a study on one screen, or with every line of it."""
+    console = Console(highlight=False)
+    width = console.width if console.is_terminal else _PLAIN_WIDTH
+    lines = digest(found, width, None if whole else MOST_LINES).split("\n")
+    shown = Text("\n".join(map(plain, lines)))
+    for word in _VERDICTS.finditer(shown.plain):
+        shown.stylize(_COLOURS[word[1]], *word.span())
+    console.print(shown, soft_wrap=True)
+
+
+def show_report(results: StudyResults, out: Path | None, *, full: bool = False) -> None:
+    """Print the answer of a study and a sentence for a paper, and write its report into `out`.
+
+    Args:
+        full: print every table, and a line a question.
+    """
+    whole = document(results)
+    for section in whole.summary if full else ():
+        show(section)
+    # Printed first: what was found is told even where no file can be written.
+    show_answer(answer(results, most=None) if full else whole.answer, whole=full)
+    if out:
+        typer.echo(f"Report: {write_report(results, out, whole)[0]}")
+        if missing := missing_packages():
+            typer.echo(how_to_get_figures(missing))
+        else:
+            typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
+        if not full and any(len(line.tests) > 1 for line in whole.answer.lines):
+            again = f"swarm-logistics study report {shlex.quote(str(out))} --full"
+            typer.echo(f"Each question on a line of its own: {again}")
+    typer.echo(f"For a paper: {plain(in_a_sentence(results))}")
+
+
+def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
+    """Print the seeds that each comparison of a study needs for an effect, given or published."""
+    n_seeds, margin = len(results.plan.seeds), results.plan.specification.margin
+    columns = (
+        "policy", "verdict on", "assumed effect", f"seeds for {POWER:.0%} power",
+        f"distance that {n_seeds} seeds find", f"seeds for equivalent at {margin:.0%}",
+    )  # fmt: skip
+    hint = f"For another effect: swarm-logistics study plan {shlex.quote(asked)} --effect 0.2"
+    rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
+    show_table(f"Seeds needed, from {n_seeds} seeds", columns, rows, hint)
+
+
+def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
+    # Only the spread is taken from the runs, never the effect that they happened to show.
+    compared, estimate, same = test.compared, test.estimate, test.equivalence
+    seeds = test.problem or "no effect is named"
+    if estimate is not None and effect is not None:
+        seeds = spi.no_plan_because(estimate, effect) or str(
+            spi.seeds_for_power(estimate, effect, POWER)
+        )
+    return (
+        compared.policy,
+        f"{compared.indicator} > {compared.threshold:.3g}, {compared.label}",
+        number(effect),
+        seeds,
+        number(test.detectable),
+        NOTHING if same is None else number(spi.seeds_for_equivalence(same, POWER), 0),
+    )
+
+
+def in_one_line(tally: Tally, players: str, out: Path) -> str:
+    """Return how many runs `players` have played, in which time; they are kept in `out`."""
+    rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
+    error = plain(tally.error or "")
+    place, to = shlex.quote(str(out)), shlex.quote(str(out / "runs.csv"))
+    export = f"swarm-logistics study export {place} --to {to}"
+    why = f", the first with {error}. Each traceback: {export}" if error else ""
+    return (
+        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
+        f"were kept from before; {tally.failed} failed{why}"
+    )

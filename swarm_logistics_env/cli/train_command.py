@@ -1,0 +1,92 @@
+"""`swarm-logistics train`."""
+
+from __future__ import annotations
+
+import shlex
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.policies import read_card
+from swarm_logistics_env.train.training import load_training, preset_names
+
+from .terminal import show_table
+
+
+def train_command(
+    context: typer.Context,
+    preset: Annotated[
+        str,
+        typer.Argument(
+            metavar="PRESET|FILE",
+            help=f"Training preset ({', '.join(preset_names())}), or TOML file of one.",
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Directory; results/train/NAME if not given.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of everything random.")] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Agent-steps to learn from.")] = None,
+    device: Annotated[
+        str | None, typer.Option(help="cpu or cuda; the GPU where there is one if not given.")
+    ] = None,
+) -> None:
+    """Train a policy; the same command goes on where it was stopped."""
+    changed = {"seed": seed, "agent_steps": steps}
+    fields = {name: value for name, value in changed.items() if value is not None}
+    try:
+        path = _train(preset, out, str(context.obj), device, fields)
+    except KeyboardInterrupt:
+        typer.echo("\nStopped. The same command goes on.", err=True)
+        raise typer.Exit(130) from None
+    typer.echo(f"Written: {path}")
+    typer.echo(f"Watch it: swarm-logistics watch --policy {shlex.quote(str(path))}")
+    typer.echo(f"Judge it: swarm-logistics judge {shlex.quote(str(path))}")
+
+
+def _train(
+    asked: str, out: Path | None, command: str, device: str | None, fields: dict[str, Any]
+) -> Path:
+    """Train a preset, or what a TOML file describes, and show it; return the policy file's path."""
+    training = load_training(asked, **fields)
+    try:
+        import_module("tensorboard")  # missed before anything is written
+        from swarm_logistics_env.train.trainer import train
+    except ModuleNotFoundError as error:
+        raise TrainingError(
+            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
+        ) from error
+    out = out or Path("results/train", training.name)
+    log = shlex.quote(str(out / "tensorboard"))
+    typer.echo(f"To follow it: tensorboard --logdir {log}")
+    path = train(training, out, command=command, device=device)
+    _show_training(path)
+    return path
+
+
+def _show_training(path: Path) -> None:
+    from swarm_logistics_env.train.curve import BEST, PICTURE
+
+    card = read_card(path)
+    rows = tuple(
+        (
+            score.measure,
+            score.condition,
+            f"{score.value:.3g}",
+            *("-" if limit is None else f"{limit:.3g}" for limit in (score.low, score.high)),
+            str(score.seeds),
+        )
+        for score in card.scores
+    )
+    if rows:
+        show_table(
+            f"{card.name}: scores on seeds it was not trained on",
+            ("measure", "condition", "value", "low", "high", "seeds"),
+            rows,
+            "low, high: limits of the 95 % interval",
+        )
+    typer.echo(f"Curve: {path.parent / PICTURE}")
+    typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
