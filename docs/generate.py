@@ -1,18 +1,20 @@
-"""Writes what three pages tell of the code, between their markers: `python docs/generate.py`."""
+"""Writes what two pages tell of the code, between their markers: `python docs/generate.py`."""
 
 from __future__ import annotations
 
 import inspect
 import json
 import re
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic_core import PydanticUndefined
 from tables import rewritten, table
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
+from swarm_logistics_env.cli.app import command_line
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
 from swarm_logistics_env.environment.spaces import ITEM_FEATURES, ROBOT_FEATURES
@@ -119,18 +121,36 @@ def arguments_list() -> str:
     return "\n".join(f"* `{name}`:{meaning}" for name, meaning in pairs)
 
 
-def study_files() -> dict[str, str]:
-    """Return the blocks of the page about study files."""
-    presets = "\n".join(f"* `{name}`: {about(study)}" for name, study in PRESETS.items())
+def reference() -> dict[str, str]:
+    """Return the blocks of the page about commands and files."""
+    trainings = {name: load_training(name) for name in preset_names()}
+    head = ("command", "what it does", "options")
     return {
-        "heads": "\n".join(f"* `[[{name}]]`: {summary(kind)}" for name, kind in FACTORS.items()),
+        "commands": table(head, list(commands(command_line(), "swarm-logistics"))),
+        "training": fields(Training),
+        "parts of a training": sections(PARTS),
+        "trainings": "\n".join(
+            f"* `{name}`: {training.about} {training.agent_steps:,} agent-steps."
+            for name, training in trainings.items()
+        ),
         "study": fields(Specification, leave_out=FACTORS),
         "scenarios": f"Presets of the scenario: {', '.join(SCENARIO_PRESETS)}.",
         "factors": sections({f"[[{name}]]": kind for name, kind in FACTORS.items()}),
-        "presets": presets,
+        "studies": "\n".join(f"* `{name}`: {about(study)}" for name, study in PRESETS.items()),
         "performance": columns_of(CELL_COLUMNS),
         "indicators": columns_of(VERDICT_COLUMNS),
     }
+
+
+def commands(command: Any, name: str) -> Iterator[tuple[str, str, str]]:
+    """Yield name, help and options of a command, or of those below it."""
+    below = getattr(command, "commands", None)
+    if below is None:
+        options = (one.opts[0] for one in command.params if one.opts[0].startswith("-"))
+        said = " ".join((command.help or "").split("\n\n")[0].split())
+        yield f"`{name}`", said, ", ".join(f"`{one}`" for one in options)
+    for part, one in (below or {}).items():
+        yield from commands(one, f"{name} {part}")
 
 
 def about(study: Specification) -> str:
@@ -149,21 +169,8 @@ def columns_of(known: Columns) -> str:
 def sections(kinds: Kinds) -> str:
     """Return a section with the fields of each record."""
     return "\n\n".join(
-        f"## `{name}`\n\n{summary(kind)}\n\n{fields(kind)}" for name, kind in kinds.items()
+        f"### `{name}`\n\n{summary(kind)}\n\n{fields(kind)}" for name, kind in kinds.items()
     )
-
-
-def training_files() -> dict[str, str]:
-    """Return the blocks of the page about training files."""
-    presets = {name: load_training(name) for name in preset_names()}
-    return {
-        "training": fields(Training),
-        "tables": sections(PARTS),
-        "presets": "\n".join(
-            f"* `{name}`: {training.about} {training.agent_steps:,} agent-steps."
-            for name, training in presets.items()
-        ),
-    }
 
 
 def fields(record: type[Record], leave_out: Container[str] = ()) -> str:
@@ -214,7 +221,7 @@ def summary(documented: object) -> str:
     return " ".join((documented.__doc__ or "").split("\n\n")[0].split())
 
 
-PAGES = {"environment": environment, "study_files": study_files, "training_files": training_files}
+PAGES = {"environment": environment, "reference": reference}
 
 
 def written(page: str) -> str:
