@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame, memory
+from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.policies import PolicyCard
 from swarm_logistics_env.policies.files import CARD, DEVIATIONS, write_onnx
 from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy, explore
 from swarm_logistics_env.streams import row_keys
 
-PAGE = Path(__file__).parents[2] / "docs" / "onnx.md"
 TRAINED = [name for name in policies.NAMES if name.startswith("ppo-")]
 
 
@@ -127,22 +126,3 @@ def test_the_deviations_beside_it_make_the_commands_of_one_that_explores(
     outputs = policy._network(frame.read(rows))
     explore(keys, 0, deviations, outputs)
     np.testing.assert_array_equal(frame.command(outputs), policy.act(rows))
-
-
-def test_the_page_tells_the_numbers_of_the_code() -> None:
-    text = " ".join(PAGE.read_text(encoding="utf-8").split())
-    for number in (
-        f"{memory.FAILURE_TIME:g} s",
-        f"exp(-period / {memory.HOME_TIME:g} s)",
-        f"{memory.STUCK_TIME:g} s",
-        f"{memory.CAGED_TIME:g} s",
-        f"{memory.CLEARING_TIME:g} s",
-        f"{memory.SURELY_IN_REACH:g} m",
-        f"{memory.STANDS:g} m/s",
-        f"{memory.MOVES:g} m/s",
-        f"{memory.RETRY_TIME:g} s",
-        f"{memory.SURELY_IN_VAIN:g} times",
-        f"{len(INPUTS)} inputs",
-        f"{memory.N_COLUMNS} numbers",
-    ):
-        assert number in text, number
