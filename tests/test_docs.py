@@ -56,7 +56,9 @@ def test_what_a_page_names_exists(name: str) -> None:
     prose = re.sub(r"^```\w.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
     for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", prose):
         assert "://" in link or (DOCS / link).exists(), link
-    pictures = re.findall(r"^(?:!\[[^]]+\]\(|```{figure} )(media/[^)\s]+)", text, flags=re.MULTILINE)
+    pictures = re.findall(
+        r"^(?:!\[[^]]+\]\(|```{figure} )(media/[^)\s]+)", text, flags=re.MULTILINE
+    )
     assert pictures
     assert all((DOCS / picture).exists() for picture in pictures)
 
