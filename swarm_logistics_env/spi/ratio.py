@@ -37,7 +37,6 @@ class RatioTest(NamedTuple):
     probability: Numbers
     p_value: Numbers
     difference_sd: Numbers
-    mean_denominator: Numbers
     degrees_of_freedom: float
     degenerate: NDArray[np.bool_]
     unbounded: NDArray[np.bool_]
@@ -113,7 +112,6 @@ def paired_ratio(
         probability=probability_of(p_value, mean_difference),
         p_value=p_value,
         difference_sd=np.where(degenerate, 0.0, sd),
-        mean_denominator=den.mean(axis=-1),
         degrees_of_freedom=float(df),
         degenerate=degenerate,
         unbounded=unbounded & ~degenerate,
@@ -270,7 +268,6 @@ def unpaired_ratio(
         probability=probability_of(np.asarray(p_value), np.asarray(at_null.mean)),
         p_value=np.asarray(p_value),
         difference_sd=np.asarray(0.0 if degenerate else math.sqrt(at_null.variance * n)),
-        mean_denominator=np.asarray(mean_den),
         degrees_of_freedom=df,
         degenerate=np.asarray(degenerate),
         unbounded=np.asarray(math.isinf(low) and not degenerate),
