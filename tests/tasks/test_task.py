@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +20,6 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Case, Outcome
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
 from swarm_logistics_env.warehouse import Warehouse
-from tests.tasks import lane
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 
@@ -120,34 +117,6 @@ def test_fields_and_failure_modes_are_those_of_the_task() -> None:
     assert WAREHOUSE.vary(Scenario(), {"preset": "dots"}) == Scenario.preset("dots")
     with pytest.raises(ScenarioError, match="no scenario preset"):
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
-
-
-SCRIPT = """
-from swarm_logistics_env.studies import Study
-
-study = Study(task="lane", policies=["walker"], seeds=2, sizes=[{"values": [2, 4]}])
-assert study.run().failed == 0
-assert Study(task="lane").specification.played.name == "lane"
-assert (study.performance()["mean"] > 0).all()
-"""
-
-
-def test_a_task_needs_two_files(tmp_path: Path) -> None:
-    copy = tmp_path / PACKAGE.name
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(lane.__file__, copy / "tasks" / "lane_task.py")
-    choice = copy / "tasks" / "task.py"
-    text = choice.read_text(encoding="utf-8")
-    name = '    "lane": "swarm_logistics_env.tasks.lane_task:LANE",\n'
-    choice.write_text(text.replace("NAMES = {\n", f"NAMES = {{\n{name}"), encoding="utf-8")
-    subprocess.run(
-        [sys.executable, "-c", SCRIPT],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        check=True,
-    )
-    page = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    assert "Files: two, `tasks/NAME_task.py` and `tasks/task.py`" in page
 
 
 def test_prose_does_not_count() -> None:
