@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError
@@ -54,32 +52,27 @@ def test_parameters_are_part_of_what_a_run_is_and_are_told(tmp_path: Path) -> No
     assert Specification.from_json(study.specification.to_json()) == study.specification
 
 
-class Silent:
+class Silent(SwarmDT):
     """A policy that tells nobody its parameters."""
 
     def __init__(self, speed: float = 0.0) -> None:
+        super().__init__()
         self.speed = speed
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        self.n_robots = n_robots
-
-    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        return np.full((self.n_robots, 4), self.speed)
 
 
 def test_parameters_reach_the_policy_and_count_where_it_does_not_tell_them(tmp_path: Path) -> None:
     chosen = PolicySpec(name="swarm-dt", parameters={"taxis_gain": 0.0})
     # Swarm D-T without its taxis is the random walk.
     assert policies.identity(chosen.load()) == PolicySpec.of("random-walk").identity()
-    silent = [
-        PolicySpec.of({"name": f"{__name__}:Silent", "parameters": {"speed": speed}})
-        for speed in (0.1, 0.2)
-    ]
-    assert silent[0].identity() != silent[1].identity()
-    assert [policy.runs_code for policy in (*silent, chosen)] == [True, True, False]
+    tables = [{"name": f"{__name__}:Silent", "parameters": {"speed": s}} for s in (0.1, 0.2)]
+    one, other = map(PolicySpec.of, tables)
+    assert one.identity() != other.identity()
+    assert (one.runs_code, chosen.runs_code) == (True, False)
     # A file may not name code by way of parameters.
-    policy = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
-    (tmp_path / "mine.toml").write_text(f"policies = [{policy}]\n[[sizes]]\nvalues = [2, 3]\n")
+    (tmp_path / "mine.toml").write_text(
+        f'[[policies]]\nname = "{__name__}:Silent"\nparameters = {{ speed = 0.1 }}\n'
+        "[[sizes]]\nvalues = [2, 3]\n"
+    )
     with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(tmp_path / "mine.toml")
     assert Study.from_file(tmp_path / "mine.toml", trust_code=True).plan().cases
