@@ -20,8 +20,7 @@ from .inputs import (
     same_seeds,
 )
 from .ratio import MIN_SEEDS, Term, paired_ratio, unpaired_ratio
-from .stalls import at_stake
-from .summaries import pairing_correlation
+from .summaries import at_stake, pairing_correlation
 
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 

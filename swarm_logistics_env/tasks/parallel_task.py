@@ -45,10 +45,17 @@ ENVIRONMENT_SOURCES = (
 )
 _codes: dict[str, str] = {}  # of tasks by their settings: one process answers once
 
-NEEDS = {
-    "silent": "the action that counts as none",
-    "noisy": "a standard deviation above 0, in the observations' own units",
-    REMOVED: "the name of the factory's argument that takes the numbers of the robots to leave out",
+# By failure mode: whether a value is what it needs, and what that is.
+NEEDS: dict[str, tuple[Callable[[Value], bool], str]] = {
+    "silent": (lambda value: value is not None, "the action that counts as none"),
+    "noisy": (
+        lambda value: isinstance(value, int | float) and value > 0,
+        "a standard deviation above 0, in the observations' own units",
+    ),
+    REMOVED: (
+        lambda value: isinstance(value, str),
+        "the name of the factory's argument that takes the numbers of the robots to leave out",
+    ),
 }
 _REWARDS = SumOfRewards()
 
@@ -286,16 +293,12 @@ class ParallelTask:
         return int(value)
 
     def _refuse(self) -> None:
-        needed: dict[str, Callable[[Value], bool]] = {
-            "silent": lambda value: value is not None,
-            "noisy": lambda value: isinstance(value, int | float) and value > 0,
-            REMOVED: lambda value: isinstance(value, str),
-        }
         for mode, value in self._failures.items():
             if mode not in FAILURE_MODES:
                 raise StudyError(f"failures: no mode {mode!r}{suggest(mode, FAILURE_MODES)}")
-            if mode in needed and not needed[mode](value):
-                raise StudyError(f"failures[{mode!r}] = {value!r}: should be {NEEDS[mode]}")
+            holds, needed = NEEDS.get(mode, (lambda _: True, ""))
+            if not holds(value):
+                raise StudyError(f"failures[{mode!r}] = {value!r}: should be {needed}")
         if self._references is not None and self._references[0] == self._references[1]:
             raise StudyError(f"references = {self._references}: should be two different scores")
         if not self._period > 0:

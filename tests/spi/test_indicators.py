@@ -22,7 +22,7 @@ INDICATORS: dict[str, Callable[..., spi.Estimate]] = {
     "S": lambda a, b, **more: spi.scalability(a, b, n=10, m=5, **more),
     "FT": lambda a, b, p_s=LESS, **more: spi.fault_tolerance(a, b, p_s, **more),
     "R": lambda a, b, **more: spi.robustness(a, b, n=25, m=2, **more),
-    "A": lambda a, b, **more: spi.adaptability(a, b, x_o=10, x_new=15, **more),
+    "A": lambda a, b, x_new=15, **more: spi.adaptability(a, b, x_o=10, x_new=x_new, **more),
     "change": spi.relative_change,
 }
 over_indicators = pytest.mark.parametrize("name", INDICATORS)
@@ -182,7 +182,7 @@ def test_unequal_seed_sets_or_nothing_delivered_in_the_reference_are_errors(name
 
 def test_arguments_that_cannot_be_are_named() -> None:
     nan = float("nan")
-    undefined: list[tuple[Callable[..., Any], dict[str, Any], str]] = [
+    undefined: list[tuple[Any, dict[str, Any], str]] = [
         (spi.adaptability, {"x_o": 0.0, "x_new": 1.0}, "x_o = 0"),
         (spi.adaptability, {"x_o": 2.0, "x_new": 2.0}, "x_new = 2 = x_o"),
         (spi.adaptability, {"x_o": nan, "x_new": 1.0}, "x_o = nan: should be finite"),
@@ -194,13 +194,11 @@ def test_arguments_that_cannot_be_are_named() -> None:
         *((spi.fault_tolerance, {"p_s": P, "n": 25, "m": m}, f"m = {m}") for m in (0, 25)),
         (spi.fault_tolerance, {"p_s": P, "n": 25}, "together"),
         (spi.fault_tolerance, {"p_s": P, "saturated": ["x"]}, "should be among p_f, p_s, p_o"),
+        (spi.robustness, {"n": 25, "m": 0}, "m = 0: should be at least 1"),
+        (spi.scalability, {"n": 25, "m": 0}, "m = 0: should be at least 1"),
+        (spi.scalability, {"n": 0, "m": 1}, "n = 0: should be at least 1"),
+        (spi.scalability, {"n": 25, "m": 1.5}, "m = 1.5: should be a whole number"),
     ]
-    for indicator in (spi.scalability, spi.robustness):
-        undefined += [
-            (indicator, {"n": 25, "m": 0}, "m = 0: should be at least 1"),
-            (indicator, {"n": 0, "m": 1}, "n = 0: should be at least 1"),
-            (indicator, {"n": 25, "m": 1.5}, "m = 1.5: should be a whole number"),
-        ]
     for indicator, arguments, message in undefined:
         with pytest.raises(IndicatorError, match=message):
             indicator(P, P, **arguments)
@@ -232,57 +230,41 @@ def test_differences_are_skewed_beyond_chance_and_beyond_cochrans_rule(
 
 MANY = np.array([59.9, 60.0, 59.8, 60.0, 59.8])
 HALF = np.array([30.0, 28, 33, 31, 29])
-
-
-@pytest.mark.parametrize(
-    ("p_o", "p_f", "saturated", "verdict"),
-    [
-        (MANY, HALF, ("p_o",), "refuted"),  # the true P_o is larger still
-        (MANY, HALF, ("p_f",), "inconclusive"),  # the true P_F may be as large as P_o
-        (HALF, MANY, ("p_f",), "supported"),
-        (HALF, MANY, ("p_o",), "inconclusive"),
-        (HALF, MANY, ("p_o", "p_f"), "inconclusive"),
-        (MANY, HALF, ("p_o", "p_f"), "inconclusive"),
-    ],
-)
-def test_a_capped_p_blocks_the_side_it_leans_to(
-    p_o: np.ndarray, p_f: np.ndarray, saturated: tuple[str, ...], verdict: str
-) -> None:
-    r = spi.robustness(p_o, p_f, n=25, m=2, saturated=saturated)
-    assert (r.verdict, *spi.adjust([r])) == (verdict, verdict)
-    assert ("capped" in r.flags, r.p_value == 1.0) == ((verdict == "inconclusive",) * 2)
-
-
 FEWER = np.array([40.0, 40.3, 39.7, 40.1, 39.9])
 GREATER = np.array([47.1, 46.9, 47.0, 47.2, 46.8])
 
 
 @pytest.mark.parametrize(
-    ("p_f", "p_s", "threshold", "saturated", "verdict"),
+    ("name", "samples", "threshold", "saturated", "verdict"),
     [
-        (FEWER, GREATER, -0.1, "p_o", "inconclusive"),  # of a true P_o of 80 the loss is but .086
-        (FEWER, GREATER, -0.1, "p_s", "refuted"),  # of a larger P_S the loss is larger still
-        (FEWER, GREATER, -0.1, "p_f", "inconclusive"),
-        (FEWER, GREATER, 0.0, "p_o", "refuted"),  # the sign of FT does not depend on P_o
-        (GREATER, FEWER, 0.0, "p_o", "supported"),
-        (GREATER, FEWER, 0.1, "p_o", "inconclusive"),
-        (FEWER, GREATER, 0.1, "p_o", "refuted"),
-        (GREATER, FEWER, -0.1, "p_o", "supported"),
+        ("R", (MANY, HALF), 0, ("p_o",), "refuted"),  # the true P_o is larger still
+        ("R", (MANY, HALF), 0, ("p_f",), "inconclusive"),  # the true P_F may be as large as P_o
+        ("R", (HALF, MANY), 0, ("p_f",), "supported"),
+        ("R", (HALF, MANY), 0, ("p_o",), "inconclusive"),
+        ("R", (HALF, MANY), 0, ("p_o", "p_f"), "inconclusive"),
+        ("R", (MANY, HALF), 0, ("p_o", "p_f"), "inconclusive"),
+        # Of a true P_o of 80 the loss is but .086; of a larger P_S it is larger still.
+        ("FT", (MANY, FEWER, GREATER), -0.1, ("p_o",), "inconclusive"),
+        ("FT", (MANY, FEWER, GREATER), -0.1, ("p_s",), "refuted"),
+        ("FT", (MANY, FEWER, GREATER), -0.1, ("p_f",), "inconclusive"),
+        # The sign of FT does not depend on P_o.
+        ("FT", (MANY, FEWER, GREATER), 0.0, ("p_o",), "refuted"),
+        ("FT", (MANY, GREATER, FEWER), 0.0, ("p_o",), "supported"),
+        ("FT", (MANY, GREATER, FEWER), 0.1, ("p_o",), "inconclusive"),
+        ("FT", (MANY, FEWER, GREATER), 0.1, ("p_o",), "refuted"),
+        ("FT", (MANY, GREATER, FEWER), -0.1, ("p_o",), "supported"),
+        # x trebles, so that A = (P_new/P_o - 1)/2 + 1 is above 0 whatever P_o is.
+        ("A", (MANY, FEWER), 0.0, ("p_o",), "supported"),
+        ("A", (FEWER, MANY), 1.0, ("p_o",), "inconclusive"),
     ],
 )
 def test_a_cap_blocks_the_side_on_which_it_can_move_the_indicator(
-    p_f: np.ndarray, p_s: np.ndarray, threshold: float, saturated: str, verdict: str
+    name: str, samples: Any, threshold: float, saturated: tuple[str, ...], verdict: str
 ) -> None:
-    ft = spi.fault_tolerance(MANY, p_f, p_s, threshold=threshold, saturated=[saturated])
-    assert ft.verdict == verdict
-    assert ("capped" in ft.flags) == (verdict == "inconclusive")
-
-
-def test_a_capped_reference_of_a_large_change_of_a_parameter_blocks_no_gain() -> None:
-    # x trebles, so that A = (P_new/P_o - 1)/2 + 1 is above 0 whatever P_o is.
-    asked: dict[str, Any] = {"x_o": 5.0, "x_new": 15.0, "saturated": ["p_o"]}
-    assert spi.adaptability(MANY, FEWER, **asked).verdict == "supported"
-    assert spi.adaptability(FEWER, MANY, threshold=1.0, **asked).flags == ("capped",)
+    x: dict[str, float] = {"x_new": 30} if name == "A" else {}
+    found = INDICATORS[name](*samples, threshold=threshold, saturated=saturated, **x)
+    assert (found.verdict, *spi.adjust([found])) == (verdict, verdict)
+    assert ("capped" in found.flags, found.p_value == 1.0) == ((verdict == "inconclusive",) * 2)
 
 
 def test_the_same_runs_have_an_exact_value_that_is_no_evidence() -> None:
