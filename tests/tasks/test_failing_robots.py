@@ -84,13 +84,14 @@ class Nested(Lane):
 
 
 def test_structures_are_blinded_and_whole_numbers_bear_no_noise() -> None:
-    env = FailingRobots(Nested(1), [RobotFault(mode="blind", robots=1)], FAILURES)
-    ((arrays, number),) = env.reset(seed=0)[0].values()
-    assert not arrays["a"].any()
-    assert number == 0
-    env = FailingRobots(Nested(1), [RobotFault(mode="noisy", robots=1)], FAILURES)
+    blind, noisy = (
+        FailingRobots(Nested(1), [RobotFault(mode=mode, robots=1)], FAILURES)
+        for mode in ("blind", "noisy")
+    )
+    ((arrays, number),) = blind.reset(seed=0)[0].values()
+    assert (arrays["a"].any(), number) == (False, 0)
     with pytest.raises(SetupError, match="observes int64: should be floats"):
-        env.reset(seed=0)
+        noisy.reset(seed=0)
 
 
 def test_it_is_a_parallel_environment_and_seeds_are_counted() -> None:

@@ -10,7 +10,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
@@ -153,7 +152,7 @@ class Hidden(Lane):
         infos = {agent: {"done": rewards[agent]} for agent in infos}
         return self._observations(), dict.fromkeys(rewards, 0.0), *others, infos
 
-    def _observations(self) -> dict[str, NDArray[np.float32]]:
+    def _observations(self) -> dict[str, Any]:
         return {agent: np.zeros(2, np.float32) for agent in self.agents}
 
 
