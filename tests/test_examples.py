@@ -31,13 +31,12 @@ def test_ppo_learns_over_two_swarm_sizes(
     PPO = pytest.importorskip("stable_baselines3", reason="needs the extra train").PPO
     learn = PPO.learn
 
-    def watched(model: Any, *arguments: Any, **named: Any) -> Any:
+    def watched(model: Any, *arguments: Any, **named: Any) -> None:
         before = [part.detach().clone() for part in model.policy.parameters()]
         learn(model, *arguments, **named)
         assert (model.num_timesteps, model.n_envs) == (2_304, 2 * 3 + 2 * 6)
-        assert all(
-            not bool((old == new).all()) for old, new in zip(before, model.policy.parameters())
-        )
+        pairs = zip(before, model.policy.parameters())
+        assert not any(bool((old == new).all()) for old, new in pairs)
 
     monkeypatch.setattr(PPO, "learn", watched)
     delivered = main("ppo_swarm", total_timesteps=2_304, duration=10.0)
