@@ -22,17 +22,9 @@ STUDY = """
 task = "tests.tasks.lane:LANE"
 policies = ["walker", "random"]
 seeds = 4
-
-[[sizes]]
-values = [2, 4]
-
-[[faults]]
-modes = ["silent", "blind"]
-robots = [1]
-
-[[parameters]]
-name = "length"
-values = [6, 12]
+sizes = [{ values = [2, 4] }]
+faults = [{ modes = ["silent", "blind"], robots = [1] }]
+parameters = [{ name = "length", values = [6, 12] }]
 """
 FAULT = {"modes": ["silent"], "robots": [1]}
 

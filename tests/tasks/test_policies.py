@@ -15,21 +15,12 @@ from swarm_logistics_env.studies.specification import Specification
 FILE = """
 seeds = 1
 scenario = { n_robots = 3, n_items = 4, warehouse_width = 3, warehouse_height = 3, duration = 2 }
-
-[[policies]]
-name = "swarm-dt"
-
-[[policies]]
-name = "swarm-dt"
-parameters = { taxis_gain = 0.5, diffusion = 0.7 }
-
-[[policies]]
-name = "swarm-dt"
-parameters = { taxis_gain = 0.25 }
-label = "half-hearted"
-
-[[sizes]]
-values = [2, 3]
+sizes = [{ values = [2, 3] }]
+policies = [
+    "swarm-dt",
+    { name = "swarm-dt", parameters = { taxis_gain = 0.5, diffusion = 0.7 } },
+    { name = "swarm-dt", parameters = { taxis_gain = 0.25 }, label = "half-hearted" },
+]
 """
 LABELS = ["swarm-dt", "swarm-dt (taxis_gain = 0.5, diffusion = 0.7)", "half-hearted"]
 
@@ -69,10 +60,8 @@ def test_parameters_reach_the_policy_and_count_where_it_does_not_tell_them(tmp_p
     assert one.identity() != other.identity()
     assert (one.runs_code, chosen.runs_code) == (True, False)
     # A file may not name code by way of parameters.
-    (tmp_path / "mine.toml").write_text(
-        f'[[policies]]\nname = "{__name__}:Silent"\nparameters = {{ speed = 0.1 }}\n'
-        "[[sizes]]\nvalues = [2, 3]\n"
-    )
+    table = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
+    (tmp_path / "mine.toml").write_text(FILE.replace('"swarm-dt",', f"{table},", 1))
     with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(tmp_path / "mine.toml")
     assert Study.from_file(tmp_path / "mine.toml", trust_code=True).plan().cases

@@ -33,13 +33,10 @@ def test_cases_of_other_tasks_are_other_cases() -> None:
 
 def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_path: Path) -> None:
     path, out = tmp_path / "lane.toml", tmp_path / "out"
-    path.write_text(
-        'task = "tests.tasks.lane:LANE"\nseeds = 2\npolicies = ["walker"]\n'
-        "[[sizes]]\nvalues = [2, 4]\n"
-    )
+    path.write_text('task = "tests.tasks.lane:LANE"\nseeds = 2\nsizes = [{ values = [2, 4] }]\n')
     with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(path)
-    study = Study.from_file(path, out=out, trust_code=True)
+    study = Study.from_file(path, out=out, trust_code=True, policies=["walker"])
     assert study.run().failed == 0
     with pytest.raises(StudyError, match=r"is code.*--trust-code"):
         Study.stored(out)
