@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from dataclasses import replace
 from importlib.metadata import packages_distributions, version
@@ -203,21 +203,19 @@ class ParallelTask:
                 f"task {self.name}: robots are removed from the start, not from {onset:g} s on, so "
                 'FT is not defined here: should be asked for R alone, indicators = ["R"]'
             )
-        return RobotFault(mode=mode, robots=robots, onset=onset, duration=duration).replace(
-            **manner
-        )
+        return RobotFault(mode=mode, robots=robots, onset=onset, duration=duration, **manner)
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one run; see `Task.play`."""
         scenario, n_robots = case.scenario, case.scenario.n_robots
         assert isinstance(scenario, ParallelScenario)
         faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
-        absent = {
-            row
-            for fault in faults
-            if fault.mode == REMOVED
-            for row in failing_rows(seed, n_robots, fault.robots)
-        }
+
+        def failing(faults: Iterable[RobotFault]) -> tuple[int, ...]:
+            """Return which robots any of these faults names: the sets of one seed are nested."""
+            return failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
+
+        absent = failing(fault for fault in faults if fault.mode == REMOVED)
         player: Value = case.policy.load(self.policies)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
@@ -228,9 +226,9 @@ class ParallelTask:
                 digest.update(np.asarray(flatten(space, observations[agent])).tobytes())
             digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
 
-        with closing(self._made(scenario, tuple(sorted(absent)))) as env:
+        with closing(self._made(scenario, absent)) as env:
             agents = agents_by_row(env, n_robots, absent)
-            failing = FailingRobots(
+            broken = FailingRobots(
                 env,
                 [fault for fault in faults if fault.mode != REMOVED],
                 self._failures,
@@ -241,21 +239,20 @@ class ParallelTask:
                 player.configure(env, agents)
             if hasattr(player, "reset"):
                 player.reset(n_robots, policy_seed)
-            observations, _ = failing.reset(seed=seed)
-            add(failing.given, {})
+            observations, _ = broken.reset(seed=seed)
+            add(broken.given, {})
             for _ in range(max(1, round(scenario.duration / self._period))):
                 if not env.agents:
                     break
                 actions = player.act(observation_rows(env, agents, observations))
-                observations, rewards, _, _, infos = failing.step(
+                observations, rewards, _, _, infos = broken.step(
                     agent_actions(env, agents, actions)
                 )
-                add(failing.given, rewards)
+                add(broken.given, rewards)
                 gains.append(float(self._gain(env, rewards, infos)))
         # What P counts need be in no observation and no reward.
         digest.update(np.array(gains).tobytes())
-        most = max((fault.robots for fault in faults), default=0)
-        return self._outcome(gains, digest.hexdigest(), failing_rows(seed, n_robots, most))
+        return self._outcome(gains, digest.hexdigest(), failing(faults))
 
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
