@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import islice, product
 from pathlib import Path
 from typing import TypeAlias
 
@@ -29,41 +29,18 @@ from swarm_logistics_env.warehouse.faults import ROLES
 # Plays pairs of a fault's place in the list and the number of its run, 0, 1, ..; returns the change
 # of performance, P_F - P_o, of each: the lower, the worse the fault.
 Play: TypeAlias = Callable[[Sequence[tuple[int, int]]], Sequence[float]]
+Matrix: TypeAlias = NDArray[np.float64]
 
-_FIRST_SHARE = (
-    0.25  # of the budget: faults at random, so that the model has something to learn from
-)
+# Of the budget: faults at random, so that the model has something to learn from.
+_FIRST_SHARE = 0.25
 _ROUNDS = 8  # in which the rest is spent; the runs of one round are played side by side
-_SEEDS_AT_RANDOM = 2  # runs of each fault in a random search, to tell faults from luck
 # Shares of the variance between faults: by mode; by mode and role; by mode, onset and duration; by
 # all of them.
 _SHARES = (0.4, 0.2, 0.2, 0.2)
 _NOISES = (0.1, 0.3, 1.0, 3.0)  # candidates for the variance between seeds over that between faults
 
 
-@dataclass
-class Trials:
-    """The runs of a search so far.
-
-    Attributes:
-        tried: place of the fault of each run in the list of faults.
-        change: P_F - P_o of each run [items].
-    """
-
-    tried: list[int] = field(default_factory=list)
-    change: list[float] = field(default_factory=list)
-
-    def add(self, places: Sequence[int], play: Play) -> None:
-        """Play one more run of each of these faults."""
-        pairs: list[tuple[int, int]] = []
-        for place in places:
-            earlier = [place_before for place_before, _ in pairs]
-            pairs.append((place, self.tried.count(place) + earlier.count(place)))
-        self.change += [float(change) for change in play(pairs)]
-        self.tried += [place for place, _ in pairs]
-
-
-def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple[int, Trials]:
+def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple[int, list[int]]:
     """Search by Thompson sampling from a Gaussian process over the faults.
 
     Faults that are alike (in mode, role, onset, duration) are expected to cost alike, so that a run
@@ -76,71 +53,62 @@ def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple
         seed: of the search's own choices.
 
     Returns:
-        The place of the fault that is believed to be worst, and all runs.
+        The place of the fault that is believed to be worst, and that of every run's fault.
     """
     rng = generator(seed, "fault search")
-    trials, covariance = Trials(), _covariance(faults)
+    covariance = _covariance(faults)
+    tried: list[int] = []
+    change: list[float] = []
+
+    def add(places: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
+        """Play one more run of each of these faults; return what all runs let one believe."""
+        pairs = []
+        for place in places.tolist():
+            pairs.append((place, tried.count(place)))
+            tried.append(place)
+        change.extend(play(pairs))
+        return _posterior(covariance, np.array(tried), np.array(change))
+
     first = max(1, round(budget * _FIRST_SHARE))
-    trials.add([int(p) for p in rng.choice(len(faults), first, replace=first > len(faults))], play)
+    mean, spread = add(rng.choice(len(faults), first, replace=first > len(faults)))
     sizes = np.diff(np.linspace(first, budget, _ROUNDS + 1).round().astype(int))
     for size in sizes[sizes > 0]:
-        mean, spread = _posterior(covariance, trials)
         root = np.linalg.cholesky(spread + 1e-9 * np.eye(len(faults)))
         draws = mean[:, None] + root @ rng.standard_normal((len(faults), size))
-        trials.add([int(place) for place in draws.argmin(axis=0)], play)
-    mean, _ = _posterior(covariance, trials)
-    return min(set(trials.tried), key=lambda place: float(mean[place])), trials
+        mean, spread = add(draws.argmin(axis=0))
+    return min(set(tried), key=lambda place: float(mean[place])), tried
 
 
-def random_search(
-    faults: Sequence[Fault], play: Play, budget: int, seed: int
-) -> tuple[int, Trials]:
-    """Try faults at random, each over some seeds, within the same budget; for comparison.
-
-    Returns:
-        The place of the fault with the lowest mean, and all runs.
-    """
-    rng, trials = generator(seed, "random fault search"), Trials()
-    count = min(len(faults), max(1, budget // _SEEDS_AT_RANDOM))
-    chosen = [int(place) for place in rng.choice(len(faults), count, replace=False)]
-    trials.add([chosen[number % count] for number in range(budget)], play)
-    tried, change = np.array(trials.tried), np.array(trials.change)
-    return min(chosen, key=lambda place: float(change[tried == place].mean())), trials
-
-
-def _covariance(faults: Sequence[Fault]) -> NDArray[np.float64]:
+def _covariance(faults: Sequence[Fault]) -> Matrix:
     """Return how alike the faults are expected to be, (faults, faults), 1 on the diagonal."""
 
-    def are_equal(values: Sequence[object]) -> NDArray[np.bool_]:
-        return np.array([[one == other for other in values] for one in values])
-
-    def near(values: Sequence[float]) -> NDArray[np.float64]:
+    def near(values: list[float]) -> Matrix:
         steps = np.searchsorted(np.unique(values), values)
-        alike: NDArray[np.float64] = np.exp(-0.5 * (steps[:, None] - steps[None, :]) ** 2)
+        alike: Matrix = np.exp(-0.5 * (steps[:, None] - steps) ** 2)
         return alike
 
-    mode, role = (are_equal([getattr(f, name) for f in faults]) for name in ("mode", "role"))
+    mode, role = (np.array([str(getattr(f, name)) for f in faults]) for name in ("mode", "role"))
     lasting = near([np.inf if fault.duration is None else fault.duration for fault in faults])
     time = near([fault.onset for fault in faults]) * lasting
-    both = mode & role
+    same: Matrix = mode[:, None] == mode
+    both: Matrix = same & (role[:, None] == role)
     by_mode, by_role, by_time, by_all = _SHARES
-    return by_mode * mode + by_role * both + by_time * mode * time + by_all * both * time
+    return by_mode * same + by_role * both + by_time * same * time + by_all * both * time
 
 
 def _posterior(
-    covariance: NDArray[np.float64], trials: Trials
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    covariance: Matrix, tried: NDArray[np.int64], change: Matrix
+) -> tuple[Matrix, Matrix]:
     """Return mean (faults,) and covariance (faults, faults) of what the runs let one believe.
 
     The noise is that under which the runs are likeliest; scale and mean are those of the runs.
     """
-    tried, change = np.array(trials.tried), np.array(trials.change)
     centre, scale = change.mean(), max(float(change.std()), 1e-6)
     normal = (change - centre) / scale
     prior, across = covariance[np.ix_(tried, tried)], covariance[:, tried]
 
-    def factor(noise: float) -> tuple[NDArray[np.float64], bool]:
-        made: tuple[NDArray[np.float64], bool] = cho_factor(
+    def factor(noise: float) -> tuple[Matrix, bool]:
+        made: tuple[Matrix, bool] = cho_factor(
             (prior + noise * np.eye(len(tried))) / (1.0 + noise), lower=True
         )
         return made
@@ -174,7 +142,7 @@ class Attack:
         scenario: conditions of every episode.
         robots: how many fail.
         modes: failure modes to search among.
-        budget: runs of faults in the search; the random search has as many.
+        budget: runs of faults in the search.
         fresh: seeds of the estimates, none of which the search has met; at least 3.
         seed: of the search's own choices.
     """
@@ -218,7 +186,7 @@ class Found:
     """A fault, how it was found, and its robustness on fresh seeds.
 
     Attributes:
-        by: "search", "random search" or "named modes".
+        by: "search" or "named modes".
         runs: how many runs of faults it took.
     """
 
@@ -264,28 +232,43 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
     except OSError as error:
         raise StudyError(f"cannot write to {out}: {error.strerror}") from error
     with Runs(out / STORE) as store:
-        players = _Players(base, engine, store)
-        play = players.search_play(faults)
-        worst, trials = search(faults, play, asked.budget, asked.seed)
-        at_random, _ = random_search(faults, play, asked.budget, asked.seed)
+
+        def delivered(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
+            outcomes = _outcomes(base, engine, store, pairs)
+            return np.array([outcome.delivered for outcome in outcomes], np.float64)
+
+        def play(pairs: Sequence[tuple[int, int]]) -> Sequence[float]:
+            """Play a fault's k-th run with seed k, beside the run without a fault."""
+            seeds = [seed for _, seed in pairs]
+            sound = delivered([(None, seed) for seed in range(max(*seeds, _NAMED_SEEDS - 1) + 1)])
+            if not sound.any():
+                raise SetupError(
+                    f"{policy.title} delivers nothing without faults, so no fault can cost "
+                    "anything: should be another policy, a longer duration or more robots"
+                )
+            return list(delivered([(faults[place], seed) for place, seed in pairs]) - sound[seeds])
+
+        worst, tried = search(faults, play, asked.budget, asked.seed)
         named = [Fault(mode, asked.robots) for mode in asked.modes]
-        tries = players.played(named, range(_NAMED_SEEDS))
-        worst_named = int(np.argmin([runs.by_seed.mean() for runs in tries]))
-        # Seeds that neither search can have met, nor the choice among the named modes.
-        first = max(asked.budget, _NAMED_SEEDS)
-        fresh = range(first, first + asked.fresh)
+        tries = delivered([*product(named, range(_NAMED_SEEDS))]).reshape(len(named), -1)
+        worst_named = int(tries.mean(axis=1).argmin())
         chosen = [
             ("search", faults[worst], asked.budget),
-            ("random search", faults[at_random], asked.budget),
             ("named modes", named[worst_named], _NAMED_SEEDS * len(named)),
         ]
-        sound, *failed = players.played([None, *(fault for _, fault, _ in chosen)], fresh)
+        # Seeds that neither the search can have met, nor the choice among the named modes.
+        first = max(asked.budget, _NAMED_SEEDS)
+        fresh = range(first, first + asked.fresh)
+        judged = (None, *(fault for _, fault, _ in chosen))
+        outcomes = iter(_outcomes(base, engine, store, [*product(judged, fresh)]))
+        arm = Arm(NO_FAULT, base)
+        sound, *failed = (Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in judged)
     return AttackResult(
         found=tuple(
             Found(by, fault, _robustness(asked, sound, with_fault), runs)
             for (by, fault, runs), with_fault in zip(chosen, failed, strict=True)
         ),
-        tried=len(set(trials.tried)),
+        tried=len(set(tried)),
         searched=len(faults),
         is_capped=sound.saturated,
     )
@@ -302,51 +285,20 @@ def _robustness(asked: Attack, sound: Cell, failed: Cell) -> Estimate:
     )
 
 
-class _Players:
-    """Plays faults over seeds; every run is kept in a store and played once."""
-
-    def __init__(self, base: Case, engine: Engine, store: Runs) -> None:
-        self._base, self._engine, self._store = base, engine, store
-
-    def played(self, faults: Sequence[Fault | None], seeds: Sequence[int]) -> list[Cell]:
-        """Return the runs of each fault (None: without one) over the seeds."""
-        outcomes = self._outcomes([(fault, seed) for fault in faults for seed in seeds])
-        n, arm = len(seeds), Arm(NO_FAULT, self._base)
-        return [
-            Cell.of("", "", arm, outcomes[place * n : (place + 1) * n])
-            for place in range(len(faults))
-        ]
-
-    def search_play(self, faults: Sequence[Fault]) -> Play:
-        """Return what plays a fault's k-th run with seed k, beside the run without a fault."""
-
-        def play(pairs: Sequence[tuple[int, int]]) -> Sequence[float]:
-            last = max(seed for _, seed in pairs)
-            sound = self._delivered([(None, seed) for seed in range(max(last + 1, _NAMED_SEEDS))])
-            if not sound.any():
-                raise SetupError(
-                    f"{self._base.policy.title} delivers nothing without faults, so no fault can "
-                    "cost anything: should be another policy, a longer duration or more robots"
-                )
-            failed = self._delivered([(faults[place], seed) for place, seed in pairs])
-            return list(failed - sound[[seed for _, seed in pairs]])
-
-        return play
-
-    def _delivered(self, pairs: Sequence[tuple[Fault | None, int]]) -> NDArray[np.float64]:
-        return np.array([outcome.delivered for outcome in self._outcomes(pairs)], np.float64)
-
-    def _outcomes(self, pairs: Sequence[tuple[Fault | None, int]]) -> list[Outcome]:
-        code = WAREHOUSE.code()
-        runs = [
-            replace(self._base, faults=() if fault is None else (fault,)).run(code, seed)
-            for fault, seed in pairs
-        ]
-        done = self._store.succeeded()
-        missing = {run.key: run for run in runs if run.key not in done}
-        for run, outcome in self._engine(missing.values()):
-            self._store.add(run, outcome)
-            if outcome.error is not None:
-                raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
-        outcomes = self._store.outcomes(runs)
-        return [outcomes[run.case.key, run.seed] for run in runs]
+def _outcomes(
+    base: Case, engine: Engine, store: Runs, pairs: Sequence[tuple[Fault | None, int]]
+) -> list[Outcome]:
+    """Return the outcomes of faults (None: without one) at seeds; play what is not in the store."""
+    code = WAREHOUSE.code()
+    runs = [
+        replace(base, faults=() if fault is None else (fault,)).run(code, seed)
+        for fault, seed in pairs
+    ]
+    done = store.succeeded()
+    missing = {run.key: run for run in runs if run.key not in done}
+    for run, outcome in engine(missing.values()):
+        store.add(run, outcome)
+        if outcome.error is not None:
+            raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
+    outcomes = store.outcomes(runs)
+    return [outcomes[run.case.key, run.seed] for run in runs]

@@ -16,10 +16,6 @@ from swarm_logistics_env.wrappers import FaultInjection, FixedAgents, SwarmSize,
 SMALL = Scenario(n_robots=6, n_items=12, warehouse_width=5.0, warehouse_height=4.0, duration=60.0)
 
 
-def plain() -> Any:
-    return parallel_env(SMALL)
-
-
 class Forgetful(SwarmDT):
     """Goes on from the episode before."""
 
@@ -58,10 +54,17 @@ class Counts(Wrapper):
         return rows, rewards + Counts.steps, *rest
 
 
+class Stranger:
+    unwrapped = None
+
+    def __init__(self, env: object) -> None:
+        pass
+
+
 @pytest.mark.parametrize("mode", ["FM1", "dead", "removed"])
 def test_wrappers_of_the_package_pass(mode: str) -> None:
     def make() -> Any:
-        env = FaultInjection(plain(), mode, robots=2, onset=1.0)
+        env = FaultInjection(parallel_env(SMALL), mode, robots=2, onset=1.0)
         return FixedAgents(SwarmSize(env, [6, 9], leave=[(1, 3.0)]))
 
     testing.check_wrapper(make, steps=60)
@@ -74,26 +77,25 @@ def test_policies_of_the_package_pass(policy: Any) -> None:
 
 @pytest.mark.parametrize(
     ("wrapper", "sentence"),
-    [(Magnifies, "outside"), (Doubles, "outside"), (Counts, "another episode")],
+    [
+        (Magnifies, "outside"),
+        (Doubles, "outside"),
+        (Counts, "another episode"),
+        (Stranger, "should be a SwarmLogisticsEnv"),
+    ],
 )
-def test_a_broken_wrapper_is_named(wrapper: type[Wrapper], sentence: str) -> None:
+def test_a_broken_wrapper_is_named(wrapper: Any, sentence: str) -> None:
     with pytest.raises(testing.CheckError, match=sentence):
-        testing.check_wrapper(lambda: wrapper(plain()), steps=30)
+        testing.check_wrapper(lambda: wrapper(parallel_env(SMALL)), steps=30)
 
 
-def test_a_policy_that_remembers_the_episode_before_is_named() -> None:
-    with pytest.raises(testing.CheckError, match="reset should forget it"):
-        testing.check_policy(Forgetful(), SMALL, steps=60)
-
-
-def test_commands_of_the_wrong_shape_are_named() -> None:
-    with pytest.raises(PolicyError, match="shape"):
-        testing.check_policy(OneColumn(), SMALL, steps=5)
-
-
-def test_what_is_no_environment_of_ours_is_refused() -> None:
-    class Stranger:
-        unwrapped = None
-
-    with pytest.raises(testing.CheckError, match="should be a SwarmLogisticsEnv"):
-        testing.check_wrapper(Stranger)
+@pytest.mark.parametrize(
+    ("policy", "error", "sentence"),
+    [
+        (Forgetful(), testing.CheckError, "reset should forget it"),
+        (OneColumn(), PolicyError, "shape"),
+    ],
+)
+def test_a_broken_policy_is_named(policy: SwarmDT, error: type[Exception], sentence: str) -> None:
+    with pytest.raises(error, match=sentence):
+        testing.check_policy(policy, SMALL, steps=60)

@@ -17,7 +17,7 @@ from scipy.special import stdtr
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.ratio import RatioTest, paired_ratio
-from swarm_logistics_env.spi.stalls import at_stake
+from swarm_logistics_env.spi.summaries import at_stake
 from swarm_logistics_env.studies.specification import looks_up_to
 from swarm_logistics_env.studies.until_clear import SPENDING
 

@@ -320,7 +320,7 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
         ("found by", "fault", "R [95 %]", "runs"),
         rows,
         f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
-        f"{worst.robustness.value:.3f} on {fresh} seeds that no search has met.{played}",
+        f"{worst.robustness.value:.3f} on {fresh} seeds that the search has not met.{played}",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
         *([capped] if result.is_capped else ()),

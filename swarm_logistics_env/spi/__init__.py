@@ -32,7 +32,6 @@ from .power import (
     seeds_for_power,
 )
 from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
-from .stalls import share_stalled
 from .summaries import (
     Interval,
     interquartile_mean,
@@ -41,6 +40,7 @@ from .summaries import (
     pairing_correlation,
     prediction_interval,
     probability_of_improvement,
+    share_stalled,
     worst_decile,
 )
 from .trials import Trial, Trials, read_trials

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, TypedDict
 
@@ -19,9 +19,8 @@ from .inputs import (
     positive_mean,
     same_seeds,
 )
-from .ratio import MIN_SEEDS, RatioTest, Term, paired_ratio, unpaired_ratio
-from .stalls import at_stake
-from .summaries import pairing_correlation
+from .ratio import MIN_SEEDS, Term, paired_ratio, unpaired_ratio
+from .summaries import at_stake, pairing_correlation
 
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
@@ -57,7 +56,7 @@ SIGNS = {
 class Estimate:
     """One indicator over n seeds: theta = mean(num) / mean(den) + offset, with its judgement.
 
-    Everything but `value`, `verdict` and the description of the input is None at n = 1, and where
+    Everything but `value` and the description of the input is None at n = 1, and where
     the runs compared are the same runs.
 
     Attributes:
@@ -68,7 +67,6 @@ class Estimate:
         high: Upper limit of the interval; inf where the interval is unbounded; None as `low`.
         probability: Confidence that theta > threshold, in [0, 1], not a posterior frequency:
             1 - p/2 where mean(D) > 0, else p/2, D = num - (threshold - offset) den.
-        verdict: On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted.
         threshold: The value that theta is tested against.
         confidence: Of the interval, in (0, 1).
         n_seeds: Number of seeds; of the smallest sample where unpaired.
@@ -98,7 +96,6 @@ class Estimate:
     low: float | None = None
     high: float | None = None
     probability: float | None = None
-    verdict: Verdict = "inconclusive"
     threshold: float
     confidence: float
     n_seeds: int
@@ -118,6 +115,11 @@ class Estimate:
         return "identical" in self.flags
 
     @property
+    def verdict(self) -> Verdict:
+        """On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted."""
+        return self.verdict_for(self.p_value)
+
+    @property
     def answer(self) -> Verdict:
         """The verdict; of identical runs what their exact value says, which is no evidence.
 
@@ -128,8 +130,10 @@ class Estimate:
         return "supported" if self.value > self.threshold else "refuted"
 
     def verdict_for(self, p_value: float | None) -> Verdict:
-        """Return the verdict at a two-sided p, e.g. one that Holm adjusted."""
-        return verdict_at(1.0 - self.confidence, p_value, self.probability)
+        """Return the verdict at a two-sided p, e.g. one that Holm adjusted; None: inconclusive."""
+        if p_value is None or self.probability is None or not p_value < 1.0 - self.confidence:
+            return "inconclusive"
+        return "supported" if self.probability > 0.5 else "refuted"
 
     def __str__(self) -> str:
         """Return sign, value, interval and verdict in one line."""
@@ -145,16 +149,6 @@ class Estimate:
             f"{shown.mark} {self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
             f"{shown.word} ({n}{p})"
         )
-
-
-def verdict_at(alpha: float, p_value: float | None, probability: float | None) -> Verdict:
-    """Judge theta > threshold by a two-sided p against `alpha`; `probability` gives the side.
-
-    No p (one seed) is inconclusive.
-    """
-    if p_value is None or probability is None or not p_value < alpha:
-        return "inconclusive"
-    return "supported" if probability > 0.5 else "refuted"
 
 
 # The two differences of two seeds are close to each other by chance so often, counts being whole
@@ -212,10 +206,10 @@ def judge(
     finite("threshold", threshold)
     between_0_and_1("confidence", confidence)
     weighted = _checked(terms, saturated, paired=paired, identical=identical)
-    samples = [term.sample for term in weighted.values()]
-    mean_den = float(samples[-1].mean())
+    *_, reference = (term.sample for term in weighted.values())
+    mean_den = float(reference.mean())
     mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
-    n_seeds = min(sample.size for sample in samples)
+    n_seeds = min(term.sample.size for term in weighted.values())
     untested = Estimate(
         indicator=indicator,
         value=mean_num / mean_den + offset,
@@ -230,75 +224,58 @@ def judge(
         return replace(untested, low=value, high=value, flags=("identical",))
     if n_seeds == 1:
         return replace(untested, flags=("single_seed",))
-    weights = {name: term.weight(threshold - offset) for name, term in weighted.items()}
-    taken, added = at_stake([(weights[name], term.sample) for name, term in weighted.items()])
-    stakes = (float(taken), float(added)) if paired else (0.0, 0.0)
-    test, flags, skewness = _tested(untested, weighted, offset, stakes)
-    p_value, probability = float(test.p_value), float(test.probability)
-    blocks = _blocks(untested, test, [weights[name] for name in saturated])
-    flags += blocks
-    if blocks:
-        p_value, probability = 1.0, 0.5
-    elif not paired or n_seeds < MIN_SEEDS:
-        flags.append("assumes_normal")
-    elif test.p_seen < 1.0 - confidence <= test.p_value:
-        flags.append("hidden_stalls")
-    if test.unbounded:
-        flags.append("unbounded")
-    return replace(
-        untested,
-        value=float(test.value),
-        low=None if test.degenerate else float(test.low),
-        high=None if test.degenerate else float(test.high),
-        probability=probability,
-        verdict=verdict_at(1.0 - confidence, p_value, probability),
-        p_value=p_value,
-        pairing_correlation=pairing_correlation(*samples[:2]) if paired else None,
-        difference_sd=float(test.difference_sd),
-        difference_skewness=skewness,
-        at_stake=stakes,
-        mean_denominator=float(test.mean_denominator),
-        degrees_of_freedom=test.degrees_of_freedom,
-        flags=tuple(flags),
-    )
-
-
-def _blocks(asked: Estimate, test: RatioTest, capped: Sequence[float]) -> list[str]:
-    """Return what leaves no verdict at all; `capped`: weights in D of the P that are capped."""
-    flags = []
-    if asked.n_seeds < LEAST_SEEDS:
-        flags.append("too_few_seeds")
-    if test.degenerate:
-        flags.append("degenerate")
-    # The true P of one that is capped is larger, and moves D by the sign of its weight.
-    if any(weight * (float(test.value) - asked.threshold) < 0.0 for weight in capped):
-        flags.append("capped")
-    return flags
+    return _tested(untested, weighted, offset, saturated)
 
 
 def _tested(
-    asked: Estimate,
-    weighted: Mapping[str, Term],
-    offset: float,
-    stakes: tuple[float, float],
-) -> tuple[RatioTest, list[str], float | None]:
-    """Return the test that the data allow, what to say of it, and the skewness of D."""
-    asking = {
-        "offset": offset,
-        "threshold": asked.threshold,
-        "confidence": asked.confidence,
+    asked: Estimate, weighted: Mapping[str, Term], offset: float, saturated: Collection[str]
+) -> Estimate:
+    """Return the estimate with the test that its seeds allow, and what is to be said of it."""
+    n_seeds, paired, threshold = asked.n_seeds, asked.paired, asked.threshold
+    terms, null = list(weighted.values()), threshold - offset
+    asking = {"offset": offset, "threshold": threshold, "confidence": asked.confidence}
+    skewness, correlation, stakes = None, None, (0.0, 0.0)
+    if paired:
+        correlation = pairing_correlation(terms[0].sample, terms[1].sample)
+        num = np.asarray(sum(term.in_num * term.sample for term in terms))
+        den = terms[-1].sample
+        taken, added = at_stake([(term.weight(null), term.sample) for term in terms])
+        stakes = float(taken), float(added)
+        test = paired_ratio(num, den, **asking, at_stake=stakes)
+        # Without spread the skewness of D would be one of rounding errors.
+        if not test.degenerate and n_seeds >= LEAST_SEEDS:
+            skewness = _skewness(num - null * den)
+    else:
+        test = unpaired_ratio(terms, **asking)
+    # The true P of one that is capped is larger, and moves D by the sign of its weight.
+    leaning = float(test.value) - threshold
+    capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
+    blocked = capped or bool(test.degenerate) or n_seeds < LEAST_SEEDS
+    normal = not paired or n_seeds < MIN_SEEDS
+    hidden = bool(test.p_seen < 1.0 - asked.confidence <= test.p_value)
+    flags = {
+        "skewed": skewness is not None and _skewed(skewness, n_seeds),
+        "too_few_seeds": n_seeds < LEAST_SEEDS,
+        "degenerate": test.degenerate,
+        "capped": capped,
+        "assumes_normal": normal and not blocked,
+        "hidden_stalls": hidden and not normal and not blocked,
+        "unbounded": test.unbounded,
     }
-    if not asked.paired:
-        return unpaired_ratio(list(weighted.values()), **asking), [], None
-    *_, reference = weighted.values()
-    num = np.asarray(sum(term.in_num * term.sample for term in weighted.values()))
-    den = reference.sample
-    test = paired_ratio(num, den, **asking, at_stake=stakes)
-    # Without spread the skewness of D would be one of rounding errors.
-    if test.degenerate or asked.n_seeds < LEAST_SEEDS:
-        return test, [], None
-    skewness = _skewness(num - (asked.threshold - offset) * den)
-    return test, ["skewed"] if _skewed(skewness, asked.n_seeds) else [], skewness
+    return replace(
+        asked,
+        value=float(test.value),
+        low=None if test.degenerate else float(test.low),
+        high=None if test.degenerate else float(test.high),
+        probability=0.5 if blocked else float(test.probability),
+        p_value=1.0 if blocked else float(test.p_value),
+        pairing_correlation=correlation,
+        difference_sd=float(test.difference_sd),
+        difference_skewness=skewness,
+        at_stake=stakes,
+        degrees_of_freedom=test.degrees_of_freedom,
+        flags=tuple(flag for flag, holds in flags.items() if holds),
+    )
 
 
 def _checked(

@@ -182,9 +182,6 @@ def fault_budget(robustness_by_m: Mapping[int, Estimate]) -> FaultBudget:
         if estimate.indicator != "R":
             raise IndicatorError(f"indicator at m = {m} is {estimate.indicator}: should be R")
     robots = 0
-    while robots + 1 in robustness_by_m:
-        if robustness_by_m[robots + 1].answer != "supported":
-            return FaultBudget(robots, robots + 1)
+    while robots + 1 in robustness_by_m and robustness_by_m[robots + 1].answer == "supported":
         robots += 1
-    untested = robots < max(robustness_by_m)
-    return FaultBudget(robots, robots + 1 if untested else None)
+    return FaultBudget(robots, robots + 1 if robots < max(robustness_by_m) else None)

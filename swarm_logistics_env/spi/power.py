@@ -12,7 +12,7 @@ from .equivalence import Equivalence
 from .estimate import Estimate
 from .inputs import IndicatorError, Numbers, between_0_and_1, count, finite
 from .ratio import MIN_SEEDS
-from .stalls import MARGIN, critical_with_hidden
+from .summaries import STALL_MARGIN, critical_with_hidden
 
 MAX_SEEDS = 1_000_000
 # A pilot's own spread is as often too small as too large, and power falls faster on the one side
@@ -123,7 +123,7 @@ def seeds_against_stalls(estimate: Estimate) -> int | None:
     distance = (estimate.value - estimate.threshold) * estimate.mean_denominator
     share = min(abs(distance) / estimate.at_stake[distance < 0.0], 0.5)
     error = (1.0 - estimate.confidence) / 2
-    fewest = math.log(error / MARGIN) / math.log1p(-share)
+    fewest = math.log(error / STALL_MARGIN) / math.log1p(-share)
     return max(math.floor(fewest), estimate.n_seeds) + 1
 
 

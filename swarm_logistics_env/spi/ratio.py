@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .inputs import Numbers
-from .stalls import p_with_hidden
+from .summaries import p_with_hidden
 
 MIN_SEEDS = 10  # below, too few distinct resamples to studentise
 RESAMPLES = 9_999  # p is a whole number of ten-thousandths
@@ -37,7 +37,6 @@ class RatioTest(NamedTuple):
     probability: Numbers
     p_value: Numbers
     difference_sd: Numbers
-    mean_denominator: Numbers
     degrees_of_freedom: float
     degenerate: NDArray[np.bool_]
     unbounded: NDArray[np.bool_]
@@ -62,7 +61,7 @@ def paired_ratio(
         threshold: The theta that the test compares with.
         confidence: Of the Fieller interval, in (0, 1).
         at_stake: What stalls would take from mean(D) and add to it, shape (...), as
-            `stalls.at_stake` gives it; from ten seeds on p holds for stalls that no run showed.
+            `summaries.at_stake` gives it; from ten seeds on p holds for stalls that no run showed.
 
     Returns:
         Arrays of shape (...). The interval inverts the test of the runs seen: it excludes
@@ -113,7 +112,6 @@ def paired_ratio(
         probability=probability_of(p_value, mean_difference),
         p_value=p_value,
         difference_sd=np.where(degenerate, 0.0, sd),
-        mean_denominator=den.mean(axis=-1),
         degrees_of_freedom=float(df),
         degenerate=degenerate,
         unbounded=unbounded & ~degenerate,
@@ -226,14 +224,6 @@ class Term(NamedTuple):
         return 0.0 if abs(weight) <= ROUNDING * (1.0 + abs(self.in_num)) else weight
 
 
-class _Difference(NamedTuple):
-    """mean(D), its squared standard error and Welch's degrees of freedom at one value of theta."""
-
-    mean: float
-    variance: float
-    degrees_of_freedom: float
-
-
 def unpaired_ratio(
     terms: Sequence[Term], *, offset: float = 0.0, threshold: float = 0.0, confidence: float = 0.95
 ) -> RatioTest:
@@ -249,28 +239,26 @@ def unpaired_ratio(
     mean_den = sum(term.in_den * float(term.sample.mean()) for term in terms)
     value = sum(term.in_num * float(term.sample.mean()) for term in terms) / mean_den
     null = threshold - offset
-    at_null = _difference(terms, null)
+    mean, variance, df = _difference(terms, null)
     scale = sum(
         (abs(term.in_num) + abs(null * term.in_den)) * float(term.sample.max()) for term in terms
     )
-    degenerate = math.sqrt(at_null.variance) <= ROUNDING * scale
+    degenerate = math.sqrt(variance) <= ROUNDING * scale
     if degenerate:
         p_value, low, high = 1.0, -math.inf, math.inf
         # No spread leaves no Welch formula; the smallest sample bounds it from below.
         df = float(min(term.sample.size for term in terms) - 1)
     else:
-        df = at_null.degrees_of_freedom
-        p_value = 2.0 * float(stdtr(df, -abs(at_null.mean) / math.sqrt(at_null.variance)))
+        p_value = 2.0 * float(stdtr(df, -abs(mean) / math.sqrt(variance)))
         low, high = _limits(terms, value, mean_den, 0.5 + confidence / 2)
     n = min(term.sample.size for term in terms)
     return RatioTest(
         value=np.asarray(value + offset),
         low=np.asarray(low + offset),
         high=np.asarray(high + offset),
-        probability=probability_of(np.asarray(p_value), np.asarray(at_null.mean)),
+        probability=probability_of(np.asarray(p_value), np.asarray(mean)),
         p_value=np.asarray(p_value),
-        difference_sd=np.asarray(0.0 if degenerate else math.sqrt(at_null.variance * n)),
-        mean_denominator=np.asarray(mean_den),
+        difference_sd=np.asarray(0.0 if degenerate else math.sqrt(variance * n)),
         degrees_of_freedom=df,
         degenerate=np.asarray(degenerate),
         unbounded=np.asarray(math.isinf(low) and not degenerate),
@@ -278,7 +266,8 @@ def unpaired_ratio(
     )
 
 
-def _difference(terms: Sequence[Term], theta: float) -> _Difference:
+def _difference(terms: Sequence[Term], theta: float) -> tuple[float, float, float]:
+    """Return mean(D), its squared standard error and Welch's degrees of freedom at one theta."""
     mean, variance, welch = 0.0, 0.0, 0.0
     for term in terms:
         sample, weight = term.sample, term.weight(theta)
@@ -286,7 +275,7 @@ def _difference(terms: Sequence[Term], theta: float) -> _Difference:
         mean += weight * float(sample.mean())
         variance += share
         welch += share**2 / (sample.size - 1)
-    return _Difference(mean, variance, variance**2 / welch if welch > 0.0 else math.inf)
+    return mean, variance, variance**2 / welch if welch > 0.0 else math.inf
 
 
 def _limits(
@@ -303,12 +292,10 @@ def _limits(
         return abs(mean) - float(stdtrit(df, quantile)) * math.sqrt(variance)
 
     # Far out only the denominator's sample is left; the interval ends if its mean is clear of 0.
-    far = _difference([Term(sample, in_den, 0.0) for sample, _, in_den in terms], 0.0)
-    if far.variance > 0.0 and mean_den <= float(
-        stdtrit(far.degrees_of_freedom, quantile)
-    ) * math.sqrt(far.variance):
+    _, far, df = _difference([Term(sample, in_den, 0.0) for sample, _, in_den in terms], 0.0)
+    if far > 0.0 and mean_den <= float(stdtrit(df, quantile)) * math.sqrt(far):
         return -math.inf, math.inf
-    spread = math.sqrt(_difference(terms, value).variance) / mean_den
+    spread = math.sqrt(_difference(terms, value)[1]) / mean_den
     if spread == 0.0:
         return value, value
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .inputs import IndicatorError, Numbers
-from .trials_table import Table, read_table
+from .trials_table import Row, read_rows
 
 NO_FAULT = "none"
 REMOVED = "removed"
@@ -139,141 +138,140 @@ def read_trials(
             value.
     """
     path = Path(path)
-    table, content = read_table(path, dict(columns or {}), tuple(ignore), decimal)
-    rows = _events(table, duration) if "time" in table.places else _runs(table, duration)
-    if not rows:
-        raise IndicatorError(f"{path} holds no trial: should have a row for each below the names")
-    _check_pairing(path, rows)
-    _check_durations(path, rows)
-    return Trials(path.name, hashlib.sha256(content).hexdigest()[:16], tuple(rows), table.notes)
+    rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
+    varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
+    spelled: dict[str, str] = {}  # each fault in small letters to how its first row has it
+    faults = dict.fromkeys(row.text("fault") for row in rows)
+    for name in faults:
+        spelled.setdefault(name.casefold(), name)
+    trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
+    found = _events(path, trials) if "time" in rows[0].names else _runs(path, trials)
+    _check_pairing(path, found)
+    _check_durations(path, found)
+    notes = (
+        f"The faults {spelled[name.casefold()]} and {name} are taken for one."
+        for name in faults
+        if name not in spelled.values()
+    )
+    return Trials(path.name, digest, tuple(found), tuple(notes))
 
 
-def _runs(table: Table, duration: float | None) -> list[Trial]:
-    if "performance" not in table.places:
-        raise IndicatorError(
-            f"{table.path} has no column 'performance', or time, for one delivery a row: it has "
-            f"{', '.join(map(repr, table.header))}; say which it is by --column performance=NAME"
-        )
-    rows: list[Trial] = []
-    labels: dict[object, int] = {}
-    for line in range(len(table.rows)):
-        trial = _trial(table, line, duration, table.number(line, "performance", least=0.0))
-        label = table.text(line, "trial")
-        if label and (first := labels.setdefault((trial.condition, label), line)) != line:
-            raise table.error(
-                line, "trial", f"is in line {table.lines[first]} too: should name one run a row"
-            )
-        rows.append(trial)
-    return rows
-
-
-def _events(table: Table, duration: float | None) -> list[Trial]:
-    if "performance" in table.places:
-        raise IndicatorError(
-            f"{table.path} has a column of times and one of performance: should have one of them; "
-            "ignore the other"
-        )
-    if "trial" not in table.places and "seed" not in table.places:
-        raise IndicatorError(
-            f"{table.path} has no column trial or seed: should say which run a delivery belongs to"
-        )
-    runs: dict[object, list[tuple[Trial, float | None]]] = {}
-    for line in range(len(table.rows)):
-        trial = _trial(table, line, duration, 0.0)
-        time = table.number(line, "time", least=0.0) if table.text(line, "time") else None
-        if time is not None and trial.duration is not None and time > trial.duration:
-            raise table.error(line, "time", f"should not be after its duration {trial.duration:g}")
-        if trial.onset and trial.duration is None:
-            raise table.error(
-                line,
-                "duration",
-                "should say when a trial ends [s], as a fault begins during it; "
-                "a column of it, or --duration SECONDS",
-            )
-        key = (trial.condition, trial.seed, table.text(line, "trial"))
-        runs.setdefault(key, []).append((trial, time))
-    found = []
-    for deliveries in runs.values():
-        times = tuple(sorted(time for _, time in deliveries if time is not None))
-        found.append(replace(deliveries[0][0], times=times, performance=float(len(times))))
-    return found
-
-
-def _trial(table: Table, line: int, duration: float | None, performance: float) -> Trial:
-    n_robots = table.whole(line, "n_robots", least=1)
-    fault, faulty = table.text(line, "fault"), table.whole(line, "faulty", least=0) or 0
-    fault = _FAULT_NAMES.get(fault.lower(), table.spellings[fault.casefold()])
+def _trial(
+    row: Row, spelled: Mapping[str, str], varying: Sequence[str], duration: float | None
+) -> Trial:
+    """Return the trial of a row, without performance and times."""
+    n_robots = row.whole_or_none("n_robots", 1)
+    fault, faulty = row.text("fault"), row.whole_or_none("faulty", 0) or 0
+    fault = _FAULT_NAMES.get(fault.lower(), spelled[fault.casefold()])
     is_fault = fault not in (NO_FAULT, REPEATED)
+    onset = row.number_or_none("onset", 0.0) or 0.0
+    if row.text("duration"):
+        duration = row.number("duration", 0.0)
     if is_fault and not faulty:
-        raise table.error(line, "faulty", f"should be how many robots fail by {fault!r}, 1 or more")
+        raise row.error("faulty", f"should be how many robots fail by {fault!r}, 1 or more")
     if faulty and not is_fault:
-        raise table.error(line, "faulty", "should be 0 without a fault, or the fault be named")
+        raise row.error("faulty", "should be 0 without a fault, or the fault be named")
     if is_fault and n_robots is None:
-        raise table.error(line, "n_robots", "should be the swarm's size, or R is undefined")
+        raise row.error("n_robots", "should be the swarm's size, or R is undefined")
     if n_robots is not None and faulty >= n_robots:
-        raise table.error(line, "faulty", f"should be less than the {n_robots} robots")
-    onset = table.number(line, "onset", least=0.0) if table.text(line, "onset") else 0.0
-    if table.text(line, "duration"):
-        duration = table.number(line, "duration", least=0.0)
+        raise row.error("faulty", f"should be less than the {n_robots} robots")
     if duration is not None and onset >= duration:
-        raise table.error(line, "onset", f"should be before the trial ends at {duration:g} s")
+        raise row.error("onset", f"should be before the trial ends at {duration:g} s")
     return Trial(
-        table.lines[line],
-        table.text(line, "policy") or "recorded",
-        table.text(line, "table"),
+        row.line,
+        row.text("policy") or "recorded",
+        row.text("table"),
         n_robots,
         fault,
         faulty,
         # Without a fault nothing fails at any time, whatever the column says.
         onset if is_fault else 0.0,
-        table.parameters(line),
-        table.whole(line, "seed", least=0),
-        performance,
+        tuple((name, row.number(name)) for name in varying),
+        row.whole_or_none("seed", 0),
+        0.0,
         duration=duration,
     )
 
 
+def _runs(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
+    first = rows[0][1]
+    if "performance" not in first.names:
+        raise IndicatorError(
+            f"{path} has no column 'performance', or time, for one delivery a row: it has "
+            f"{', '.join(map(repr, first.cells))}; say which it is by --column performance=NAME"
+        )
+    labels: dict[object, int] = {}
+    for trial, row in rows:
+        label = row.text("trial")
+        if label and (line := labels.setdefault((trial.condition, label), row.line)) != row.line:
+            raise row.error("trial", f"is in line {line} too: should name one run a row")
+    return [replace(trial, performance=row.number("performance", 0.0)) for trial, row in rows]
+
+
+def _events(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
+    names = rows[0][1].names
+    if "performance" in names:
+        raise IndicatorError(
+            f"{path} has a column of times and one of performance: should have one of them; "
+            "ignore the other"
+        )
+    if "trial" not in names and "seed" not in names:
+        raise IndicatorError(
+            f"{path} has no column trial or seed: should say which run a delivery belongs to"
+        )
+    runs: dict[object, tuple[Trial, list[float]]] = {}
+    for trial, row in rows:
+        time = row.number_or_none("time", 0.0)
+        if time is not None and trial.duration is not None and time > trial.duration:
+            raise row.error("time", f"should not be after its duration {trial.duration:g}")
+        if trial.onset and trial.duration is None:
+            raise row.error(
+                "duration",
+                "should say when a trial ends [s], as a fault begins during it; "
+                "a column of it, or --duration SECONDS",
+            )
+        key = (trial.condition, trial.seed, row.text("trial"))
+        runs.setdefault(key, (trial, []))[1].extend([] if time is None else [time])
+    return [
+        replace(trial, times=tuple(sorted(times)), performance=float(len(times)))
+        for trial, times in runs.values()
+    ]
+
+
 def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
     """Refuse seeds that do not pair the runs of all conditions one to one."""
-    seeded = [row for row in rows if row.seed is not None]
-    if not seeded:
+    bare = next((row for row in rows if row.seed is None), None)
+    everywhere = {row.seed for row in rows if row.seed is not None}
+    if not everywhere:
         return
-    if len(seeded) < len(rows):
-        bare = next(row for row in rows if row.seed is None)
+    if bare is not None:
         raise IndicatorError(
             f"{path}, line {bare.line}: has no seed, as other rows have: give every run one, or "
             "leave the column out"
         )
     conditions: dict[object, dict[int | None, Trial]] = {}
-    for row in seeded:
+    for row in rows:
         of_seed = conditions.setdefault(row.condition, {})
-        if row.seed in of_seed:
+        if (first := of_seed.setdefault(row.seed, row)) is not row:
             raise IndicatorError(
-                f"{path}, line {row.line}: has seed {row.seed} like line {of_seed[row.seed].line}, "
+                f"{path}, line {row.line}: has seed {row.seed} like line {first.line}, "
                 "two rows of one seed in one condition: should be one, or leave the column out"
             )
-        of_seed[row.seed] = row
-    everywhere = {row.seed for row in seeded}
     for of_seed in conditions.values():
-        if set(of_seed) != everywhere:
-            lacking = min(seed for seed in everywhere if seed is not None and seed not in of_seed)
+        if lacking := everywhere.difference(of_seed):
             raise IndicatorError(
                 f"{path}, line {min(row.line for row in of_seed.values())}: its condition has no "
-                f"run of seed {lacking}: give every condition the same seeds, or leave the column "
-                "out"
+                f"run of seed {min(lacking)}: give every condition the same seeds, or leave the "
+                "column out"
             )
 
 
 def _check_durations(path: Path, rows: Sequence[Trial]) -> None:
-    first = rows[0]
     for row in rows:
-        if row.duration != first.duration:
+        if row.duration != rows[0].duration:
+            told = ("nothing" if r.duration is None else f"{r.duration:g}" for r in (row, rows[0]))
             raise IndicatorError(
-                f"{path}, line {row.line}: has duration {_told(row.duration)}, line {first.line} "
-                f"{_told(first.duration)}: runs compared should be of one length; else let P be a "
-                "rate, and leave the column out"
+                f"{path}, line {row.line}: has duration {next(told)}, line {rows[0].line} "
+                f"{next(told)}: runs compared should be of one length; else let P be a rate, and "
+                "leave the column out"
             )
-
-
-def _told(duration: float | None) -> str:
-    return "nothing" if duration is None else f"{duration:g}"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import difflib
+import hashlib
 import math
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from .inputs import IndicatorError
@@ -33,107 +33,63 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
-class Table:
-    """The cells of a file, found by what their column is.
+class Row:
+    """One row of a file.
 
     Attributes:
-        path: of the file.
-        header: the columns' names as the file has them.
-        places: number of each known column by what it is (a key of `NAMES`).
-        others: numbers of the columns that may be parameters.
-        rows, lines: the cells, and the line that each row ends in.
+        place: file and line.
+        line: that it ends in.
+        cells: by the name of the column in the file.
+        names: what a column is (a key of `NAMES`) to its name in the file.
         decimal: the sign before decimals.
     """
 
-    path: Path
-    header: tuple[str, ...]
-    places: dict[str, int]
-    others: tuple[int, ...]
-    rows: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
-    decimal: str = "."
+    place: str
+    line: int
+    cells: Mapping[str, str]
+    names: Mapping[str, str]
+    decimal: str
 
-    def text(self, row: int, column: str) -> str:
+    def text(self, column: str) -> str:
         """Return a cell; empty where there is none."""
-        return self.rows[row][self.places[column]] if column in self.places else ""
+        return self.cells.get(self.names.get(column, column), "")
 
-    def number(self, row: int, column: str, *, least: float = -math.inf) -> float:
+    def number(self, column: str, least: float = -math.inf, *, whole: bool = False) -> float:
         """Return a cell as a finite number of at least `least`."""
-        return self._number(row, self.places[column], least)
+        cell = self.text(column)
+        plain = cell if self.decimal == "." else cell.replace(".", " ").replace(self.decimal, ".")
+        value = float(plain) if _NUMBER.fullmatch(plain) else math.inf
+        if math.isfinite(value) and value >= least and (not whole or value.is_integer()):
+            return value
+        should = f"should be a {'whole ' * whole}number"
+        should += f", {least:g} or more" if math.isfinite(least) else ""
+        if "," in cell and self.decimal == ".":
+            should += " without a sign between thousands; --decimal , where decimals have a comma"
+        elif column not in NAMES:
+            should += f", as every column that varies is a parameter; else --ignore {column!r}"
+        raise self.error(column, should)
 
-    def whole(self, row: int, column: str, *, least: int) -> int | None:
-        """Return a cell as a whole number of at least `least`; None: it is empty or not there."""
-        if not (cell := self.text(row, column)):
-            return None
-        value = self._parsed(cell)
-        if value is None or not (value >= least and value == int(min(value, 1e15))):
-            raise self.error(row, column, f"should be a whole number, {least} or more")
-        return int(value)
+    def number_or_none(self, column: str, least: float) -> float | None:
+        """Return a cell as a number; None: it is empty or not there."""
+        return self.number(column, least) if self.text(column) else None
 
-    def parameters(self, row: int) -> tuple[tuple[str, float], ...]:
-        """Return name and value of every other column that varies over the file."""
-        return tuple((self.header[place], self._number(row, place)) for place in self._varying)
+    def whole_or_none(self, column: str, least: float) -> int | None:
+        """Return a cell as a whole number; None: it is empty or not there."""
+        return int(self.number(column, least, whole=True)) if self.text(column) else None
 
-    def error(self, row: int, column: str, should: str) -> IndicatorError:
+    def error(self, column: str, should: str) -> IndicatorError:
         """Return the error that a cell cannot be."""
-        if column not in self.places:
-            return IndicatorError(
-                f"{self.path}, line {self.lines[row]}: {column} is missing: {should}"
-            )
-        return self._error(row, self.places[column], should)
-
-    def _error(self, row: int, place: int, should: str) -> IndicatorError:
-        cell = self.rows[row][place]
-        return IndicatorError(
-            f"{self.path}, line {self.lines[row]}, column {self.header[place]!r}: "
-            f"{repr(cell) if cell else 'nothing'}: {should}"
-        )
-
-    def _number(self, row: int, place: int, least: float = -math.inf) -> float:
-        value = self._parsed(self.rows[row][place])
-        if value is None or value < least:
-            bound = f", {least:g} or more" if math.isfinite(least) else ""
-            hint = ""
-            if value is None and "," in self.rows[row][place]:
-                hint = " without a sign between thousands; --decimal , where decimals have a comma"
-            elif value is None and place in self.others:
-                hint = ", as every column that varies is a parameter; else --ignore " + repr(
-                    self.header[place]
-                )
-            raise self._error(row, place, f"should be a number{bound}{hint}")
-        return value
-
-    def _parsed(self, cell: str) -> float | None:
-        if self.decimal != ".":
-            cell = cell.replace(".", " ").replace(self.decimal, ".")
-        value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
-        return value if math.isfinite(value) else None
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences on faults that are spelled in several ways and taken for one."""
-        faults = dict.fromkeys(self.text(row, "fault") for row in range(len(self.rows)))
-        others = (name for name in faults if name != self.spellings[name.casefold()])
-        return tuple(
-            f"The faults {self.spellings[name.casefold()]} and {name} are taken for one."
-            for name in others
-        )
-
-    @cached_property
-    def spellings(self) -> dict[str, str]:
-        """Each fault in small letters to the way in which its first row has it."""
-        faults = [self.text(row, "fault") for row in range(len(self.rows))]
-        return {fault.casefold(): fault for fault in reversed(faults)}
-
-    @cached_property
-    def _varying(self) -> tuple[int, ...]:
-        return tuple(place for place in self.others if len({row[place] for row in self.rows}) > 1)
+        name, cell = self.names.get(column, column), self.text(column)
+        if name not in self.cells:
+            return IndicatorError(f"{self.place}: {column} is missing: {should}")
+        shown = repr(cell) if cell else "nothing"
+        return IndicatorError(f"{self.place}, column {name!r}: {shown}: {should}")
 
 
-def read_table(
-    path: Path, columns: dict[str, str], ignore: tuple[str, ...], decimal: str
-) -> tuple[Table, bytes]:
-    """Return the table in a file, and the file's bytes.
+def read_rows(
+    path: Path, columns: Mapping[str, str], ignore: Sequence[str], decimal: str
+) -> tuple[list[Row], list[str], str]:
+    """Return the rows of a file, the columns that may be parameters, and the file's digest.
 
     Args:
         columns: what a column is (a word of `NAMES`) to its name in the file.
@@ -141,10 +97,22 @@ def read_table(
         decimal: the sign before decimals, "." or ",".
 
     Raises:
-        IndicatorError: the file cannot be read or is no such table, or a column is not there.
+        IndicatorError: the file cannot be read, holds no row or is no such table, or a column is
+            not there.
     """
     if decimal not in (".", ","):
         raise IndicatorError(f"--decimal {decimal}: should be . or ,")
+    lines, digest = _lines(path)
+    header, cells = _cells(path, lines)
+    names, others = _columns(path, header, columns, ignore)
+    if not cells:
+        raise IndicatorError(f"{path} holds no trial: should have a row for each below the names")
+    rows = [Row(f"{path}, line {line}", line, row, names, decimal) for line, row in cells]
+    return rows, others, digest
+
+
+def _lines(path: Path) -> tuple[list[str], str]:
+    """Return the lines of a file and the digest of its content."""
     try:
         content = path.read_bytes()
         text = content.decode("utf-8-sig")
@@ -162,6 +130,11 @@ def read_table(
                     f"{path}, line {number}: holds {sign!r}: should be plain text, without control "
                     "signs"
                 )
+    return lines, hashlib.sha256(content).hexdigest()[:16]
+
+
+def _cells(path: Path, lines: list[str]) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
+    """Return the columns' names, and line and cells by these names of every row with any."""
     # Spreadsheets may say the delimiter in a first line such as "sep=;".
     empty = ("", "sep=;", "sep=,", "sep=")
     start = next((n for n, line in enumerate(lines) if line.strip().lower() not in empty), None)
@@ -169,64 +142,59 @@ def read_table(
         raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
     delimiter = max(";\t,", key=lines[start].count)
     reader = csv.reader(lines[start:], delimiter=delimiter, skipinitialspace=True)
-    rows, numbers = [], []
+    rows = []
     try:
-        header = tuple(cell.strip() for cell in next(reader))
-        for cells in reader:
-            stripped = tuple(cell.strip() for cell in cells)
-            number = start + reader.line_num
-            if not any(stripped):
-                continue
-            if any(stripped[len(header) :]):
+        header = [cell.strip() for cell in next(reader)]
+        for values in reader:
+            cells = [cell.strip() for cell in values]
+            line = start + reader.line_num
+            if any(cells[len(header) :]):
                 raise IndicatorError(
-                    f"{path}, line {number}: has {len(stripped)} values, more values than the "
+                    f"{path}, line {line}: has {len(cells)} values, more values than the "
                     f"{len(header)} columns: if decimals have a comma, put ; between the columns"
                 )
-            rows.append((*stripped, *("",) * (len(header) - len(stripped)))[: len(header)])
-            numbers.append(number)
+            if any(cells):
+                rows.append((line, dict.fromkeys(header, "") | dict(zip(header, cells))))
     except csv.Error as error:
         raise IndicatorError(f"{path} is not a CSV file: {error}") from error
-    places, others = _columns(path, header, columns, ignore)
-    return Table(path, header, places, others, tuple(rows), tuple(numbers), decimal), content
+    return header, rows
 
 
 def _columns(
-    path: Path, header: tuple[str, ...], columns: dict[str, str], ignore: tuple[str, ...]
-) -> tuple[dict[str, int], tuple[int, ...]]:
-    """Return where each known column is, and which columns are left as parameters."""
+    path: Path, header: Sequence[str], columns: Mapping[str, str], ignore: Sequence[str]
+) -> tuple[dict[str, str], list[str]]:
+    """Return the name of each known column, and the columns that are left as parameters."""
     for column in columns:
         if column not in _MEANING:
             raise IndicatorError(f"--column {column}: {_one_of(column, _MEANING)}")
-    columns = {_MEANING[column]: name for column, name in columns.items()}
     for name in (*columns.values(), *ignore):
         if name not in header:
             raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, header)}")
+    names = {_MEANING[column]: name for column, name in columns.items()}
+    given, others = {*names}, []
     for name in header:
-        if name and header.count(name) > 1:
-            raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
-    places = {column: header.index(name) for column, name in columns.items()}
-    others = []
-    for place, name in enumerate(header):
         if not name or name in ignore or name in columns.values():
             continue
+        if header.count(name) > 1:
+            raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
         word = _word(name)
         known = _MEANING.get(word)
-        if known is None or known in columns:
+        if known is None or (known in given and name not in NAMES):
             close = difflib.get_close_matches(word, _MEANING, n=1, cutoff=0.75)
             if close and known is None and len(word) > 3:
                 raise IndicatorError(
                     f"{path} has a column {name!r}; did you mean {close[0]!r}? Else rename it, or "
                     f"leave it out by --ignore {name!r}"
                 )
-            others.append(place)
-        elif known in places:
+            others.append(name)
+        elif known in names:
             raise IndicatorError(
-                f"{path} has columns {header[places[known]]!r} and {name!r}, both {known}: say "
+                f"{path} has columns {names[known]!r} and {name!r}, both {known}: say "
                 f"which it is by --column {known}=NAME, and leave the other out by --ignore NAME"
             )
         else:
-            places[known] = place
-    return places, tuple(others)
+            names[known] = name
+    return names, others
 
 
 def _word(name: str) -> str:

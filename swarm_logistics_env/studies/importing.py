@@ -15,8 +15,8 @@ from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials, read_trials
-from swarm_logistics_env.tasks.recorded_trials import RECORDED, RecordedFault, RecordedScenario
 from swarm_logistics_env.tasks.task import Case, Outcome
+from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
 from .comparison import OTHER_BEHAVIOUR, Arm, Comparison, Setting
 from .declaration import Declaration, Origin, note

@@ -65,6 +65,9 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         rows: number of each agent in the whole swarm, by name; None: its place in
             `possible_agents`.
 
+    Attributes:
+        given: what the environment itself let each agent observe, before any failure changed it.
+
     Raises:
         FaultError: a fault's mode is not among `failures`, or more robots fail than there are.
         SetupError: "noisy" meets observations that are no floats.
@@ -132,6 +135,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         return action
 
     def _observed(self, observations: dict[str, Value]) -> dict[str, Value]:
+        self.given = observations
         return {agent: self._sensed(agent, value) for agent, value in observations.items()}
 
     def _sensed(self, agent: str, value: Value) -> Value:

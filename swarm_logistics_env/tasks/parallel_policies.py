@@ -55,10 +55,8 @@ def agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str |
             f"the environment of {len(present)} robots has {len(names)} agents: should have as "
             "many, see the task's `size`"
         )
-    agents: list[str | None] = [None] * n_robots
-    for row, name in zip(present, names):
-        agents[row] = name
-    return agents
+    agents = dict(zip(present, names))
+    return [agents.get(row) for row in range(n_robots)]
 
 
 def observation_rows(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
 from dataclasses import replace
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import ClassVar
 
 import numpy as np
 from gymnasium.spaces import flatten
-from pettingzoo.utils.wrappers import BaseParallelWrapper
 from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
 from swarm_logistics_env.errors import FaultError, StudyError, SwarmLogisticsError, suggest
@@ -43,15 +43,20 @@ ENVIRONMENT_SOURCES = (
     "tasks/parallel_policies.py",
     "tasks/parallel_task.py",
 )
-_environments: dict[str, str] = {}
+_codes: dict[str, str] = {}  # of tasks by their settings: one process answers once
 
-NEEDS = {
-    "silent": "the action that counts as none",
-    "noisy": "a standard deviation above 0, in the observations' own units",
-    REMOVED: "the name of the factory's argument that takes the numbers of the robots to leave out",
+# By failure mode: whether a value is what it needs, and what that is.
+NEEDS: dict[str, tuple[Callable[[Value], bool], str]] = {
+    "silent": (lambda value: value is not None, "the action that counts as none"),
+    "noisy": (
+        lambda value: isinstance(value, int | float) and value > 0,
+        "a standard deviation above 0, in the observations' own units",
+    ),
+    REMOVED: (
+        lambda value: isinstance(value, str),
+        "the name of the factory's argument that takes the numbers of the robots to leave out",
+    ),
 }
-
-
 _REWARDS = SumOfRewards()
 
 
@@ -145,13 +150,27 @@ class ParallelTask:
         The code is the modules of the factory, of the performance and of their own package as far
         as they import it; the libraries are those that the environment's classes come from.
         """
-        settings = (
+        settings = repr((
             name_of(self._make_env), self._size, name_of(self._gain), self._references,
             self._failures, self._period, self.default,
-        )  # fmt: skip
-        return environment_version(
-            repr(settings), (self._make_env, self._gain), lambda: self._made(self.default, ())
-        )
+        ))  # fmt: skip
+        if settings not in _codes:
+            package = Path(__file__).parents[1]
+            digest = hashlib.sha256(settings.encode())
+            for name in ENVIRONMENT_SOURCES:
+                digest.update(without_prose((package / name).read_text(encoding="utf-8")).encode())
+            for function in (self._make_env, self._gain):
+                digest.update(function_digest(function).encode())
+            with closing(self._made(self.default, ())) as env:
+                classes = type(env.unwrapped).__mro__
+            modules = {kind.__module__.partition(".")[0] for kind in classes}
+            modules.discard(package.name)  # its own code is known by its sources
+            installed = packages_distributions()
+            names = sorted({name for module in modules for name in installed.get(module, ())})
+            versions = ", ".join(f"{name} {version(name)}" for name in names)
+            digest.update(versions.encode())
+            _codes[settings] = f"{digest.hexdigest()[:16]} ({versions})"
+        return _codes[settings]
 
     def vary(self, base: TaskScenario, fields: Fields) -> ParallelScenario:
         """Return a scenario with some fields changed.
@@ -184,28 +203,33 @@ class ParallelTask:
                 f"task {self.name}: robots are removed from the start, not from {onset:g} s on, so "
                 'FT is not defined here: should be asked for R alone, indicators = ["R"]'
             )
-        return RobotFault(mode=mode, robots=robots, onset=onset, duration=duration).replace(
-            **manner
-        )
+        return RobotFault(mode=mode, robots=robots, onset=onset, duration=duration, **manner)
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one run; see `Task.play`."""
         scenario, n_robots = case.scenario, case.scenario.n_robots
         assert isinstance(scenario, ParallelScenario)
         faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
-        absent = {
-            row
-            for fault in faults
-            if fault.mode == REMOVED
-            for row in failing_rows(seed, n_robots, fault.robots)
-        }
+
+        def failing(faults: Iterable[RobotFault]) -> tuple[int, ...]:
+            """Return which robots any of these faults names: the sets of one seed are nested."""
+            return failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
+
+        absent = failing(fault for fault in faults if fault.mode == REMOVED)
         player: Value = case.policy.load(self.policies)
-        env = self._made(scenario, tuple(sorted(absent)))
-        try:
+        digest = hashlib.blake2b(digest_size=16)
+        gains: list[float] = []
+
+        def add(observations: Mapping[str, Value], rewards: Mapping[str, Value]) -> None:
+            for agent in sorted(observations):
+                space = env.observation_space(agent)
+                digest.update(np.asarray(flatten(space, observations[agent])).tobytes())
+            digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
+
+        with closing(self._made(scenario, absent)) as env:
             agents = agents_by_row(env, n_robots, absent)
-            recorded = _Recorded(env)
-            failing = FailingRobots(
-                recorded,
+            broken = FailingRobots(
+                env,
                 [fault for fault in faults if fault.mode != REMOVED],
                 self._failures,
                 self._period,
@@ -215,20 +239,20 @@ class ParallelTask:
                 player.configure(env, agents)
             if hasattr(player, "reset"):
                 player.reset(n_robots, policy_seed)
-            observations, _ = failing.reset(seed=seed)
-            gains: list[float] = []
+            observations, _ = broken.reset(seed=seed)
+            add(broken.given, {})
             for _ in range(max(1, round(scenario.duration / self._period))):
                 if not env.agents:
                     break
                 actions = player.act(observation_rows(env, agents, observations))
-                observations, rewards, _, _, infos = failing.step(
+                observations, rewards, _, _, infos = broken.step(
                     agent_actions(env, agents, actions)
                 )
+                add(broken.given, rewards)
                 gains.append(float(self._gain(env, rewards, infos)))
-        finally:
-            env.close()
-        most = max((fault.robots for fault in faults), default=0)
-        return self._outcome(gains, recorded.digest(gains), failing_rows(seed, n_robots, most))
+        # What P counts need be in no observation and no reward.
+        digest.update(np.array(gains).tobytes())
+        return self._outcome(gains, digest.hexdigest(), failing(faults))
 
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
@@ -266,80 +290,13 @@ class ParallelTask:
         return int(value)
 
     def _refuse(self) -> None:
-        needed: dict[str, Callable[[Value], bool]] = {
-            "silent": lambda value: value is not None,
-            "noisy": lambda value: isinstance(value, int | float) and value > 0,
-            REMOVED: lambda value: isinstance(value, str),
-        }
         for mode, value in self._failures.items():
             if mode not in FAILURE_MODES:
                 raise StudyError(f"failures: no mode {mode!r}{suggest(mode, FAILURE_MODES)}")
-            if mode in needed and not needed[mode](value):
-                raise StudyError(f"failures[{mode!r}] = {value!r}: should be {NEEDS[mode]}")
+            holds, needed = NEEDS.get(mode, (lambda _: True, ""))
+            if not holds(value):
+                raise StudyError(f"failures[{mode!r}] = {value!r}: should be {needed}")
         if self._references is not None and self._references[0] == self._references[1]:
             raise StudyError(f"references = {self._references}: should be two different scores")
         if not self._period > 0:
             raise StudyError(f"period = {self._period}: should be above 0 s")
-
-
-class _Recorded(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
-    """Digests what the environment itself gives, before any failure changes it."""
-
-    def __init__(self, env: Env) -> None:
-        super().__init__(env)
-        self._hash = hashlib.blake2b(digest_size=16)
-
-    def reset(
-        self, seed: int | None = None, options: dict[str, Value] | None = None
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
-        observations, infos = self.env.reset(seed=seed, options=options)
-        self._add(observations, {})
-        return observations, infos
-
-    def step(self, actions: dict[str, Value]) -> tuple[dict[str, Value], ...]:
-        observations, rewards, *others = self.env.step(actions)
-        self._add(observations, rewards)
-        return observations, rewards, *others
-
-    def digest(self, gains: list[float]) -> str:
-        """Return 32 hexadecimal digits that equal runs share, whose steps gave these `gains`."""
-        # What P counts need be in no observation and no reward.
-        self._hash.update(np.array(gains).tobytes())
-        return self._hash.hexdigest()
-
-    def _add(self, observations: dict[str, Value], rewards: dict[str, Value]) -> None:
-        for agent in sorted(observations):
-            space = self.env.observation_space(agent)
-            self._hash.update(np.asarray(flatten(space, observations[agent])).tobytes())
-        self._hash.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
-
-
-def environment_version(
-    settings: str, functions: Iterable[Callable[..., Value]], make: Callable[[], Value]
-) -> str:
-    """Return a digest of what decides a run in a parallel environment, and its libraries' versions.
-
-    Args:
-        settings: of the task; one process answers once for the same settings.
-        functions: of the task, whose modules count.
-        make: makes the environment, whose classes tell which libraries it comes from.
-    """
-    if settings not in _environments:
-        package = Path(__file__).parents[1]
-        digest = hashlib.sha256(settings.encode())
-        for name in ENVIRONMENT_SOURCES:
-            digest.update(without_prose((package / name).read_text(encoding="utf-8")).encode())
-        for function in functions:
-            digest.update(function_digest(function).encode())
-        env = make()
-        try:
-            modules = {kind.__module__.partition(".")[0] for kind in type(env.unwrapped).__mro__}
-        finally:
-            env.close()
-        modules.discard(package.name)  # its own code is known by its sources
-        installed = packages_distributions()
-        names = sorted({name for module in modules for name in installed.get(module, ())})
-        versions = ", ".join(f"{name} {version(name)}" for name in names)
-        digest.update(versions.encode())
-        _environments[settings] = f"{digest.hexdigest()[:16]} ({versions})"
-    return _environments[settings]

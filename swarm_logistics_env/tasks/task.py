@@ -268,7 +268,7 @@ DEFAULT = "warehouse"
 NAMES = {
     DEFAULT: "swarm_logistics_env.tasks.warehouse_task:WAREHOUSE",
     "clearing": "swarm_logistics_env.tasks.warehouse_task:CLEARING",
-    "recorded trials": "swarm_logistics_env.tasks.recorded_trials:RECORDED",
+    "recorded trials": "swarm_logistics_env.tasks.warehouse_task:RECORDED",
 }
 
 

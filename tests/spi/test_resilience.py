@@ -17,26 +17,6 @@ def test_the_index_counts_deliveries_after_the_onset() -> None:
     assert (index.indicator, index.threshold, index.n_seeds) == ("resilience", 1.0, 2)
 
 
-BAD: list[tuple[Any, Any, str]] = [
-    ([], [[1.0]], "faulty is empty"),
-    ([[1.0]], [], "reference is empty"),
-    ([[1.0]], [[1.0], [2.0]], "unequal seed sets"),
-    ([[-1.0]], [[1.0]], r"faulty\[0\]"),
-    ([[1.0]], [[float("nan")]], r"reference\[0\]"),
-    ([[1.0]], [[[1.0]]], r"reference\[0\]"),
-    ([["late"]], [[1.0]], r"faulty\[0\] = \['late'\]: should be an array of numbers"),
-    ([[900.0]], [[10.0]], "mean of reference = 0"),
-]
-
-
-@pytest.mark.parametrize(("faulty", "reference", "message"), BAD)
-def test_bad_input_is_named(faulty: Any, reference: Any, message: str) -> None:
-    with pytest.raises(IndicatorError, match=message):
-        spi.resilience_index(faulty, reference, onset=100.0)
-    with pytest.raises(IndicatorError, match="onset = nan"):
-        spi.resilience_index([[1.0]], [[1.0]], onset=float("nan"))
-
-
 ONSET, END = 1_000.0, 2_000.0
 
 
@@ -48,21 +28,6 @@ def test_each_run_is_timed_or_censored() -> None:
     assert back.tolist() == [True, True, False]
     assert seconds == pytest.approx([0, 200, 900], abs=6)  # followed until the last window begins
     assert spi.kaplan_meier(seconds, back).share == pytest.approx([2 / 3, 1 / 3])
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"faulty": [[1.0]]}, "unequal seed sets"),
-        ({"onset": END}, "onset = 2000"),
-        ({"window": 1_001.0}, "window = 1001"),
-        ({"window": float("nan")}, "window = nan"),
-    ],
-)
-def test_runs_that_cannot_be_timed_are_named(change: dict[str, Any], message: str) -> None:
-    runs: dict[str, Any] = {"faulty": [[1.0], [2.0]], "reference": [[1.0], [2.0]]}
-    with pytest.raises(IndicatorError, match=message):
-        spi.repair_times(**{**runs, "onset": ONSET, "end": END, **change})
 
 
 # 6-MP arm of Freireich et al. (1963), the textbook example; True: relapse seen
@@ -82,25 +47,42 @@ def test_textbook_curve() -> None:
     assert (spi.kaplan_meier(WEEKS, SEEN, confidence=0.99).low < curve.low).all()
 
 
-def test_without_censoring_it_is_the_share_left() -> None:
+def test_a_curve_without_censoring_and_one_without_events() -> None:
     curve = spi.kaplan_meier([3, 1, 2, 2], [True] * 4)
     assert curve.share == pytest.approx([0.75, 0.25, 0.0])
-    assert (curve.low[-1], curve.high[-1]) == (0.0, 1.0)
-    assert curve.median() == 2
-
-
-def test_no_event_leaves_an_empty_curve_without_median() -> None:
+    assert (curve.low[-1], curve.high[-1], curve.median()) == (0.0, 1.0, 2)
     curve = spi.kaplan_meier([900.0, 900.0], [False, False])
-    assert curve.seconds.size == 0
-    assert curve.median() is None
+    assert (curve.seconds.size, curve.median()) == (0, None)
 
 
-BAD_TIMES: list[tuple[Any, Any]] = [([], []), ([1.0], [True, False]), ([-1.0], [True]),
-                              ([float("nan")], [True]), ([float("inf")], [False]),
-                              (["late"], [True])]  # fmt: skip
-
-
-@pytest.mark.parametrize(("seconds", "happened"), BAD_TIMES)
-def test_bad_times_are_named(seconds: Any, happened: Any) -> None:
-    with pytest.raises(IndicatorError, match="seconds"):
-        spi.kaplan_meier(seconds, happened)
+@pytest.mark.parametrize(
+    ("function", "change", "message"),
+    [
+        (spi.resilience_index, {"faulty": []}, "faulty is empty"),
+        (spi.resilience_index, {"reference": []}, "reference is empty"),
+        (spi.resilience_index, {"faulty": [[1.0]]}, "unequal seed sets"),
+        (spi.resilience_index, {"faulty": [[-1.0], []]}, r"faulty\[0\]"),
+        (spi.resilience_index, {"reference": [[], [float("nan")]]}, r"reference\[1\]"),
+        (spi.resilience_index, {"reference": [[[1.0]], []]}, r"reference\[0\]"),
+        (spi.resilience_index, {"faulty": [["late"]]}, r"= \['late'\]: should be an array of num"),
+        (spi.resilience_index, {"reference": [[10.0], []]}, "mean of reference = 0"),
+        (spi.resilience_index, {"onset": float("nan")}, "onset = nan"),
+        (spi.repair_times, {"faulty": [[1.0]]}, "unequal seed sets"),
+        (spi.repair_times, {"onset": END, "end": END}, "onset = 2000"),
+        (spi.repair_times, {"end": END, "window": 1_001.0}, "window = 1001"),
+        (spi.repair_times, {"end": END, "window": float("nan")}, "window = nan"),
+        *(
+            (spi.kaplan_meier, {"seconds": seconds, "happened": happened}, "seconds")
+            for seconds, happened in (
+                ([], []), ([1.0], [True, False]), ([-1.0], [True]), ([float("nan")], [True]),
+                ([float("inf")], [False]), (["late"], [True]),
+            )
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_named(function: Any, change: dict[str, Any], message: str) -> None:
+    usual: dict[str, Any] = {"faulty": [[1.0], [2.0]], "reference": [[1.0], [2.0]], "onset": ONSET}
+    if function is spi.repair_times:
+        usual["end"] = END
+    with pytest.raises(IndicatorError, match=message):
+        function(**({} if function is spi.kaplan_meier else usual) | change)

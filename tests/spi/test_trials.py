@@ -3,46 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from swarm_logistics_env import spi
 
-# Semicolons, decimal commas, a unit, a fault of its own, no seeds.
+
+def read(tmp_path: Path, text: str, **asked: Any) -> spi.Trials:
+    path = tmp_path / "trials.csv"
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    return spi.read_trials(path, **asked)
+
+
+# Semicolons, decimal commas, a unit, a fault of its own, a note, no seeds.
 COMMAS = """trial;robots;fault;faulty;delivered;width [m];note
 1;8;none;;12,5;2;
-2;8;none;;11,25;2;
-3;8;none;;13;2;battery
-4;8;wheel;1;10,5;2;
-5;8;wheel;1;9,75;2;
-6;8;wheel;1;11,5;2;
-7;8;removed;1;10,0;2;
-8;8;removed;1;11,0;2;
-9;8;removed;1;10,25;2;
-10;8;none;;9,5;1,5;
-11;8;none;;10,5;1,5;
-12;8;none;;10,75;1,5;
-13;4;none;;6,5;2;
-14;4;none;;7,5;2;
-15;4;none;;6,25;2;
+2;8;none;;11,25;2;battery
+3;8;wheel;1;10,5;2;
+4;8;removed;1;10,0;2;
+5;8;none;;9,5;1,5;
 """
 
 
-def written(tmp_path: Path, text: str) -> Path:
-    path = tmp_path / "trials.csv"
-    path.write_bytes(text.encode(errors="surrogateescape"))
-    return path
-
-
 def test_a_file_with_decimal_commas_is_read(tmp_path: Path) -> None:
-    trials = spi.read_trials(written(tmp_path, COMMAS), ignore=["note"], decimal=",")
-    assert not trials.paired
-    assert len(trials.rows) == 15
+    trials = read(tmp_path, COMMAS, ignore=["note"], decimal=",")
+    assert (trials.paired, len(trials.rows)) == (False, 5)
     whole = {"n_robots": 8, "width [m]": 2.0}
-    assert trials.performance(fault="none", **whole).tolist() == [12.5, 11.25, 13.0]
-    assert trials.performance(fault="wheel", faulty=1).tolist() == [10.5, 9.75, 11.5]
-    assert trials.performance(fault="removed").tolist() == [10.0, 11.0, 10.25]
-    assert trials.performance(**{"width [m]": 1.5}).tolist() == [9.5, 10.5, 10.75]
+    assert trials.performance(fault="none", **whole).tolist() == [12.5, 11.25]
+    assert trials.performance(fault="wheel", faulty=1).tolist() == [10.5]
+    assert trials.performance(**{"width [m]": 1.5}).tolist() == [9.5]
     with pytest.raises(spi.IndicatorError, match="no trial with fault = 'wheal'"):
         trials.performance(fault="wheal")
 
@@ -58,29 +48,28 @@ def test_a_file_with_decimal_commas_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_spellings_of_one_file_read_alike(tmp_path: Path, text: str) -> None:
-    trials = spi.read_trials(written(tmp_path, text))
-    found = [(row.n_robots, row.fault, row.faulty, row.performance) for row in trials.rows]
+    rows = read(tmp_path, text).rows
+    found = [(row.n_robots, row.fault, row.faulty, row.performance) for row in rows]
     assert found == [(8, "none", 0, 10.5), (8, "stuck wheel", 2, 7.0)]
 
 
 def test_a_mode_is_one_mode_however_it_is_typed(tmp_path: Path) -> None:
-    path = tmp_path / "mine.csv"
-    path.write_text("robots,fault,faulty,p\n4,none,0,9\n4,Fm1,1,7\n4,FM1,1,6\n4,fm1,1,5\n")
-    trials = spi.read_trials(path)
+    trials = read(tmp_path, "robots,fault,faulty,p\n4,none,0,9\n4,Fm1,1,7\n4,FM1,1,6\n4,fm1,1,5\n")
     assert [row.fault for row in trials.rows] == ["none", "Fm1", "Fm1", "Fm1"]
     assert len({row.condition for row in trials.rows}) == 2
+    assert trials.notes[0] == "The faults Fm1 and FM1 are taken for one."
 
 
 def test_columns_of_other_names_are_mapped(tmp_path: Path) -> None:
-    text = "swarm,boxes,weather\n4,5,sun\n8,9,rain\n"
-    path = written(tmp_path, text)
     columns = {"performance": "boxes", "n_robots": "swarm"}
-    trials = spi.read_trials(path, columns=columns, ignore=["weather"])
-    assert [(row.n_robots, row.performance) for row in trials.rows] == [(4, 5.0), (8, 9.0)]
+    text = "swarm,boxes,weather,p\n4,5,sun,.5\n8,9,rain,.7\n"
+    rows = read(tmp_path, text, columns=columns, ignore=["weather"]).rows
+    assert [(row.n_robots, row.performance) for row in rows] == [(4, 5.0), (8, 9.0)]
+    assert [row.parameters for row in rows] == [(("p", 0.5),), (("p", 0.7),)]
 
 
 def test_seeds_pair_whatever_the_order(tmp_path: Path) -> None:
-    trials = spi.read_trials(written(tmp_path, "robots,seed,p\n4,7,1\n4,3,2\n8,3,30\n8,7,10\n"))
+    trials = read(tmp_path, "robots,seed,p\n4,7,1\n4,3,2\n8,3,30\n8,7,10\n")
     assert trials.paired
     assert trials.performance(n_robots=4).tolist() == [2, 1]
     assert trials.performance(n_robots=8).tolist() == [30, 10]
@@ -91,15 +80,15 @@ def test_an_event_log_counts_deliveries_and_keeps_their_times(tmp_path: Path) ->
         "trial,robots,fault,faulty,onset,time [s]\n"
         "1,4,none,0,,30.5\n1,4,none,0,,12.25\n2,4,none,0,,\n3,4,jam,1,20,50\n"
     )
-    trials = spi.read_trials(written(tmp_path, text), duration=60.0)
-    assert [row.times for row in trials.rows] == [(12.25, 30.5), (), (50.0,)]
-    assert [row.performance for row in trials.rows] == [2.0, 0.0, 1.0]
-    assert trials.rows[2].onset == 20.0
+    rows = read(tmp_path, text, duration=60.0).rows
+    assert [row.times for row in rows] == [(12.25, 30.5), (), (50.0,)]
+    assert [row.performance for row in rows] == [2.0, 0.0, 1.0]
+    assert rows[2].onset == 20.0
 
 
 def test_without_a_fault_an_onset_tells_no_conditions_apart(tmp_path: Path) -> None:
     text = "robots,fault,faulty,onset,p\n8,none,,,9\n8,none,,20,8\n8,jam,1,20,7\n8,jam,1,30,6\n"
-    rows = spi.read_trials(written(tmp_path, text)).rows
+    rows = read(tmp_path, text).rows
     assert [row.onset for row in rows] == [0.0, 0.0, 20.0, 30.0]
     assert len({row.condition for row in rows}) == 3
 
@@ -117,10 +106,7 @@ GOOD = "1,8,none,,10\n"
         ("trial,robots\n1,8\n", "has no column 'performance', or time"),
         (HEAD + GOOD + "2,8,none,,ten\n", "line 3, column 'delivered': 'ten': should be a number"),
         (HEAD + GOOD + "2,8,none,,\n", "line 3, column 'delivered': nothing: should be a number"),
-        (
-            HEAD + "1,8,none,,-2\n",
-            "line 2, column 'delivered': '-2': should be a number, 0 or more",
-        ),
+        (HEAD + "1,8,none,,-2\n", "line 2, column 'delivered': '-2': should be a number, 0 or"),
         (HEAD + "1,8,none,,inf\n", "line 2, column 'delivered': 'inf': should be a number"),
         (HEAD + "1,8,none,,12,5\n", "line 2: has 6 values, more values than the 5 columns"),
         (HEAD + GOOD + "2,8,jam,,7\n", "line 3, column 'faulty': nothing: should be how many"),
@@ -129,25 +115,19 @@ GOOD = "1,8,none,,10\n"
         (HEAD + GOOD + "2,8,jam,8,7\n", "column 'faulty': '8': should be less than the 8 robots"),
         (HEAD + GOOD + "2,,jam,1,7\n", "line 3, column 'robots': nothing: should be the swarm's"),
         (HEAD + GOOD + "1,8,none,,7\n", "line 3, column 'trial': '1': is in line 2 too"),
-        (
-            'robots,p\n4,"1,204"\n8,998\n',
-            "line 2, column 'p': '1,204': should be a number, 0 or more without a sign between",
-        ),
-        (
-            "robots;p\n4;1,5\n8;2.5\n",
-            "line 2, column 'p': '1,5': should be a number, 0 or more without",
-        ),
+        ('robots,p\n4,"1,204"\n8,998\n', "line 2, column 'p': '1,204': should be a number, 0 or"),
+        ("robots;p\n4;1,5\n8;2.5\n", "'1,5': should be a number, 0 or more without a sign between"),
         ("robots,fualt,p\n4,none,1\n", "has a column 'fualt'; did you mean 'fault'?"),
         ("robots,p,note\n4,1,a\n8,2,b\n", "line 2, column 'note': 'a': should be a number, as"),
         ("robots,p,items\n4,1,1\n", "has columns 'p' and 'items', both performance"),
         ("robots,p,p\n4,1,1\n", "has two columns 'p'"),
+        ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
+        ("robots,p\n0,1\n", "column 'robots': '0': should be a whole number, 1 or more"),
+        ("robots,onset,duration,p\n4,60,60,1\n", "'60': should be before the trial ends at 60 s"),
         ("robots,seed,p\n4,0,1\n8,,2\n", "line 3: has no seed"),
         ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
         ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n", "line 4: its condition has no run of seed 1"),
-        (
-            "robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n8,2,4\n",
-            "line 2: its condition has no run of",
-        ),
+        ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n8,2,4\n", "line 2: its condition has no run of"),
         ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: has duration 90, line 2 60"),
         ("robots,time\n4,1\n", "has no column trial or seed"),
         ("trial,robots,time,p\n1,4,1,1\n", "has a column of times and one of performance"),
@@ -164,23 +144,30 @@ GOOD = "1,8,none,,10\n"
 def test_a_broken_file_is_refused_by_line_column_and_remedy(
     tmp_path: Path, text: str, words: str
 ) -> None:
-    path = written(tmp_path, text)
     with pytest.raises(spi.IndicatorError) as caught:
-        spi.read_trials(path)
+        read(tmp_path, text)
     assert words in str(caught.value)
-    assert str(caught.value).startswith(str(path))
+    assert str(caught.value).startswith(str(tmp_path / "trials.csv"))
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, HEAD + GOOD)
-    for columns, ignore, words in (
-        ({"performanse": "delivered"}, (), "did you mean 'performance'?"),
-        ({"performance": "deliverd"}, (), "no column 'deliverd': did you mean 'delivered'?"),
-        ({}, ("faultz",), "no column 'faultz': did you mean 'fault'?"),
-    ):
-        with pytest.raises(spi.IndicatorError) as caught:
-            spi.read_trials(path, columns=columns, ignore=ignore)
-        assert words in str(caught.value)
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"columns": {"performanse": "delivered"}}, "did you mean 'performance'?"),
+        (
+            {"columns": {"performance": "deliverd"}},
+            "no column 'deliverd': did you mean 'delivered'",
+        ),
+        ({"ignore": ["faultz"]}, "no column 'faultz': did you mean 'fault'"),
+        ({"decimal": ";"}, "--decimal ;: should be . or ,"),
+    ],
+)
+def test_a_mapping_that_cannot_be_is_refused(
+    tmp_path: Path, asked: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(spi.IndicatorError) as caught:
+        read(tmp_path, HEAD + GOOD, **asked)
+    assert words in str(caught.value)
     with pytest.raises(spi.IndicatorError, match="cannot read"):
         spi.read_trials(tmp_path / "nowhere.csv")

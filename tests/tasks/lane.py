@@ -27,10 +27,9 @@ class Lane(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     render_mode = None
 
     def __init__(self, n_robots: int, length: int = 6, without: tuple[int, ...] = ()) -> None:
-        self.length, self.n_robots, self._without = length, n_robots, without
-        self.rows = [row for row in range(n_robots) if row not in without]
-        self.possible_agents = [f"robot_{row}" for row in self.rows]
-        self.agents: list[str] = []
+        self.length, self.n_robots = length, n_robots
+        self.rows = {f"robot_{row}": row for row in range(n_robots) if row not in without}
+        self.possible_agents, self.agents = [*self.rows], list[str]()
 
     def observation_space(self, agent: str) -> Box:
         return OBSERVATIONS
@@ -44,32 +43,23 @@ class Lane(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         self.agents = self.possible_agents[:]
-        starts = self._rng.permutation(self.length * 2)[: self.n_robots] % self.length
-        self.cells = [int(starts[row]) for row in self.rows]
+        starts = self._rng.permutation(self.length * 2) % self.length
+        self.cells = {agent: int(starts[row]) for agent, row in self.rows.items()}
         return self._observations(), {agent: {} for agent in self.agents}
 
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-        luck = self._rng.random(self.n_robots)
-        rewards = dict.fromkeys(self.agents, 0.0)
-        for place, agent in enumerate(self.agents):
-            step = {STAY: 0, WALK: int(luck[self.rows[place]] < 0.8), BACK: -1}[actions[agent]]
-            goal = max(0, self.cells[place] + step)
-            if goal > 0 and goal != self.cells[place] and goal in self.cells:
-                continue
-            self.cells[place] = goal
-            if goal == self.length:
-                self.cells[place], rewards[agent] = 0, 1.0
-        infos = {
-            agent: {"distance": self.cells[place] / 4} for place, agent in enumerate(self.agents)
-        }
+        luck, rewards = self._rng.random(self.n_robots), dict.fromkeys(self.agents, 0.0)
+        for agent, cell in self.cells.items():
+            step = {STAY: 0, WALK: int(luck[self.rows[agent]] < 0.8), BACK: -1}[actions[agent]]
+            goal = max(0, cell + step)
+            if goal in (0, cell) or goal not in self.cells.values():
+                self.cells[agent], rewards[agent] = goal % self.length, float(goal == self.length)
+        infos = {agent: {"distance": cell / 4} for agent, cell in self.cells.items()}
         never = dict.fromkeys(self.agents, False)
         return self._observations(), rewards, never, never, infos
 
-    def _observations(self) -> dict[str, NDArray[np.float32]]:
-        return {
-            agent: np.array([cell, self.length], dtype=np.float32)
-            for agent, cell in zip(self.agents, self.cells)
-        }
+    def _observations(self) -> dict[str, Any]:
+        return {a: np.array([c, self.length], np.float32) for a, c in self.cells.items()}
 
 
 class Walker:

@@ -41,33 +41,36 @@ def test_faults_of_one_seed_are_nested_and_differ_between_seeds() -> None:
     assert len({failing_rows(seed, 10, 1) for seed in range(30)}) > 5
 
 
-def test_silent_and_frozen_robots() -> None:
-    executed, _, row = played("silent", onset=2.0, duration=3.0)
-    mine = [actions[row] for actions in executed]
-    assert mine == [0, 1, STAY, STAY, STAY, 1, 0, 1, 0, 1]
-    others = [actions[row - 1] for actions in executed]
-    assert others == [step % 2 for step in range(10)]
-    executed, _, row = played("frozen", onset=2.0, duration=3.0)
-    assert [actions[row] for actions in executed] == [0, WALK, WALK, WALK, WALK, 1, 0, 1, 0, 1]
-    executed, _, row = played("frozen")
-    assert [actions[row] for actions in executed] == [0] * 10
+LATE: dict[str, Any] = {"onset": 2.0, "duration": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("mode", "fields", "mine"),
+    [
+        ("silent", LATE, [0, 1, STAY, STAY, STAY, 1, 0, 1, 0, 1]),
+        ("frozen", LATE, [0, WALK, WALK, WALK, WALK, 1, 0, 1, 0, 1]),
+        ("frozen", {}, [0] * 10),
+    ],
+)
+def test_silent_and_frozen_robots(mode: str, fields: dict[str, Any], mine: list[int]) -> None:
+    executed, _, row = played(mode, **fields)
+    assert [actions[row] for actions in executed] == mine
+    assert [actions[row - 1] for actions in executed] == [step % 2 for step in range(10)]
 
 
 def test_blind_and_noisy_robots() -> None:
-    _, seen, row = played("blind", onset=2.0, duration=3.0)
-    mine = [observations[f"robot_{row}"] for observations in seen]
-    assert [not value.any() for value in mine] == [False] * 2 + [True] * 3 + [False] * 6
-    plain = [seen[t][f"robot_{(row + 1) % 3}"] for t in range(11)]
-    _, noisy, _ = played("noisy")
-    assert all((noisy[t][f"robot_{(row + 1) % 3}"] == plain[t]).all() for t in range(11))
-    shifts = np.array([noisy[t][f"robot_{row}"][1] - 6 for t in range(11)])
-    assert noisy[0][f"robot_{row}"].dtype == np.float32
-    assert 0.2 < shifts.std() < 1.0
+    _, seen, row = played("blind", **LATE)
+    me, other = f"robot_{row}", f"robot_{(row + 1) % 3}"
+    assert [not seen[t][me].any() for t in range(11)] == [False] * 2 + [True] * 3 + [False] * 6
+    (_, noisy, _), (_, again, _) = played("noisy"), played("noisy")
+    for t in range(11):
+        assert (noisy[t][other] == seen[t][other]).all()
+        assert (noisy[t][me] == again[t][me]).all()
+    assert noisy[0][me].dtype == np.float32
+    assert 0.2 < np.std([noisy[t][me][1] for t in range(11)]) < 1.0
     env = FailingRobots(Lane(3), [RobotFault(mode="noisy", robots=3)], FAILURES)
-    errors = [value[1] - 6 for value in env.reset(seed=3)[0].values()]
-    assert len(set(errors)) == 3, "each robot errs on its own"
-    again = played("noisy")[1]
-    assert all((again[t][f"robot_{row}"] == noisy[t][f"robot_{row}"]).all() for t in range(11))
+    errors = {value[1] - 6 for value in env.reset(seed=3)[0].values()}
+    assert len(errors) == 3, "each robot errs on its own"
 
 
 class Nested(Lane):
@@ -81,13 +84,14 @@ class Nested(Lane):
 
 
 def test_structures_are_blinded_and_whole_numbers_bear_no_noise() -> None:
-    env = FailingRobots(Nested(1), [RobotFault(mode="blind", robots=1)], FAILURES)
-    ((arrays, number),) = env.reset(seed=0)[0].values()
-    assert not arrays["a"].any()
-    assert number == 0
-    env = FailingRobots(Nested(1), [RobotFault(mode="noisy", robots=1)], FAILURES)
+    blind, noisy = (
+        FailingRobots(Nested(1), [RobotFault(mode=mode, robots=1)], FAILURES)
+        for mode in ("blind", "noisy")
+    )
+    ((arrays, number),) = blind.reset(seed=0)[0].values()
+    assert (arrays["a"].any(), number) == (False, 0)
     with pytest.raises(SetupError, match="observes int64: should be floats"):
-        env.reset(seed=0)
+        noisy.reset(seed=0)
 
 
 def test_it_is_a_parallel_environment_and_seeds_are_counted() -> None:

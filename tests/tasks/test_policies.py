@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError, StudyError, SwarmLogisticsError
@@ -17,21 +15,12 @@ from swarm_logistics_env.studies.specification import Specification
 FILE = """
 seeds = 1
 scenario = { n_robots = 3, n_items = 4, warehouse_width = 3, warehouse_height = 3, duration = 2 }
-
-[[policies]]
-name = "swarm-dt"
-
-[[policies]]
-name = "swarm-dt"
-parameters = { taxis_gain = 0.5, diffusion = 0.7 }
-
-[[policies]]
-name = "swarm-dt"
-parameters = { taxis_gain = 0.25 }
-label = "half-hearted"
-
-[[sizes]]
-values = [2, 3]
+sizes = [{ values = [2, 3] }]
+policies = [
+    "swarm-dt",
+    { name = "swarm-dt", parameters = { taxis_gain = 0.5, diffusion = 0.7 } },
+    { name = "swarm-dt", parameters = { taxis_gain = 0.25 }, label = "half-hearted" },
+]
 """
 LABELS = ["swarm-dt", "swarm-dt (taxis_gain = 0.5, diffusion = 0.7)", "half-hearted"]
 
@@ -54,32 +43,25 @@ def test_parameters_are_part_of_what_a_run_is_and_are_told(tmp_path: Path) -> No
     assert Specification.from_json(study.specification.to_json()) == study.specification
 
 
-class Silent:
+class Silent(SwarmDT):
     """A policy that tells nobody its parameters."""
 
     def __init__(self, speed: float = 0.0) -> None:
+        super().__init__()
         self.speed = speed
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        self.n_robots = n_robots
-
-    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        return np.full((self.n_robots, 4), self.speed)
 
 
 def test_parameters_reach_the_policy_and_count_where_it_does_not_tell_them(tmp_path: Path) -> None:
     chosen = PolicySpec(name="swarm-dt", parameters={"taxis_gain": 0.0})
     # Swarm D-T without its taxis is the random walk.
     assert policies.identity(chosen.load()) == PolicySpec.of("random-walk").identity()
-    silent = [
-        PolicySpec.of({"name": f"{__name__}:Silent", "parameters": {"speed": speed}})
-        for speed in (0.1, 0.2)
-    ]
-    assert silent[0].identity() != silent[1].identity()
-    assert [policy.runs_code for policy in (*silent, chosen)] == [True, True, False]
+    tables = [{"name": f"{__name__}:Silent", "parameters": {"speed": s}} for s in (0.1, 0.2)]
+    one, other = map(PolicySpec.of, tables)
+    assert one.identity() != other.identity()
+    assert (one.runs_code, chosen.runs_code) == (True, False)
     # A file may not name code by way of parameters.
-    policy = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
-    (tmp_path / "mine.toml").write_text(f"policies = [{policy}]\n[[sizes]]\nvalues = [2, 3]\n")
+    table = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
+    (tmp_path / "mine.toml").write_text(FILE.replace('"swarm-dt",', f"{table},", 1))
     with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(tmp_path / "mine.toml")
     assert Study.from_file(tmp_path / "mine.toml", trust_code=True).plan().cases

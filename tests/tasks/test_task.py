@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pytest
 
 import swarm_logistics_env
@@ -19,69 +17,39 @@ from swarm_logistics_env.errors import ScenarioError, StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.policy import modules_used, without_prose
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.tasks.task import Case, Outcome
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
+from swarm_logistics_env.tasks.task import Case
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import Warehouse
-from tests.tasks import lane
+from tests.tasks.lane import LANE
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 
 
-class Foraging(WarehouseTask):
-    """Each working robot brings as many items as its policy's number says; no physics."""
-
-    name = "toy"
-
-    def code(self) -> str:
-        return "foraging 1"
-
-    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
-        items = (case.scenario.n_robots - len(case.faults)) * 3 + seed % 2
-        times = np.linspace(1.0, 9.0, items)
-        return Outcome(times, ended_at=9.0, digest=f"{items} {case.policy.name}")
-
-
-FORAGING = Foraging()
-
-
 def test_cases_of_other_tasks_are_other_cases() -> None:
     policy = PolicySpec(name="x")
-    own, other = (Case(policy, "x", Scenario(), task=t) for t in (WAREHOUSE, FORAGING))
+    own, other = (Case(policy, "x", Scenario(), task=t) for t in (WAREHOUSE, LANE))
     assert own.key != other.key
 
 
-FILE = f"""
-task = "{__name__}:FORAGING"
-seeds = 2
-policies = ["swarm-dt"]
-
-[[sizes]]
-values = [2, 4]
-"""
-
-
 def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_path: Path) -> None:
-    path, out = tmp_path / "forage.toml", tmp_path / "out"
-    path.write_text(FILE)
+    path, out = tmp_path / "lane.toml", tmp_path / "out"
+    path.write_text('task = "tests.tasks.lane:LANE"\nseeds = 2\nsizes = [{ values = [2, 4] }]\n')
     with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
         Study.from_file(path)
-    study = Study.from_file(path, out=out, trust_code=True)
+    study = Study.from_file(path, out=out, trust_code=True, policies=["walker"])
     assert study.run().failed == 0
     with pytest.raises(StudyError, match=r"is code.*--trust-code"):
         Study.stored(out)
     again = Study.stored(out, trust_code=True)
     assert again.specification == study.specification
     assert again.run().played == 0
-    assert Study.stored(out, task=FORAGING).finished() == (4, 4)
+    assert Study.stored(out, task=LANE).finished() == (4, 4)
 
 
 @pytest.mark.parametrize(
     ("task", "words"),
     [
-        (
-            "warehous",
-            "no task 'warehous' (a name or 'package.module:OBJECT'); did you mean 'warehouse'?",
-        ),
+        ("warehous", "(a name or 'package.module:OBJECT'); did you mean 'warehouse'?"),
         ("nowhere:TASK", "task 'nowhere:TASK' cannot be imported: No module named 'nowhere'"),
         ("json:nothing", "has no attribute 'nothing'"),
         ("json:dumps", "is no task: should have the attributes of tasks.Task"),
@@ -95,59 +63,28 @@ def test_what_is_no_task_is_refused_in_one_sentence(task: object, words: str) ->
     assert "\n" not in str(caught.value)
 
 
-def test_fields_and_failure_modes_are_those_of_the_task() -> None:
-    class Other(Foraging):
-        @property
-        def fields(self) -> dict[str, str]:
-            return {"flowers": "number"}
-
-        @property
-        def failure_modes(self) -> dict[str, str]:
-            return {"lost": "x", "removed": "y"}
-
-    Study(task=Other(), parameters=[{"name": "flowers", "values": [1, 2]}])
-    for fields, words in (
-        ({"faults": [{"modes": ["lots"]}]}, "no failure mode 'lots'; did you mean 'lost'?"),
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"faults": [{"modes": ["silnt"]}]}, "no failure mode 'silnt'; did you mean 'silent'?"),
         ({"faults": [{"modes": ["removed"]}]}, "no failure mode 'removed'"),
-        ({"parameters": [{"name": "delivery_width", "values": [1, 2]}]}, "known: flowers"),
+        ({"parameters": [{"name": "item_radius", "values": [1, 2]}]}, "known: duration, length"),
         ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
-        ({"scenario": 3}, "should be a table of fields or a Scenario"),
-    ):
-        with pytest.raises(StudyError, match=words):
-            Study(task=Other(), **fields)
+        ({"scenario": 3}, "should be a table of fields or a ParallelScenario"),
+    ],
+)
+def test_fields_and_failure_modes_are_those_of_the_task(fields: dict[str, Any], words: str) -> None:
+    Study(task=LANE, parameters=[{"name": "length", "values": [1, 2]}])
+    with pytest.raises(StudyError, match=words):
+        Study(task=LANE, **fields)
+
+
+def test_the_warehouse_is_varied_by_its_numbers_and_presets() -> None:
     assert {"n_robots", "restock", "delivery_width"} & {*WAREHOUSE.fields} == {"delivery_width"}
     assert WAREHOUSE.removed in WAREHOUSE.failure_modes
     assert WAREHOUSE.vary(Scenario(), {"preset": "dots"}) == Scenario.preset("dots")
     with pytest.raises(ScenarioError, match="no scenario preset"):
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
-
-
-SCRIPT = """
-from swarm_logistics_env.studies import Study
-
-study = Study(task="lane", policies=["walker"], seeds=2, sizes=[{"values": [2, 4]}])
-assert study.run().failed == 0
-assert Study(task="lane").specification.played.name == "lane"
-assert (study.performance()["mean"] > 0).all()
-"""
-
-
-def test_a_task_needs_two_files(tmp_path: Path) -> None:
-    copy = tmp_path / PACKAGE.name
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(lane.__file__, copy / "tasks" / "lane_task.py")
-    choice = copy / "tasks" / "task.py"
-    text = choice.read_text(encoding="utf-8")
-    name = '    "lane": "swarm_logistics_env.tasks.lane_task:LANE",\n'
-    choice.write_text(text.replace("NAMES = {\n", f"NAMES = {{\n{name}"), encoding="utf-8")
-    subprocess.run(
-        [sys.executable, "-c", SCRIPT],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        check=True,
-    )
-    page = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    assert "Files: two, `tasks/NAME_task.py` and `tasks/task.py`" in page
 
 
 def test_prose_does_not_count() -> None:
@@ -186,22 +123,19 @@ def test_clearing_is_a_rate_that_no_number_of_items_caps(tmp_path: Path) -> None
     size = {"sizes": [{"values": [2, 4]}], "policies": ["homing"], "seeds": 3}
     study = Study(out=tmp_path, task="clearing", scenario={**small, "n_robots": 4}, **size)
     assert study.run(processes=1).failed == 0
-    results = study.findings()
-    for cell in results.cells:
+    for cell in study.findings().cells:
         assert not cell.saturated
         for p, outcome in zip(cell.by_seed, cell.outcomes):
-            assert outcome.all_delivered
-            assert len(outcome.delivery_times) == 6
+            assert (outcome.all_delivered, len(outcome.delivery_times)) == (True, 6)
             assert outcome.time_to_clear == outcome.ended_at
             assert outcome.ended_at == pytest.approx(outcome.delivery_times[-1])
             assert p == pytest.approx(60.0 * 6 / outcome.ended_at)
     # A run that is not done in time has the rate until then, and no time.
     short = Study(out=None, task="clearing", scenario={**small, "duration": 1.0}, **size)
     case = short.plan().cases[0]
-    assert case.task.play(case, 0, 0).time_to_clear == math.inf
-    assert case.task.play(case, 0, 0).delivered == 0.0
+    outcome = case.task.play(case, 0, 0)
+    assert (outcome.time_to_clear, outcome.delivered) == (math.inf, 0.0)
     with pytest.raises(StudyError, match="restock = True: should be False"):
         Study(task="clearing", scenario={"restock": True})
-    assert (
-        Study(task="clearing", scenario={"preset": "paper"}).specification.scenario.duration > 500
-    )
+    preset: Any = Study(task="clearing", scenario={"preset": "paper"}).specification.scenario
+    assert preset.duration > 500
