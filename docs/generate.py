@@ -81,7 +81,7 @@ def environment() -> dict[str, str]:
         "scenario": f"{scenario_table(scenario)}\n\nSources: {sources}.",
         "fault": f"`Fault({', '.join(Fault.model_fields)})`",
         "failures": table(("mode", "the robot"), modes),
-        "wrappers": table(("wrapper", ""), wrapped),
+        "wrappers": table(("wrapper", "what it does"), wrapped),
     }
 
 
