@@ -183,7 +183,8 @@ def _made_of(thing: Any) -> tuple[object, list[Any]]:
     And what it names: kernels, structures and intrinsics.
     """
     if isinstance(thing, _Intrinsic):
-        return Path(thing.__wrapped__.__code__.co_filename).read_bytes(), []
+        defined: Any = thing._defn
+        return Path(defined.__code__.co_filename).read_bytes(), []
     if isinstance(thing, type):
         hints = get_type_hints(thing, include_extras=True)
         return hints, [kind for kind in hints.values() if hasattr(kind, "_fields")]
@@ -195,7 +196,7 @@ def _made_of(thing: Any) -> tuple[object, list[Any]]:
             named += [getattr(module, name) for name in code.co_names if hasattr(module, name)]
     values = [*code.co_consts, *(function.__defaults__ or ()), *named]
     plain = [np.asarray(each).tolist() for each in values if isinstance(each, _PLAIN)]
-    parts = [each for each in values if isinstance(each, Dispatcher | _Intrinsic)]
+    parts: list[Any] = [each for each in values if isinstance(each, Dispatcher | _Intrinsic)]
     parts += [each for each in values if isinstance(each, type) and hasattr(each, "_fields")]
     called = [(each.__module__, each.__name__) for each in parts]
     return (thing.targetoptions, code.co_code, code.co_names, plain, called), parts

@@ -14,7 +14,7 @@ from swarm_logistics_env.warehouse.fault_text import fault_of, text_of
         ("FM1:2@200", Fault("FM1", 2, onset=200.0)),
         ("FM1:2@1234.567", Fault("FM1", 2, onset=1234.567)),
         ("FM4_jam:2:carrier@100+50", Fault("FM4_jam", 2, 100.0, 50.0, role="carrier")),
-        ("dead[move]:3@0+2.5", Fault("dead[move]", 3, 0.0, 2.5)),
+        ("dead:3@0+2.5", Fault("dead", 3, 0.0, 2.5)),
     ],
 )
 def test_a_fault_is_written_as_text_and_read_back(text: str, fault: Fault) -> None:

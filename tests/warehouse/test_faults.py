@@ -15,11 +15,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import FaultError
 from swarm_logistics_env.observations import N_BEAMS
-from swarm_logistics_env.warehouse.failure_modes import (
-    FailureMode,
-    failure_mode,
-    lost_capabilities,
-)
+from swarm_logistics_env.warehouse.failure_modes import FailureMode
 from swarm_logistics_env.warehouse.faults import ROLES, failed_robots, robots_in_role, roles_of
 from swarm_logistics_env.warehouse.state import NOBODY
 from tests.warehouse.conftest import (
@@ -89,8 +85,6 @@ def test_faults_do_not_move_where_things_start() -> None:
     ("arguments", "complaint"),
     [
         ({"mode": "FM9"}, "no failure mode 'FM9'; did you mean 'FM"),
-        ({"mode": "dead[fly]"}, "dead takes move, sense, .* not 'fly'"),
-        ({"mode": "FM9[move]"}, "no failure mode"),
         ({"robots": 0}, "^Fault.robots = 0: should be greater than 0$"),
         ({"robots": 1.5}, "^Fault.robots = 1.5: should be a valid integer, [^;]*$"),
         ({"robots": ()}, "at least one robot"),
@@ -136,15 +130,6 @@ def test_a_fault_survives_json_and_is_hashable(fault: Fault) -> None:
     assert Fault(**json.loads(json.dumps(fault.model_dump(mode="json")))) == fault
     assert len({fault, Fault.from_json(fault.to_json())}) == 1
     assert ("role" in fault.to_json()) == (fault.role is not None)  # stored runs stay known
-
-
-def test_a_part_of_a_mode_takes_these_capabilities_alone() -> None:
-    assert lost_capabilities("dead") == ("move", "sense", "pick_up", "deliver", "send", "hear")
-    part = failure_mode("dead[move,send]")
-    assert (part.speed, part.sends, part.obeys, part.view) == (0.0, False, False, 1.0)
-    assert all((part.rangers, part.lifts, part.delivers, part.hears))
-    assert lost_capabilities("dead[move,send]") == ("move", "send")
-    assert lost_capabilities("motor_slow") == ("move",)
 
 
 # -- what is lost -------------------------------------------------------------------------------
@@ -362,8 +347,6 @@ def test_an_intermittent_fault_comes_and_goes_at_times_of_each_robots_own() -> N
     other = held(Fault("rangers_blind", (4, 6), onset=2.0, intermittent=(1.0, 0.5)), 10)
     np.testing.assert_array_equal(other[:, 4], failed[:, 4])
     assert (held(fault, seed=6)[:, 1] != failed[:, 1]).any()
-    whole, part = (held(Fault(m, (1,), intermittent=(1.0, 0.5))) for m in ("dead", "dead[send]"))
-    np.testing.assert_array_equal(part, whole)
 
 
 def test_an_intermittent_fault_ends_for_good_after_its_duration() -> None:
