@@ -54,18 +54,10 @@ def scan_disc(forward: float, left: float, square: float, radius: float, scan: S
         scan: is changed.
     """
     clearance = square - radius * radius
-    middle = nearest_beam(forward, left)
-    if square > _ONE_BEAM * radius * radius:
-        # Without a branch: whether it is met cannot be predicted.
-        along = forward * _BEAM_X[middle] + left * _BEAM_Y[middle]
-        inside = along * along - clearance
-        distance = along - math.sqrt(max(inside, 0.0))
-        met = inside > 0.0 and distance < scan[middle]
-        scan[middle] = distance if met else scan[middle]
-        return
     if clearance <= 0.0:
         scan[:] = 0.0
         return
+    middle = nearest_beam(forward, left)
     # Outwards from the beam that looks nearest to its centre: if that one misses, all do.
     for way in (1, -1):
         for turned in range(_N_BEAMS // 2):
