@@ -62,6 +62,8 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
         ({"physics_period": 0.05}, "physics_period = 0.05 s: should be at most 0.02 s, or robots"),
         ({"max_speed": 6.0}, r"lets a robot cross 0.12 m .* at most .* 0.0166667 s"),
         ({"duration": 0.05}, "duration = 0.05 s should be at least one control_period"),
+        ({"n_requests": 61}, "n_requests = 61: should be at most n_items = 60"),
+        ({"dock_capacity": 10.1}, "dock_capacity = 10.1: should be at most .* 10 per second"),
         # Numbers that no run survives.
         ({"duration": 1e308}, "duration = 1e.308: should be at most 1e.09"),
         ({"timer_limit": 1e308}, "timer_limit = 1e.308: should be at most 1e.09"),
@@ -131,6 +133,7 @@ def test_presets() -> None:
     assert set(SCENARIO_PRESETS) == {"paper", "paper_scalability", "dots", "realistic"}
     assert Scenario.preset("paper") == Scenario()
     assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
+    assert Scenario.preset("realistic").handling_steps == 10
     assert Scenario.preset("dots") == Scenario(max_speed=1.0, max_acceleration=2.0)
     with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
         Scenario.preset("papr")

@@ -12,7 +12,7 @@ from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.observations import unflatten
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
-from tests.warehouse.conftest import HOLD, STAY, Build
+from tests.warehouse.conftest import Build
 
 TOLERANCE = 2e-5  # [m]: rows are of single precision
 
@@ -251,49 +251,6 @@ def narrowest_gap(world: Warehouse, me: int) -> float:
 
 
 # -- by hand ------------------------------------------------------------------------------------
-
-
-def test_a_scan_in_an_empty_corner_by_hand(build: Build) -> None:
-    world = build([(1.0, 0.5)], [(1.5, 0.5)])
-    parts = unflatten(world.observe()[0], world.scenario)
-    walls = parts["range_walls"]
-    assert walls[0] == 2.0  # ahead: nothing in range
-    assert walls[8] == pytest.approx(1.0)  # behind
-    assert walls[12] == pytest.approx(0.5)  # to the right
-    assert walls[10] == pytest.approx(0.5 * math.sqrt(2.0))
-    assert parts["range_items"][0] == pytest.approx(0.5 - 0.125)
-    assert (parts["range_items"][1:] == 2.0).all()
-    assert (parts["range_robots"] == 2.0).all()
-
-
-def test_the_lowest_timer_is_heard_beyond_the_neighbours_in_the_row(build: Build) -> None:
-    # Nine robots nearer than the one that tells; it is not in the row, yet heard.
-    ring = [(5.0 + math.cos(k * math.tau / 9), 5.0 + math.sin(k * math.tau / 9)) for k in range(9)]
-    world = build([(5.0, 5.0), *ring, (8.5, 5.0)], [(1.0, 1.0)])
-    rows = world.step([STAY] * 11)
-    parts = unflatten(rows[0], world.scenario)
-    assert (parts["neighbour_present"] == 1.0).all()
-    assert (parts["neighbour_timer_heard"] == 0.0).all()
-    assert parts["lowest_timer_present"][0] == 1.0
-    assert parts["lowest_timer_x"][0] == pytest.approx(3.5)
-
-
-def test_equal_timers_are_settled_by_the_nearest_teller(build: Build) -> None:
-    robots = [(7.0, 5.0), (8.6, 6.0), (8.4, 5.0), (8.5, 4.0)]
-    world = build(robots, [(1.0, 1.0)])
-    rows = world.step([STAY] * 4)
-    lowest = rows[0, row.LOWEST_TIMER : row.LOWEST_TIMER + 4]
-    assert lowest == pytest.approx([1.0, 1.4, 0.0, 0.0])
-
-
-@pytest.mark.parametrize(("x", "feels"), [(2.255, True), (2.24, False)])
-def test_a_laden_robot_feels_items_but_for_those_that_it_lifted_above(
-    build: Build, x: float, feels: bool
-) -> None:
-    world = build([(2.0, 2.0)], [(1.8, 2.0), (x, 2.0)])
-    assert not world.state.robot_contact[0]
-    world.step([HOLD])
-    assert (world.state.robot_item[0], world.state.robot_contact[0]) == (0, feels)
 
 
 @pytest.mark.parametrize("x", np.linspace(1.0, 3.0, 21))
