@@ -69,7 +69,8 @@ def test_an_array_that_is_not_as_declared_is_refused(rows: Any) -> None:
 def test_blank_arrays_have_the_lengths_that_their_shapes_name() -> None:
     claims = blank(Claims, {"I": 4, "4 N": 8, "N": 2})
     assert [len(each) for each in claims] == [4, 4, 8, 2]
-    assert (claims.events.shape, claims.events.dtype) == ((8, 3), np.int64)
+    assert claims.events.shape == (8, 3)
+    assert claims.events.dtype == np.int64
     assert packed(claims)[[1, 5, 6]].tolist() == [4, 8, 3]
 
 
