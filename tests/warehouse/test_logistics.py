@@ -74,6 +74,7 @@ HANDS: dict[str, tuple[Any, ...]] = {
     "who opens an empty hand changes nothing": (
         [(2.0, 2.0), (5.0, 5.0)], [FAR, (4.0, 9.0), (5.0, 5.1)], [[STAY, HOLD], [OPEN, STAY]],
         [-1, 2]),
+    "an item goes where its carrier goes": (ONE, [FAR, (2.1, 2.1)], [[HOLD], *[[EAST]] * 3], [1]),
     "nothing more than one item": (ONE, [(2.1, 2.0), (1.8, 2.0)], [[HOLD]] * 3, [0]),
     "FM2 masks no item": (PAIR, [(2.18, 2.0)], BOTH, [-1, 0], [Fault("FM2", (0,))]),
     "who stays masks no item": (PAIR, [(2.18, 2.0)], [[STAY, HOLD]], [-1, 0]),
@@ -115,18 +116,6 @@ def test_what_is_in_whose_hand(build: Build, case: str) -> None:
         assert state.item_status[item] == (STORED if carrier == NOBODY else CARRIED)
         if carrier != NOBODY:
             np.testing.assert_array_equal(state.item_position[item], state.robot_position[carrier])
-
-
-def test_an_item_goes_where_its_carrier_goes_and_is_put_down_there(build: Build) -> None:
-    world = build([(2.0, 2.0)], [FAR, (2.1, 2.1)])
-    state = world.state
-    for command in (HOLD, EAST, EAST, EAST, OPEN):
-        world.step([command])
-        np.testing.assert_array_equal(state.item_position[1], state.robot_position[0])
-    assert state.item_position[1, 0] > 2.3
-    assert (state.item_status[1], state.item_carrier[1]) == (STORED, NOBODY)
-    steps(world, WEST, times=3)
-    assert state.item_position[1, 0] > state.robot_position[0, 0]
 
 
 def test_only_who_lifts_collides_with_items_and_only_until_it_lets_go(build: Build) -> None:

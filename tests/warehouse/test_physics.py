@@ -21,12 +21,6 @@ def deepest_overlap(world: Warehouse) -> float:
     return float(DIAMETER - gaps[~np.eye(len(position), dtype=bool)].min())
 
 
-def deepest_in_walls(world: Warehouse) -> float:
-    at, scenario = world.state.robot_position, world.scenario
-    far = np.array([scenario.warehouse_width, scenario.warehouse_height]) - at
-    return float(DIAMETER / 2 - min(at.min(), far.min()))
-
-
 @pytest.mark.parametrize("gap", np.linspace(0.3, 0.45, 7))
 def test_two_robots_that_meet_head_on_never_pass_through_each_other(
     build: Build, gap: float
@@ -43,15 +37,6 @@ def test_two_robots_that_meet_head_on_never_pass_through_each_other(
     assert abs(deepest_overlap(world)) <= SUSTAINED
     assert pushed.state.robot_position[1, 0] > max(pushed.state.robot_position[0, 0], 3.1)
     assert world.state.robot_heading.tolist() == [0.0, 0.0]  # no collision turns a robot
-
-
-@pytest.mark.parametrize("way", [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1)])
-def test_walls_stop_a_robot(build: Build, way: tuple[int, int]) -> None:
-    world = build([(5.0, 5.0)], [FAR], control_period=0.02)
-    for _ in range(250):
-        world.step([(*way, 0.0, 0.0)])
-        assert deepest_in_walls(world) <= CLOSING / 2
-    assert abs(deepest_in_walls(world)) <= SUSTAINED
 
 
 @pytest.mark.parametrize(("top", "acceleration"), [(2.0, 20.0), (1.0, 2.0)])

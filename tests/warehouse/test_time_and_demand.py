@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -222,22 +222,3 @@ def test_random_worlds_keep_their_items_their_order_and_their_bits(
         assert (np.diff(times) >= 1.0 / capacity - 1e-6).all()
         within = [((times >= t - 1e-6) & (times < t + 1.0 - 1e-6)).sum() for t in times]
         assert max(within, default=0) <= max(capacity, 1.0)
-
-
-def test_how_requests_are_drawn_changes_no_other_stream() -> None:
-    fields: list[dict[str, Any]] = [
-        {},
-        {"demand": "zipf"},
-        {"n_requests": 4, "dock_capacity": 1.0},
-        TIMED,
-    ]
-    worlds = [Warehouse(Scenario(sensor_dropout=0.2, ranger_noise=0.1, **each)) for each in fields]
-    starts = [world.reset(3) for world in worlds]
-    asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
-    for rows in starts:
-        rows[:, asked : row.NEIGHBOURS : row.ITEM_WIDTH] = 0.0
-        np.testing.assert_array_equal(rows, starts[0])
-    moved = [world.step(np.full((25, 4), [1.0, 0.3, 0.1, 0.0])) for world in worlds]
-    for rows in moved:
-        rows[:, asked : row.NEIGHBOURS : row.ITEM_WIDTH] = 0.0
-        np.testing.assert_array_equal(rows, moved[0])
