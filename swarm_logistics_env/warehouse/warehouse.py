@@ -19,8 +19,7 @@ from . import layout, stepping
 from .fault_text import FaultLike, checked_faults
 from .faults import GRACE, Fault, Occurrence, apply_faults
 from .grid import blank_grid
-from .handling import IDLE
-from .logistics import MESSAGE
+from .logistics import IDLE, MESSAGE
 from .packing import blank, packed
 from .physics import Physics
 from .state import NOBODY, STORED, WarehouseState
