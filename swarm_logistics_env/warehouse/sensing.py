@@ -23,7 +23,6 @@ from .surroundings import (
     choose_neighbours,
     in_frame,
     listen,
-    lowest_timer_heard,
     scan_discs,
     scan_solids,
     see_items,
@@ -232,8 +231,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     if ranger_range > 0.0:
         scan = out[row.RANGE_ROBOTS : row.RANGE_ROBOTS + row.N_BEAMS]
         scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
-    listen(me, world, n_found)
-    lowest, timer = lowest_timer_heard(world, n_found)
+    lowest, timer = listen(me, world, n_found)
     if lowest != NOBODY:
         robots.heard[me] = timer
         forward, left = in_frame(pose, robots.position[lowest, 0], robots.position[lowest, 1])
