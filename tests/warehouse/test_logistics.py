@@ -194,29 +194,6 @@ def test_an_item_is_delivered_as_soon_as_its_carriers_centre_is_inside(build: Bu
     assert border.state.robot_in_delivery.tolist() == [True, False]
 
 
-def test_a_shuffled_item_that_becomes_requested_is_delivered_at_once(build: Build) -> None:
-    heights = (5.0, 7.0, 3.0)
-    items = [*((INSIDE, y + 0.1) for y in heights), FAR]
-    world = build([(INSIDE, y) for y in heights], items)
-    steps(world, STAY, HOLD, HOLD)
-    assert world.state.delivered == 0
-    steps(world, HOLD, STAY, STAY)
-    assert world.state.delivered_by == [0, 1, 2]
-    assert len(set(world.state.delivery_times)) == 1
-    assert world.state.requested == 3
-
-
-def test_restock_brings_a_delivered_item_back_and_goes_on(build: Build) -> None:
-    world = build([(INSIDE, 5.0)], [(INSIDE, 5.1)], restock=True, pickup_range=12.0)
-    state = world.state
-    for delivered in range(1, 6):
-        steps(world, HOLD)
-        assert (state.delivered, state.requested) == (delivered, 0)
-        assert state.item_status.tolist() == [STORED]
-        assert 0.125 <= state.item_position[0, 0] <= 8.0 - 0.125
-    assert not world.all_delivered
-
-
 @pytest.mark.parametrize("restock", [(False, True), (True, False)])
 def test_when_restock_is_switched_what_is_there_is_asked_for(
     build: Build, restock: tuple[bool, bool]
