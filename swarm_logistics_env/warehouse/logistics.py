@@ -42,16 +42,6 @@ _GRACE = 1e-6  # [s]; times are sums of periods
 
 
 @kernel
-def first_not_finite(commands: Numbers) -> int:
-    """Return the first row of commands (N, C) that is not finite; NOBODY if all are."""
-    for row in range(len(commands)):
-        for column in range(commands.shape[1]):
-            if not math.isfinite(commands[row, column]):
-                return row
-    return NOBODY
-
-
-@kernel
 def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> int:
     """Return the place, row by row, of the first command that is not finite; NOBODY if all are.
 
