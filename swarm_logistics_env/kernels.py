@@ -38,7 +38,6 @@ R = TypeVar("R")
 QUIET = "SWARM_LOGISTICS_QUIET"  # environment variable of workers: nobody reads what they say
 _SILENCE = 1.0  # [s] of compiling that nobody is told of
 _HERE = Path(__file__).parent
-_PLAIN = (int, float, tuple, np.ndarray, np.generic)
 _all_kernels: list[Any] = []
 _parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
 _config, _events, _types = cast("tuple[Any, Any, Any]", (config, event, types))  # without types
@@ -195,7 +194,8 @@ def _made_of(thing: Any) -> tuple[object, list[Any]]:
         if module.__name__.startswith(__package__):
             named += [getattr(module, name) for name in code.co_names if hasattr(module, name)]
     values = [*code.co_consts, *(function.__defaults__ or ()), *named]
-    plain = [np.asarray(each).tolist() for each in values if isinstance(each, _PLAIN)]
+    plain = [each for each in values if isinstance(each, int | float | tuple | np.generic)]
+    plain += [each.tolist() for each in values if isinstance(each, np.ndarray)]
     parts: list[Any] = [each for each in values if isinstance(each, Dispatcher | _Intrinsic)]
     parts += [each for each in values if isinstance(each, type) and hasattr(each, "_fields")]
     called = [(each.__module__, each.__name__) for each in parts]
