@@ -107,23 +107,6 @@ def test_helpers_end_with_the_pool(is_closed: bool) -> None:
     assert not any(helper.is_alive() for helper in helpers)
 
 
-def test_all_worlds_are_taken_over_when_the_caller_fails_at_one() -> None:
-    made = worlds()
-    pool = WorldThreadPool(made, FIRSTS, 1)
-    pool.is_watched[:] = 1
-    rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
-
-    def arrived(place: int, sensed: NDArray[np.float32]) -> None:
-        raise RuntimeError(f"not {place}")
-
-    with pytest.raises(RuntimeError, match="not 0"):
-        pool.step(commands(0), rows, arrived)
-    assert [world.state.step for world in made] == [1, 1, 1, 1]
-    step(pool, made, commands(1))
-    assert [world.state.step for world in made] == [2, 2, 2, 2]
-    pool.close()
-
-
 def test_what_is_refused_is_raised_before_any_world_has_moved() -> None:
     made = worlds()
     never = WorldThreadPool([Warehouse(Scenario(n_robots=2, **SMALL)), *made[1:]], FIRSTS, 1)
