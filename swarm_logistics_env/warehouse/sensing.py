@@ -162,10 +162,12 @@ def fail_rangers(world: World, rows: Sensed) -> None:
         if not robots.present[robot]:
             continue
         beams, frozen = rows[robot, :_N_RANGES], robots.frozen_beams[robot]
-        if able.ranger_bias[robot] != 0.0:
-            own = able.ranger_range[robot]
+        bias, own = able.ranger_bias[robot], able.ranger_range[robot]
+        if bias != 0.0:
             reach = own if own > 0.0 else world.parameters.ranger_range
-            add_bias(beams, able.ranger_bias[robot], reach)
+            for beam in range(_N_RANGES):
+                if beams[beam] < np.float32(reach):
+                    beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
         if able.rangers_refresh[robot]:
             frozen[0] = math.nan
         elif math.isnan(frozen[0]):
@@ -174,14 +176,6 @@ def fail_rangers(world: World, rows: Sensed) -> None:
         else:
             for beam in range(_N_RANGES):
                 beams[beam] = frozen[beam]
-
-
-@kernel
-def add_bias(beams: Sensed, bias: float, reach: float) -> None:
-    """Lengthen the beams that meet something by `bias` [m], at most to `reach` [m]."""
-    for beam in range(len(beams)):
-        if beams[beam] < np.float32(reach):
-            beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
 
 
 @kernel
