@@ -5,7 +5,6 @@ A kernel is compiled when it is first called, with all that it calls, and kept o
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import functools
 import hashlib
@@ -17,7 +16,8 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast, get_type_hints
 
 import numba
 import numpy as np
@@ -26,6 +26,8 @@ from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -36,8 +38,6 @@ R = TypeVar("R")
 QUIET = "SWARM_LOGISTICS_QUIET"  # environment variable of workers: nobody reads what they say
 _SILENCE = 1.0  # [s] of compiling that nobody is told of
 _HERE = Path(__file__).parent
-# Folders of kernels, by the folder of those that call them.
-_CALLED = {"warehouse": ("warehouse",), "motion": ("motion",)}
 _all_kernels: list[Any] = []
 _parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
 _config, _events, _types = cast("tuple[Any, Any, Any]", (config, event, types))  # without types
@@ -152,10 +152,9 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
             _warn_of_no_cache()
             yield
             return
-        folder = Path(compiled.py_func.__code__.co_filename).parent
-        if folder.is_relative_to(_HERE):
+        if Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE):
             # numba looks at the file's time alone, not at kernels and constants of other files.
-            compiled._cache._cache_file._source_stamp = _digest_for(folder)
+            compiled._cache._cache_file._source_stamp = _digest_of(compiled)
     from filelock import FileLock
 
     kept = Path(compiled.stats.cache_path)
@@ -167,30 +166,40 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
         yield
 
 
-@functools.cache
-def _digest_for(folder: Path) -> str:
-    """Return a digest of all code that kernels of a folder may be made of."""
-    rooms = _CALLED.get(folder.name, ("motion", "policies", "train"))
-    digest = hashlib.blake2b(digest_size=8)
-    for room in (".", *rooms):
-        for path in sorted((_HERE / room).glob("*.py")):
-            source = path.read_bytes()
-            if any(mark in source for mark in (b"kernel", b"intrinsic", b"NamedTuple", b"N_BEAMS")):
-                digest.update(_code_of(source))
+def _digest_of(compiled: Any) -> str:
+    """Return a digest of all that a kernel is made of; no text belongs to it, as docstrings."""
+    digest, things = hashlib.blake2b(digest_size=8), [compiled]
+    for thing in things:
+        told, parts = _made_of(thing)
+        digest.update(repr(told).encode())
+        things += [part for part in parts if part not in things]
     return digest.hexdigest()
 
 
-def _code_of(source: bytes) -> bytes:
-    """Return functions, constants and structures of a module, which kernels may be made of."""
-    lines, found = source.splitlines(), []
-    for part in ast.parse(source).body:
-        is_class = isinstance(part, ast.ClassDef) and not any(
-            isinstance(base, ast.Name) and base.id == "NamedTuple" for base in part.bases
-        )
-        is_text = isinstance(part, ast.Expr)
-        if not is_class and not is_text:
-            found += lines[part.lineno - 1 : part.end_lineno]
-    return b"\n".join(found)
+def _made_of(thing: Any) -> tuple[object, list[Any]]:
+    """Return code and constants of a kernel, fields of a structure, or an intrinsic's whole file.
+
+    And what it names: kernels, structures and intrinsics.
+    """
+    if isinstance(thing, _Intrinsic):
+        defined: Any = thing._defn
+        return Path(defined.__code__.co_filename).read_bytes(), []
+    if isinstance(thing, type):
+        hints = get_type_hints(thing, include_extras=True)
+        return hints, [kind for kind in hints.values() if hasattr(kind, "_fields")]
+    function = thing.py_func
+    code, known = function.__code__, function.__globals__
+    named = [known[name] for name in code.co_names if name in known]
+    for module in [value for value in named if isinstance(value, ModuleType)]:
+        if module.__name__.startswith(__package__):
+            named += [getattr(module, name) for name in code.co_names if hasattr(module, name)]
+    values = [*code.co_consts, *(function.__defaults__ or ()), *named]
+    plain = [each for each in values if isinstance(each, int | float | tuple | np.generic)]
+    plain += [each.tolist() for each in values if isinstance(each, np.ndarray)]
+    parts: list[Any] = [each for each in values if isinstance(each, Dispatcher | _Intrinsic)]
+    parts += [each for each in values if isinstance(each, type) and hasattr(each, "_fields")]
+    called = [(each.__module__, each.__name__) for each in parts]
+    return (thing.targetoptions, code.co_code, code.co_names, plain, called), parts
 
 
 class _Report(event.Listener):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_logistics_env import Fault, Scenario, Warehouse, policies, swarm_logistics_v0
+from swarm_logistics_env import Scenario, Warehouse, policies, swarm_logistics_v0
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 
 STEPS = 1500
@@ -74,18 +74,3 @@ def test_a_trajectory_is_the_same_in_three_processes_and_beside_another_world() 
     assert int(delivered) > 2
     assert elsewhere("1", False) == first
     assert elsewhere("20240229", True) == first
-
-
-def test_worlds_of_a_kind_that_step_side_by_side_do_not_touch_each_other() -> None:
-    scenario = Scenario(n_robots=12, n_items=20, warehouse_width=5, warehouse_height=4)
-    worlds = [Warehouse(scenario) for _ in range(3)]
-    steered = [policies.load("swarm-dt") for _ in worlds]
-    rows = []
-    for world, policy in zip(worlds, steered):
-        policy.reset(12, 0)
-        rows.append(world.reset(0, [Fault("FM1", 2)]))
-    for _ in range(60):
-        for number, (world, policy) in enumerate(zip(worlds, steered)):
-            rows[number] = world.step(policy.act(rows[number]))
-        np.testing.assert_array_equal(rows[0], rows[1])
-        np.testing.assert_array_equal(rows[0], rows[2])

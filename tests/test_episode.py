@@ -22,6 +22,9 @@ class Courier:
     def reset(self, n_robots: int, seed: int) -> None:
         self.begun = (n_robots, seed)
 
+    def configure(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+
     def act(
         self, observations: NDArray[np.float32], state: WarehouseState | None = None
     ) -> NDArray[np.float64]:
@@ -47,65 +50,44 @@ class Broken:
 
 
 def test_an_episode_of_swarm_dt_is_what_it_says() -> None:
-    episode = run_episode(
-        Scenario(duration=60.0, warehouse_width=6), policies.load("swarm-dt"), seed=3
-    )
-    assert episode.seed == 3
-    assert episode.delivered == len(episode.delivery_times) > 0
-    assert episode.delivery_times.dtype == np.float64
-    assert (np.diff(episode.delivery_times) >= 0.0).all()
-    assert episode.delivery_times[0] > 0.0
-    assert episode.delivery_times[-1] <= 60.0
-    assert episode.ended_at == 60.0
-    assert not episode.all_delivered
-    assert episode.failed_robots == ()
-    assert episode.anchoring_seconds == 0.0
+    scenario = Scenario(duration=60.0, warehouse_width=6)
+    episode = run_episode(scenario, policies.load("swarm-dt"), seed=3)
+    times = episode.delivery_times
+    assert (episode.seed, episode.ended_at, episode.all_delivered) == (3, 60.0, False)
+    assert episode.delivered == len(times) > 0
+    assert times.dtype == np.float64
+    assert 0.0 < times[0] <= times[-1] <= 60.0
+    assert (np.diff(times) >= 0.0).all()
+    assert (episode.failed_robots, episode.anchoring_seconds) == ((), 0.0)
+
+
+def test_who_fails_is_listed_once_and_for_how_long_others_touch_them_is_counted() -> None:
+    # In a storage so narrow that a working robot cannot pass a dead one, it stands before it.
+    scenario = Scenario(
+        n_robots=2, n_items=1, warehouse_width=4, warehouse_height=0.3, delivery_width=1.0,
+        duration=20.0, pickup_range=0.15,
+    )  # fmt: skip
+    walk, touched = policies.load("random-walk"), []
+    for seed in range(6):
+        faults = [Fault("dead", (1,)), Fault("FM2", (1,), onset=99.0)]
+        episode = run_episode(scenario, walk, seed, faults)
+        assert episode.failed_robots == (1,)
+        touched.append(episode.anchoring_seconds)
+    assert 1.0 < max(touched) <= 20.0
+    both = run_episode(scenario, walk, 0, ["dead:2"])
+    assert (both.failed_robots, both.anchoring_seconds) == ((0, 1), 0.0)
 
 
 def test_it_ends_with_the_last_item() -> None:
-    episode = run_episode(REACHABLE, Courier(), seed=0)
+    courier = Courier()
+    episode = run_episode(REACHABLE, courier, seed=0)
+    assert (courier.begun, courier.scenario) == ((1, 0), REACHABLE)  # it is told of the episode
     assert episode.all_delivered
     assert episode.delivered == 3
     assert episode.ended_at == episode.delivery_times[-1] < 60.0
     endless = run_episode(REACHABLE.replace(restock=True, duration=30.0), Courier(), seed=0)
     assert not endless.all_delivered
     assert (endless.delivered > 3, endless.ended_at) == (True, 30.0)
-
-
-def test_every_robot_that_a_fault_names_is_listed_once() -> None:
-    faults = [Fault("FM1", (4, 2)), Fault("FM2", (2, 0), onset=99.0)]
-    episode = run_episode(Scenario(duration=1.0), policies.load("swarm-dt"), 0, faults)
-    assert episode.failed_robots == (0, 2, 4)
-
-
-def test_anchoring_counts_seconds_of_working_robots_at_failed_ones() -> None:
-    # In a storage so narrow that a working robot cannot pass a dead one, it stands before it.
-    scenario = Scenario(
-        n_robots=2, n_items=1, warehouse_width=4, warehouse_height=0.3, delivery_width=1.0,
-        duration=20.0, pickup_range=0.15,
-    )  # fmt: skip
-    longest = 0.0
-    for seed in range(6):
-        for dead in (0, 1):
-            episode = run_episode(
-                scenario, policies.load("random-walk"), seed, [Fault("dead", (dead,))]
-            )
-            longest = max(longest, episode.anchoring_seconds)
-            assert 0.0 <= episode.anchoring_seconds <= 20.0
-    assert longest > 1.0
-    both = run_episode(scenario, policies.load("random-walk"), 0, [Fault("dead", 2)])
-    assert both.anchoring_seconds == 0.0
-
-
-def test_a_policy_is_told_of_the_episode_and_its_period() -> None:
-    class Noted(Courier):
-        def configure(self, scenario: Scenario) -> None:
-            self.scenario = scenario
-
-    policy, scenario = Noted(), REACHABLE.replace(duration=1.0, control_period=0.2)
-    run_episode(scenario, policy, seed=11)
-    assert policy.begun == (1, 11)
-    assert policy.scenario == scenario
 
 
 @pytest.mark.parametrize(

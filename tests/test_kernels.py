@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
-import swarm_logistics_env
-from swarm_logistics_env import kernels
+from swarm_logistics_env import kernels, observations
+from swarm_logistics_env.warehouse import grid, stepping
+from swarm_logistics_env.warehouse.packing import unpacked_at
 
-PACKAGE = Path(swarm_logistics_env.__file__).parent
 # Two signatures of one kernel, so that two processes write one index.
 FIRST_CALLS = """
 import numpy as np
@@ -81,42 +81,60 @@ def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -
     assert finished(quiet)[-1] == ""
 
 
+SOURCE = """'Of kernels.'
+FEW, TABLE = 80, np.array([1.0, 2.0])
+
+class Inner(NamedTuple):
+    n_things: int
+
+class Outer(NamedTuple):
+    inner: Inner
+
+class Told:
+    text = "told"
+
+@inlined_kernel
+def part(number):
+    'Return more.'
+    return number + 1.0
+
+@kernel
+def whole(address):
+    outer = unpacked_at(Outer, address)
+    return part(outer.inner.n_things) * TABLE[1] + row.N_BEAMS + FEW
+"""
+
+
 @pytest.mark.parametrize(
-    ("file", "old", "new", "changes"),
+    ("old", "new", "changes"),
     [
-        ("warehouse/grid.py", "_FEW = 80", "_FEW = 81", True),
-        ("observations.py", "N_BEAMS = 16", "N_BEAMS = 18", True),
-        ("warehouse/structs.py", "    step: Annotated[", "    steps: Annotated[", True),
-        ("warehouse/surroundings.py", "aged = robots.heard[robot] + period", "aged = period", True),
-        ("policies/homing.py", "AVOID_GAIN", "AVOID_GAINS", False),  # no world calls it
-        ("warehouse/warehouse.py", "self.n_removed += 1", "self.n_removed += 2", False),
-        ("warehouse/layout.py", '"""The places', '"""Places', False),
+        ("FEW, TABLE = 80", "FEW, TABLE = 81", True),
+        ("[1.0, 2.0]", "[1.0, 2.5]", True),
+        ("n_things: int", "n_things: float", True),
+        ("    inner: Inner", "    inner: Inner\n    n_more: int", True),
+        ("number + 1.0", "number - 1.0", True),
+        ("number + 1.0", "number + 2.0", True),
+        ("@inlined_kernel", "@kernel", True),
+        ("N_BEAMS", "N_COLUMNS", True),
+        ("Return more", "Return one more", False),
+        ("Of kernels", "Of two kernels", False),
+        ('"told"', '"told anew"', False),
     ],
 )
 def test_what_is_kept_is_used_until_code_of_kernels_changes(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    file: str,
-    old: str,
-    new: str,
-    changes: bool,
+    old: str, new: str, changes: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    copy = tmp_path / "copy"
-    for path in PACKAGE.rglob("*.py"):
-        kept = copy / path.relative_to(PACKAGE)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(path, kept)
-    monkeypatch.setattr(kernels, "_HERE", copy)
+    def digest(source: str) -> str:
+        names = {**vars(kernels), "NamedTuple": NamedTuple, "row": observations}
+        names |= {"unpacked_at": unpacked_at}
+        exec(compile(source, "made", "exec", dont_inherit=True), names)
+        return kernels._digest_of(names["whole"])
 
-    def digest() -> str:
-        kernels._digest_for.cache_clear()
-        return kernels._digest_for(copy / "warehouse")
-
-    before, text = digest(), (copy / file).read_text(encoding="utf-8")
-    assert old in text
-    (copy / file).write_text(text.replace(old, new), encoding="utf-8")
-    assert (digest() != before) == changes
-    kernels._digest_for.cache_clear()
+    assert old in SOURCE
+    assert (digest(SOURCE.replace(old, new)) != digest(SOURCE)) == changes
+    steps = kernels._digest_of(stepping.step)
+    monkeypatch.setattr(grid, "_FEW", 81)  # of a kernel that others call
+    assert kernels._digest_of(stepping.step) != steps
 
 
 def test_a_kernel_that_another_one_called_can_be_called_from_python() -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env import Scenario
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.observations import N_COLUMNS, bounds, columns, unflatten
 
@@ -33,24 +33,13 @@ def test_bounds_follow_the_scenario() -> None:
     assert (unflatten(low, scenario)["velocity"] == -1.5).all()
 
 
-def test_unflatten_gives_views_of_rows_and_of_tables() -> None:
-    scenario = Scenario(n_robots=4)
-    table = Warehouse(scenario).reset(0)
-    parts = unflatten(table, scenario)
-    assert parts["range_robots"].shape == (4, 16)
-    assert parts["neighbour_x"].shape == (4, row.N_NEIGHBOURS)
-    assert parts["item_present"].shape == (4, row.N_ITEMS_IN_VIEW)
-    assert parts["timer"].shape == (4, 1)
-    one = unflatten(table[2], scenario)
-    for name, part in parts.items():
-        np.testing.assert_array_equal(part[2], one[name])
-        assert np.shares_memory(part, table)
-
-
 def test_block_features_are_named_as_the_kernels_index_them() -> None:
     scenario = Scenario()
     table = np.arange(N_COLUMNS, dtype=np.float32)
     parts = unflatten(table, scenario)
+    for name, part in unflatten(np.vstack([table, table]), scenario).items():
+        np.testing.assert_array_equal(part, [parts[name]] * 2)
+        assert np.shares_memory(parts[name], table)
     for number, feature in enumerate(row.ITEM_FEATURES):
         assert parts[f"item_{feature}"][0] == row.ITEMS + number
     for number, feature in enumerate(row.NEIGHBOUR_FEATURES):

@@ -44,17 +44,11 @@ def test_bars_of_the_whole_and_of_each_part() -> None:
     for name, count in (("mine", "8 of 8"), ("swarm-dt", "4 of 4"), ("central", "4 of 4")):
         assert any(name in line and count in line for line in text.splitlines())
     assert "swarm-dt" not in shown({"swarm-dt": 4}, {"swarm-dt": 4}, terminal=True)
-
-
-def test_what_was_done_before_is_no_part_of_the_pace() -> None:
-    told = io.StringIO()
+    assert shown({}, {}, terminal=True) == ""  # nothing to do
+    told = io.StringIO()  # what was done before is no part of the pace
     with ProgressBar("mine", 100, "rounds", done=99, console=Console(file=told)) as progress:
         progress.say()
     assert told.getvalue() == "mine: 99 of 100 rounds, just begun\n"
-
-
-def test_nothing_to_do_shows_nothing() -> None:
-    assert shown({}, {}, terminal=True) == ""
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(4.6, "0:05"), (245, "4:05"), (3723, "1:02:03")])

@@ -57,33 +57,6 @@ def test_what_it_says_of_results_is_what_the_page_of_results_says(
     assert (tmp_path / "anew.svg").stat().st_size > 10_000
 
 
-def test_a_finding_is_a_rule_not_a_sentence(script: Any) -> None:
-    rows = [
-        "|  | `swarm-dt` | `a` | `ppo-b` |", "| --- | --- | --- | --- |",
-        "| P, N = 25 | 10.0 [9.0, 11.0] | 80.0 [79.0, 81.0] | 25.0 [24.0, 26.0] |",
-        "| S, N 25 -> 100 | 0.1 [0.0, 0.2] | -0.2 [-0.3, -0.1] | 0.5 [0.4, 0.6] |",
-        "| R, FM1, m = 2 | -0.5 [-0.6, -0.4] | 0.0 [-0.1, 0.1] | 0.05 [0.01, 0.07] |",
-        "| R, FM2, m = 2 | 0.05 [0.02, 0.08] | 0.0 [-0.1, 0.1] | -0.2 [-0.3, -0.1] |",
-    ]  # fmt: skip
-    page = (
-        "<!-- tables: clearing -->\n|  | no fault |\n| --- | --- |\n"
-        "| `swarm-dt` | 700 [650, 800] |\n| `ppo-b` | 70 [60, 80] |\n"
-        f"{END}\n<!-- tables: sentences -->\n"
-        "Of 9 claims (of it) this one supports 5 and contradicts\n2 (2 on FM1); 2 are open.\n"
-        f"{END}\n<!-- tables: policies -->\n" + "\n".join(rows) + "\n\n30 seeds from 7 on.\n"
-        f"{END}\n"
-    )
-    said = script.findings(page)
-    assert "delivers 2.5 times as much**: 25 robots with `ppo-b` bring 25.0 [24.0, 26.0]" in said
-    # R = (P_F - P_o) / P_o + m/N, with m/N = 0.08.
-    assert "in mode FM1 (tells a false timer) `swarm-dt` delivers 58 % less" in said
-    assert "while `ppo-b` withstands it (0.05 [0.01, 0.07])" in said
-    assert "`ppo-b` scales best (S = 0.5 [0.4, 0.6]), and `a` delivers less" in said
-    assert "is cleared 10 times as fast by a learned swarm" in said
-    assert "this re-implementation supports 5 and contradicts 2 (2 on FM1); 2 are open." in said
-    assert "over 30 seeds" in said
-
-
 @pytest.mark.parametrize("address", [None, "https://forge.example/swarm"])
 def test_links_lead_to_files_or_the_page_says_where_they_do_not(
     address: str | None, script: Any

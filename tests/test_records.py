@@ -5,11 +5,7 @@ from typing import Annotated, Any, ClassVar
 import pytest
 from pydantic import Field, PositiveFloat
 
-from swarm_logistics_env.errors import (
-    PolicyError,
-    SwarmLogisticsError,
-    suggest,
-)
+from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
 
 
@@ -44,14 +40,8 @@ def test_what_is_wrong_is_named_in_an_error_of_the_records_own_type(
 ) -> None:
     with pytest.raises(PolicyError, match=said):
         Lamp(**fields)
-
-
-def test_a_missing_field_is_named() -> None:
     with pytest.raises(SwarmLogisticsError, match=r"^Switch\.number is missing$"):
         Switch()  # type: ignore[call-arg]
-
-
-def test_a_long_value_is_cut_short() -> None:
     with pytest.raises(PolicyError) as refused:
         Lamp(power="x" * 10_000)  # type: ignore[arg-type]
     assert len(str(refused.value)) < 300
@@ -74,8 +64,3 @@ def test_json_there_and_back() -> None:
     for text in ("nonsense", '{"power": 0}', '{"colour": 1}'):
         with pytest.raises(PolicyError, match="Lamp"):
             Lamp.from_json(text)
-
-
-def test_suggest() -> None:
-    assert suggest("taxi", ["taxis", "drop"]) == "; did you mean 'taxis'?"
-    assert suggest("zzz", ["b", "a"]) == "; known: a, b"

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import SCENARIO_PRESETS, Scenario, Warehouse
-from swarm_logistics_env.errors import ScenarioError, SwarmLogisticsError
+from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.scenario import SOURCES
 
 
@@ -28,6 +28,8 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
     assert Scenario.from_json(scenario.to_json()) == scenario
     assert Scenario(**json.loads(json.dumps(scenario.model_dump(mode="json")))) == scenario
     assert hash(Scenario.from_json(scenario.to_json())) == hash(scenario)
+    with pytest.raises(ValueError, match="frozen"):
+        scenario.n_robots = 3  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
@@ -35,16 +37,11 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
     [
         ({"n_robots": 0}, "Scenario.n_robots = 0: should be greater than 0"),
         ({"n_robots": 2.5}, "Scenario.n_robots = 2.5: should be a valid integer"),
-        ({"n_robots": "many"}, "Scenario.n_robots = 'many': should be a valid integer"),
-        ({"n_obstacles": -1}, "n_obstacles = -1: should be greater than or equal to 0"),
         ({"warehouse_width": 0.0}, "warehouse_width = 0.0: should be greater than 0"),
         ({"duration": math.nan}, "duration = nan: should be a finite number"),
-        ({"duration": math.inf}, "duration = inf: should be a finite number"),
         ({"memory_size": 17}, "memory_size = 17: should be less than or equal to 16"),
         ({"relay": "flood"}, "relay = 'flood': should be 'none' or 'gossip'"),
-        ({"restock": "sometimes"}, "restock = 'sometimes': should be a valid boolean"),
         ({"n_robot": 3}, "no field 'n_robot'; did you mean 'n_robots'?"),
-        ({"qqq": 3}, "no field 'qqq'; known: .*n_robots"),
         ({"n_robots": 0, "n_items": -1}, r"n_robots = 0: .*; .*n_items = -1: .*"),
         # What cannot be built.
         ({"warehouse_width": 0.5}, "delivery_width = 2.0 m leaves no storage: .* than .* 0.5 m"),
@@ -53,7 +50,6 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
             r"n_robots = 25 of radius 0.125 m do not fit .* 0.4 x 0.5 m: should be at most 1 ",
         ),
         ({"n_items": 5000}, "n_items = 5000 .* do not fit .* 8 x 10 m: should be at most 651"),
-        ({"n_robots": 10**9}, "n_robots = 1000000000 .* should be at most 651"),
         ({"n_obstacles": 300}, "n_obstacles = 300 .* should be at most 113"),
         ({"n_obstacles": 100, "n_items": 200}, r"n_items = 200 .* should be at most \d+ "),
         ({"warehouse_height": 0.2}, "warehouse_height = 0.2 m is narrower .* at least 0.25 m"),
@@ -62,9 +58,10 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
         ({"physics_period": 0.05}, "physics_period = 0.05 s: should be at most 0.02 s, or robots"),
         ({"max_speed": 6.0}, r"lets a robot cross 0.12 m .* at most .* 0.0166667 s"),
         ({"duration": 0.05}, "duration = 0.05 s should be at least one control_period"),
+        ({"n_requests": 61}, "n_requests = 61: should be at most n_items = 60"),
+        ({"dock_capacity": 10.1}, "dock_capacity = 10.1: should be at most .* 10 per second"),
         # Numbers that no run survives.
         ({"duration": 1e308}, "duration = 1e.308: should be at most 1e.09"),
-        ({"timer_limit": 1e308}, "timer_limit = 1e.308: should be at most 1e.09"),
         ({"obstacle_radius": 1e-300}, "obstacle_radius = 1e-300: should be at least 1e-09"),
         ({"physics_period": 1e-8}, "physics steps of a control_period: should be at most 1000"),
     ],
@@ -87,13 +84,6 @@ def test_as_many_as_it_says_fit_do_fit(field: str, count: int) -> None:
     Warehouse(smallest.replace(**{field: count})).reset(0)
     with pytest.raises(ScenarioError, match=field):
         smallest.replace(**{field: 652})
-
-
-def test_a_scenario_cannot_be_changed_in_place() -> None:
-    scenario = Scenario()
-    with pytest.raises((SwarmLogisticsError, ValueError), match="frozen"):
-        scenario.n_robots = 3  # type: ignore[misc]
-    assert scenario.n_robots == 25
 
 
 @pytest.mark.parametrize(
@@ -131,6 +121,7 @@ def test_presets() -> None:
     assert set(SCENARIO_PRESETS) == {"paper", "paper_scalability", "dots", "realistic"}
     assert Scenario.preset("paper") == Scenario()
     assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
+    assert Scenario.preset("realistic").handling_steps == 10
     assert Scenario.preset("dots") == Scenario(max_speed=1.0, max_acceleration=2.0)
     with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
         Scenario.preset("papr")

@@ -11,7 +11,7 @@ from swarm_logistics_env import Warehouse
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.warehouse import FailureMode
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.handling import IDLE, LIFTING
+from swarm_logistics_env.warehouse.logistics import IDLE, LIFTING
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam

@@ -15,8 +15,6 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import numbers_of
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.logistics import first_not_finite
-from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers import Wrapper
 
@@ -165,8 +163,8 @@ class Worlds:
             raise SetupError("step before reset: call reset() first")
         given = numbers_of(commands, "actions", self._commands.shape)
         self._commands[:] = given
-        row = first_not_finite(self._commands.reshape(self.n_rows, -1))
-        if row != NOBODY:
+        if not np.isfinite(self._commands).all():
+            row = int(np.argwhere(~np.isfinite(self._commands))[0, 0])
             world = int(self.world_of[row])
             raise CommandError(
                 f"actions[{row}] = {given[row]} (world {world}, robot_"

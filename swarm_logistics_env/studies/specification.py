@@ -123,7 +123,7 @@ class Faults(Factor):
 
     Args:
         modes: failure modes of the task other than "removed", which is the reference P_S: there the
-            robots are removed for good. In the warehouse also a part of a mode, as "dead[move]".
+            robots are removed for good.
         robots: numbers m of faulty robots, each below the swarm size.
         onsets: the times at which robots fail [s].
         duration: how long a failure lasts [s]; without it, until the end of the episode.
@@ -265,8 +265,7 @@ class Specification(_Part):
             task = task_of(info.data["task"])
             known = set(task.failure_modes) - {task.removed}
             for mode in (mode for factor in faults for mode in factor.modes):
-                # The task tells whether a robot can lose that part of a mode.
-                if mode.partition("[")[0] not in known:
+                if mode not in known:
                     raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
         return faults
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import MISSING, dataclass, fields, replace
-from functools import lru_cache
-from typing import Any
+from dataclasses import dataclass
 
 from swarm_logistics_env.errors import FaultError, suggest
 
@@ -123,64 +120,13 @@ FAILURE_MODES: dict[str, FailureMode] = {
     ),
 }
 
-# What a mode can take, each with the fields of `FailureMode` that tell of it.
-CAPABILITIES: dict[str, tuple[str, ...]] = {
-    "move": ("speed", "wears", "obeys"),
-    "sense": ("view", "rangers", "ranger_bias", "rangers_refresh"),
-    "pick_up": ("lifts",),
-    "deliver": ("delivers", "releases_inside"),
-    "send": ("sends", "radio_delay"),
-    "hear": ("hears",),
-    "tell_the_truth": ("honest",),
-    "be_there": ("present",),
-}
-_SOUND = {each.name: each.default for each in fields(FailureMode) if each.default is not MISSING}
-_PARTIAL = re.compile(r"(?P<mode>\w+)\[(?P<lost>\w+(,\w+)*)\]")
-
-
-def lost_capabilities(mode: str) -> tuple[str, ...]:
-    """Return the capabilities of `CAPABILITIES` that a mode takes, whole or in part.
-
-    Raises:
-        FaultError: there is no such mode.
-    """
-    found = failure_mode(mode)
-    changed = {name for name, sound in _SOUND.items() if getattr(found, name) != sound}
-    if found.factor is not None:  # the fault's own factor may be less than the mode's
-        changed.add(found.factor)
-    return tuple(name for name, own in CAPABILITIES.items() if changed.intersection(own))
-
-
-@lru_cache
-def _partial(mode: FailureMode, lost: tuple[str, ...]) -> FailureMode:
-    kept: dict[str, Any] = {}
-    for name, own in CAPABILITIES.items():
-        if name not in lost:
-            kept |= {each: _SOUND[each] for each in own}
-            kept |= {"factor": None} if mode.factor in own else {}
-    return replace(mode, description=f"{mode.description}; of this: {', '.join(lost)}", **kept)
-
 
 def failure_mode(name: str) -> FailureMode:
     """Return the failure mode of that name.
 
-    Args:
-        name: a key of `FAILURE_MODES`; or, as "dead[move,send]", a mode of which a robot loses
-            these capabilities alone, which tells what each of them costs.
-
     Raises:
-        FaultError: there is no such mode, or it does not take such a capability.
+        FaultError: there is no such mode.
     """
-    if name in FAILURE_MODES:
-        return FAILURE_MODES[name]
-    match = _PARTIAL.fullmatch(name)
-    if match is None or match["mode"] not in FAILURE_MODES:
+    if name not in FAILURE_MODES:
         raise FaultError(f"no failure mode {name!r}{suggest(name, FAILURE_MODES)}")
-    lost, able = tuple(match["lost"].split(",")), lost_capabilities(match["mode"])
-    for capability in lost:
-        if capability not in able:
-            raise FaultError(
-                f"failure mode {name!r}: {match['mode']} takes {', '.join(able)}, not "
-                f"{capability!r}{suggest(capability, able)}"
-            )
-    return _partial(FAILURE_MODES[match["mode"]], lost)
+    return FAILURE_MODES[name]

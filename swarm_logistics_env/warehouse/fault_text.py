@@ -19,7 +19,7 @@ FORM = "MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]]"
 
 _NUMBER = r"\d+\.?\d*|\.\d+"
 _FAULT = re.compile(
-    r"(?P<mode>\w+(\[[\w,]+\])?)(:(?P<robots>\d+)(:(?P<role>\w+))?)?"
+    r"(?P<mode>\w+)(:(?P<robots>\d+)(:(?P<role>\w+))?)?"
     rf"(@(?P<onset>{_NUMBER})(\+(?P<duration>{_NUMBER}))?)?"
 )
 

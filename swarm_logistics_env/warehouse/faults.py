@@ -80,7 +80,7 @@ class Fault(Record):
     """A failure mode that affects some robots, from a time on.
 
     Args:
-        mode: a key of `FAILURE_MODES`, or a part of one, see `failure_mode`.
+        mode: a key of `FAILURE_MODES`.
         robots: how many robots fail (1..N), chosen by the seed alone, so that every mode hits the
             same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
         onset: when it begins [s], from the start of the episode.
@@ -238,8 +238,7 @@ class Occurrence:
         switches, fault = self._switches[robot], self.fault
         while switches[-1] <= time + GRACE:
             about = (robot, len(switches) // _SWITCHES)
-            # A part of a mode, as "dead[move]", comes and goes with the whole of it.
-            rng = generator(self._seed, f"intermittent {fault.mode.partition('[')[0]}", *about)
+            rng = generator(self._seed, f"intermittent {fault.mode}", *about)
             means = np.resize(fault.intermittent or (), _SWITCHES)
             switches += (switches[-1] + np.cumsum(rng.exponential(means))).tolist()
         return bisect_right(switches, time + GRACE)

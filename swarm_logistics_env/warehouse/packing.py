@@ -24,6 +24,7 @@ from numba.np import arrayobj
 from numpy.typing import NDArray
 
 cgutils: Any = core.cgutils  # without types
+_WORD, _BYTES = ir.IntType(64), 8
 # System V on x86-64 and AAPCS64 on arm64 pass a structure of two words, all integers or all
 # doubles, exactly as two arguments; Windows on x86-64 passes its address.
 _BY_REFERENCE = sys.platform == "win32" and "ARM" not in sys.version.upper()
@@ -37,11 +38,15 @@ def _passed(builder: Any, kind: types.Type, value: Any, by_reference: bool) -> l
     return list(cgutils.unpack_tuple(builder, value))
 
 
-def _generated(function: Callable[..., Any]) -> Callable[..., None]:
-    return cast("Callable[..., None]", intrinsic(function))
+def _generated(function: Callable[..., Any]) -> Callable[..., int]:
+    return cast("Callable[..., int]", intrinsic(function))
 
 
-def _call(returned: Any) -> Callable[..., Any]:
+def _calling(kind: Any, returned: Any) -> Callable[..., int]:
+    def typed(typing_context: Any, address: types.Type, arguments: types.Type) -> Any:
+        arguments = cast("Any", types).unliteral(arguments)
+        return kind(types.int64, arguments), generate
+
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, packed = values
         given: list[Any] = []
@@ -54,28 +59,16 @@ def _call(returned: Any) -> Callable[..., Any]:
         is_void = isinstance(returned, ir.VoidType)
         return context.get_dummy_value() if is_void else answer
 
-    return generate
+    return _generated(typed)
+
+
+# Both call the C function at an address with a tuple of arguments. Each is an integer (of any width
+# up to 64 bits, or a pointer), a double, or a tuple of two of the same kind: a structure of 16
+# bytes passed by value. The first returns nothing, the second the pointer that it is given.
+call_at, made_at = _calling(types.void, ir.VoidType()), _calling(types.int64, _WORD)
 
 
 @_generated
-def call_at(typing_context: Any, address: types.Type, arguments: types.Type) -> Any:
-    """Call the C function at `address`, which returns nothing, with a tuple of `arguments`.
-
-    Each is an integer (of any width up to 64 bits, or a pointer), a double, or a tuple of two of
-    the same kind: a structure of 16 bytes passed by value.
-    """
-    arguments = cast("Any", types).unliteral(arguments)
-    return types.void(types.int64, arguments), _call(ir.VoidType())
-
-
-@cast("Callable[..., Callable[[int, tuple[Any, ...]], int]]", intrinsic)
-def made_at(typing_context: Any, address: types.Type, arguments: types.Type) -> Any:
-    """Call the C function at `address` as `call_at` does; returns the pointer that it returns."""
-    arguments = cast("Any", types).unliteral(arguments)
-    return types.int64(types.int64, arguments), _call(ir.IntType(64))
-
-
-@cast("Callable[..., Callable[[int], Any]]", intrinsic)
 def pointer_at(typing_context: Any, address: types.Type) -> Any:
     """Return `address` as the pointer that `numba.carray` takes."""
 
@@ -97,9 +90,55 @@ def store_at(typing_context: Any, address: types.Type, value: types.Type) -> Any
     return types.void(types.int64, types.int32), generate
 
 
-S = TypeVar("S", bound=tuple[Any, ...])
+_IN_ORDER = "seq_cst"  # all threads see all changes in one order
 
-_WORD, _BYTES = ir.IntType(64), 8
+
+def _word_of(builder: Any, address: Any, place: Any) -> Any:
+    return builder.gep(builder.inttoptr(address, _WORD.as_pointer()), [place])
+
+
+@_generated
+def load(typing_context: Any, address: types.Type, place: types.Type) -> Any:
+    """Return a word, by its place in those at `address`."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.load_atomic(_word_of(builder, *values), _IN_ORDER, _BYTES)
+
+    return types.int64(types.int64, types.int64), generate
+
+
+def _changed_by(operation: str) -> Callable[..., int]:
+    def typed(typing_context: Any, address: types.Type, place: types.Type, by: types.Type) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            *where, given = values
+            return builder.atomic_rmw(operation, _word_of(builder, *where), given, _IN_ORDER)
+
+        return types.int64(types.int64, types.int64, types.int64), generate
+
+    return _generated(typed)
+
+
+# Both take an address, the place of a word there, and an integer, which is stored in it or added
+# to it; they return the old value.
+exchange, add = _changed_by("xchg"), _changed_by("add")
+
+
+@_generated
+def replace(
+    typing_context: Any, address: types.Type, place: types.Type, old: types.Type, new: types.Type
+) -> Any:
+    """Put `new` into a word, by its place, if `old` is there; returns whether it was."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        *where, was, becomes = values
+        word = _word_of(builder, *where)
+        found = builder.cmpxchg(word, was, becomes, _IN_ORDER, _IN_ORDER)
+        return builder.extract_value(found, 1)
+
+    return types.boolean(*[types.int64] * 4), generate
+
+
+S = TypeVar("S", bound=tuple[Any, ...])
 
 
 def hints(structure: type) -> dict[str, Any]:
@@ -195,11 +234,10 @@ def _field(context: Any, builder: Any, kind: StructureAt, address: Any, name: st
     found, before = _places(kind.structure)[name]
     if isinstance(found, StructureAt):
         return builder.add(address, ir.Constant(_WORD, _BYTES * before))
-    words = builder.inttoptr(address, _WORD.as_pointer())
     places = itertools.count(before)
 
     def word() -> Any:
-        loaded = builder.load(builder.gep(words, [ir.Constant(_WORD, next(places))]))
+        loaded = builder.load(_word_of(builder, address, ir.Constant(_WORD, next(places))))
         # No kernel changes the words, so LLVM need not read them again after stores elsewhere.
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded

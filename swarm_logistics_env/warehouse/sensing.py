@@ -23,7 +23,6 @@ from .surroundings import (
     choose_neighbours,
     in_frame,
     listen,
-    lowest_timer_heard,
     scan_discs,
     scan_solids,
     see_items,
@@ -163,10 +162,12 @@ def fail_rangers(world: World, rows: Sensed) -> None:
         if not robots.present[robot]:
             continue
         beams, frozen = rows[robot, :_N_RANGES], robots.frozen_beams[robot]
-        if able.ranger_bias[robot] != 0.0:
-            own = able.ranger_range[robot]
+        bias, own = able.ranger_bias[robot], able.ranger_range[robot]
+        if bias != 0.0:
             reach = own if own > 0.0 else world.parameters.ranger_range
-            add_bias(beams, able.ranger_bias[robot], reach)
+            for beam in range(_N_RANGES):
+                if beams[beam] < np.float32(reach):
+                    beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
         if able.rangers_refresh[robot]:
             frozen[0] = math.nan
         elif math.isnan(frozen[0]):
@@ -175,14 +176,6 @@ def fail_rangers(world: World, rows: Sensed) -> None:
         else:
             for beam in range(_N_RANGES):
                 beams[beam] = frozen[beam]
-
-
-@kernel
-def add_bias(beams: Sensed, bias: float, reach: float) -> None:
-    """Lengthen the beams that meet something by `bias` [m], at most to `reach` [m]."""
-    for beam in range(len(beams)):
-        if beams[beam] < np.float32(reach):
-            beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
 
 
 @kernel
@@ -232,8 +225,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     if ranger_range > 0.0:
         scan = out[row.RANGE_ROBOTS : row.RANGE_ROBOTS + row.N_BEAMS]
         scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
-    listen(me, world, n_found)
-    lowest, timer = lowest_timer_heard(world, n_found)
+    lowest, timer = listen(me, world, n_found)
     if lowest != NOBODY:
         robots.heard[me] = timer
         forward, left = in_frame(pose, robots.position[lowest, 0], robots.position[lowest, 1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,18 +54,16 @@ class Count(Generic[V]):
 
     def __set_name__(self, owner: type[WarehouseState], name: str) -> None:
         """Take the attribute's name."""
-        self.place = Progress._fields.index(name)
+        self.name = name
 
     def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> V:
         """Return the number."""
-        numbers: NDArray[Any] = state.progress[self.place]
-        number: V = numbers.item(0)
+        number: V = getattr(state.progress, self.name).item(0)
         return number
 
     def __set__(self, state: WarehouseState, value: V) -> None:
         """Set the number."""
-        numbers: NDArray[Any] = state.progress[self.place]
-        numbers[0] = value
+        getattr(state.progress, self.name)[0] = value
 
 
 class WarehouseState:

@@ -14,8 +14,15 @@ from swarm_logistics_env.kernels import kernel
 
 from .demand import ask
 from .grid import fill, look_around
-from .handling import end_handling
-from .logistics import carry_along, close_grippers, deliver, drive, open_grippers, refused_command
+from .logistics import (
+    carry_along,
+    close_grippers,
+    deliver,
+    drive,
+    end_handling,
+    open_grippers,
+    refused_command,
+)
 from .packing import unpacked_at
 from .physics import FREE_ITEM, LIFTED, NO_ONE, advance, collide_with, follow
 from .sensing import disturb, fail_rangers, sense

@@ -74,7 +74,7 @@ class Robots(NamedTuple):
     last_in_delivery: Annotated[Integers, "N"]  # the last step in which it was, or NOBODY
     contact: Annotated[Flags, "N"]  # touches something solid to it
     item: Annotated[Integers, "N"]  # item carried, or NOBODY
-    handling: Annotated[Integers, "N", 3]  # kind, item and last step, see `handling`
+    handling: Annotated[Integers, "N", 3]  # kind, item and last step, see `logistics`
     memory: Annotated[Integers, "N", "memory_size"]  # items put down, newest first, or NOBODY
     timer: Annotated[Numbers, "N"]  # [s] since the delivery area, NaN when silent
     told: Annotated[Numbers, "N"]  # [s] the timer it broadcasts, NaN when silent

@@ -54,18 +54,10 @@ def scan_disc(forward: float, left: float, square: float, radius: float, scan: S
         scan: is changed.
     """
     clearance = square - radius * radius
-    middle = nearest_beam(forward, left)
-    if square > _ONE_BEAM * radius * radius:
-        # Without a branch: whether it is met cannot be predicted.
-        along = forward * _BEAM_X[middle] + left * _BEAM_Y[middle]
-        inside = along * along - clearance
-        distance = along - math.sqrt(max(inside, 0.0))
-        met = inside > 0.0 and distance < scan[middle]
-        scan[middle] = distance if met else scan[middle]
-        return
     if clearance <= 0.0:
         scan[:] = 0.0
         return
+    middle = nearest_beam(forward, left)
     # Outwards from the beam that looks nearest to its centre: if that one misses, all do.
     for way in (1, -1):
         for turned in range(_N_BEAMS // 2):
@@ -232,33 +224,26 @@ def run_timers(world: World) -> None:
 
 
 @inlined_kernel
-def listen(me: int, world: World, n_found: int) -> None:
-    """Note in `nearby.is_heard` which of the robots found nearby `me` hears."""
+def listen(me: int, world: World, n_found: int) -> tuple[int, float]:
+    """Note in `nearby.is_heard` which of the robots found nearby `me` hears.
+
+    Returns who of them tells the lowest timer, or NOBODY, and it [s]. If several broadcast the same
+    timer, it is the nearest of them.
+    """
     robots, able, nearby = world.robots, world.able, world.nearby
     limit, loss = world.parameters.radio_range**2, world.parameters.radio_loss
-    step = world.progress.step[0]
+    lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
     for index in range(n_found):
-        other = world.robot_grid.members[nearby.place[index]]
-        is_heard = (nearby.square[index] <= limit) & able.sends[other] & able.hears[me]
+        other, square = world.robot_grid.members[nearby.place[index]], nearby.square[index]
+        is_heard = (square <= limit) & able.sends[other] & able.hears[me]
         if loss > 0.0 and is_heard:
+            step = world.progress.step[0]
             is_heard = not is_missed(robots.sensor_key[me], other, step, RADIO, loss)
         nearby.is_heard[index] = is_heard
-
-
-@inlined_kernel
-def lowest_timer_heard(world: World, n_found: int) -> tuple[int, float]:
-    """Return who tells the lowest timer of those nearby that are heard, or NOBODY, and it [s].
-
-    If several broadcast the same timer, it is the nearest of them.
-    """
-    robots, grid, nearby = world.robots, world.robot_grid, world.nearby
-    lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
-    # Without branches, as what they hang on cannot be predicted.
-    for index in range(n_found):
-        other, square = grid.members[nearby.place[index]], nearby.square[index]
+        # Without branches, as what they hang on cannot be predicted.
         told = robots.told[other]
         is_lower = (told < lowest_timer) | ((told == lowest_timer) & (square < lowest_square))
-        is_lower &= nearby.is_heard[index]
+        is_lower &= is_heard
         lowest = other if is_lower else lowest
         lowest_square = square if is_lower else lowest_square
         lowest_timer = told if is_lower else lowest_timer

@@ -16,13 +16,10 @@ import time
 import weakref
 from collections.abc import Callable, Sequence
 from queue import SimpleQueue
-from typing import Any, cast
+from typing import Any
 
 import numba
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
-from numba.core import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import ScenarioError
@@ -30,58 +27,9 @@ from swarm_logistics_env.kernels import inlined_kernel, kernel
 
 from . import stepping
 from .logistics import refused_command
-from .packing import pointer_at, unpacked_at
+from .packing import add, exchange, load, pointer_at, replace, unpacked_at
 from .structs import NOBODY, Numbers, Sensed, World
 from .warehouse import Warehouse, not_finite
-
-_WORD = 8  # bytes
-_IN_ORDER = "seq_cst"  # all threads see all changes in one order
-
-
-def _generated(function: Callable[..., Any]) -> Callable[..., int]:
-    return cast("Callable[..., int]", intrinsic(function))
-
-
-def _there(builder: Any, address: Any) -> Any:
-    return builder.inttoptr(address, ir.IntType(8 * _WORD).as_pointer())
-
-
-@_generated
-def load(typing_context: Any, address: types.Type) -> Any:
-    """Return the integer of 64 bits at `address`."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.load_atomic(_there(builder, values[0]), _IN_ORDER, _WORD)
-
-    return types.int64(types.int64), generate
-
-
-def _changed_by(operation: str) -> Callable[..., int]:
-    def typed(typing_context: Any, address: types.Type, value: types.Type) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            where, given = values
-            return builder.atomic_rmw(operation, _there(builder, where), given, _IN_ORDER)
-
-        return types.int64(types.int64, types.int64), generate
-
-    return _generated(typed)
-
-
-# Both take an address and an integer, which is stored or added there; they return the old value.
-exchange, add = _changed_by("xchg"), _changed_by("add")
-
-
-@_generated
-def replace(typing_context: Any, address: types.Type, old: types.Type, new: types.Type) -> Any:
-    """Put `new` at `address` if `old` is there; returns whether it was."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        where, old_value, new_value = values
-        found = builder.cmpxchg(_there(builder, where), old_value, new_value, _IN_ORDER, _IN_ORDER)
-        return builder.extract_value(found, 1)
-
-    return types.boolean(types.int64, types.int64, types.int64), generate
-
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
 
@@ -212,7 +160,7 @@ def _close(queue: NDArray[np.int64], wake: SimpleQueue[None], n_helpers: int) ->
 @inlined_kernel
 def job_at(queue: int, place: int) -> int:
     """Return the address of a job."""
-    return queue + _WORD * (FIRST_JOB + place * JOB_LENGTH)
+    return queue + 8 * (FIRST_JOB + place * JOB_LENGTH)
 
 
 @kernel
@@ -227,10 +175,10 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
     Returns:
         The place, row by row, of the first command that is not finite; NOBODY if all are.
     """
-    n_jobs = load(queue + _WORD * N_JOBS)
+    n_jobs = load(queue, N_JOBS)
     for place in range(n_jobs):
         job = job_at(queue, place)
-        world, first = unpacked_at(World, load(job + _WORD * WORLD)), load(job + _WORD * FIRST_ROW)
+        world, first = unpacked_at(World, load(job, WORLD)), load(job, FIRST_ROW)
         now = world.commands.now
         for robot in range(len(now)):
             for column in range(now.shape[1]):
@@ -240,37 +188,37 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
         if refused != NOBODY:
             return int(first * commands.shape[1] + refused)
     for place in range(n_jobs):
-        exchange(job_at(queue, place) + _WORD * IS_DONE, 0)
-    exchange(queue + _WORD * ROWS, rows.ctypes.data)
-    exchange(queue + _WORD * ROW_COLUMNS, rows.shape[1])
-    add(queue + _WORD * GIVEN, n_jobs)
+        exchange(job_at(queue, place), IS_DONE, 0)
+    exchange(queue, ROWS, rows.ctypes.data)
+    exchange(queue, ROW_COLUMNS, rows.shape[1])
+    add(queue, GIVEN, n_jobs)
     return NOBODY
 
 
 @kernel
 def take_sleepers(queue: int) -> int:
     """Return how many helpers went to sleep and were not yet called."""
-    return exchange(queue + _WORD * ASLEEP, 0)
+    return exchange(queue, ASLEEP, 0)
 
 
 @kernel
 def run_next_job(queue: int) -> bool:
     """Step the next world, or return that none is left to take."""
     while True:
-        taken = load(queue + _WORD * TAKEN)
-        if taken >= load(queue + _WORD * GIVEN):
+        taken = load(queue, TAKEN)
+        if taken >= load(queue, GIVEN):
             return False
-        if replace(queue + _WORD * TAKEN, taken, taken + 1):
+        if replace(queue, TAKEN, taken, taken + 1):
             break
-    job = job_at(queue, taken % load(queue + _WORD * N_JOBS))
-    address, first = load(job + _WORD * WORLD), load(job + _WORD * FIRST_ROW)
+    job = job_at(queue, taken % load(queue, N_JOBS))
+    address, first = load(job, WORLD), load(job, FIRST_ROW)
     n_robots = len(unpacked_at(World, address).robots.item)
-    n_columns = load(queue + _WORD * ROW_COLUMNS)
-    own = load(queue + _WORD * ROWS) + 4 * first * n_columns
+    n_columns = load(queue, ROW_COLUMNS)
+    own = load(queue, ROWS) + 4 * first * n_columns
     rows = carray(pointer_at(own), (n_robots, n_columns), np.float32)
     is_eventful = stepping.step(address, rows)
-    exchange(job + _WORD * IS_EVENTFUL, int(is_eventful))
-    exchange(job + _WORD * IS_DONE, 1)
+    exchange(job, IS_EVENTFUL, int(is_eventful))
+    exchange(job, IS_DONE, 1)
     return True
 
 
@@ -281,11 +229,11 @@ def next_told(queue: int, place: int, patience: int) -> int:
     Returns its place; the number of worlds if all are done and none is; _NOT_YET if others still
     step it after `patience` looks.
     """
-    n_jobs, looks = load(queue + _WORD * N_JOBS), 0
+    n_jobs, looks = load(queue, N_JOBS), 0
     while place < n_jobs:
         job = job_at(queue, place)
-        if load(job + _WORD * IS_DONE) != 0:
-            if load(job + _WORD * IS_EVENTFUL) != 0 or load(job + _WORD * IS_WATCHED) != 0:
+        if load(job, IS_DONE) != 0:
+            if load(job, IS_EVENTFUL) != 0 or load(job, IS_WATCHED) != 0:
                 return place
             place += 1
         elif not run_next_job(queue):
@@ -300,8 +248,8 @@ def finish(queue: int) -> None:
     """Step all worlds that are left and wait for those that others step."""
     while run_next_job(queue):
         pass
-    for place in range(load(queue + _WORD * N_JOBS)):
-        while load(job_at(queue, place) + _WORD * IS_DONE) == 0:
+    for place in range(load(queue, N_JOBS)):
+        while load(job_at(queue, place), IS_DONE) == 0:
             pass
 
 
@@ -310,12 +258,12 @@ def help_out(queue: int, patience: int) -> bool:
     """Work until nothing came for `patience` looks; returns whether the pool is closed."""
     looks = 0
     while looks < patience:
-        if load(queue + _WORD * IS_CLOSED) != 0:
+        if load(queue, IS_CLOSED) != 0:
             return True
         looks = 0 if run_next_job(queue) else looks + 1
     # Asleep first, then one more look: whoever gave before it must be seen, whoever gives
     # after it sees the sleeper.
-    add(queue + _WORD * ASLEEP, 1)
+    add(queue, ASLEEP, 1)
     while run_next_job(queue):
         pass
-    return load(queue + _WORD * IS_CLOSED) != 0
+    return load(queue, IS_CLOSED) != 0

@@ -19,13 +19,12 @@ from . import layout, stepping
 from .fault_text import FaultLike, checked_faults
 from .faults import GRACE, Fault, Occurrence, apply_faults
 from .grid import blank_grid
-from .handling import IDLE
+from .logistics import IDLE, MESSAGE
 from .packing import blank, packed
 from .physics import Physics
 from .state import NOBODY, STORED, WarehouseState
 from .structs import Claims, Commands, Nearby, Outcome, Sensed, World, lengths_of, parameters_of
 
-COMMAND_COLUMNS = ("forward", "left", "turn", "gripper")
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
 _NOT_KEPT = ("_physics", "_world", "_words", "_address", "_memory")
@@ -98,10 +97,10 @@ class Warehouse:
         """Move the world by one control period and return what is sensed after it.
 
         Args:
-            commands: (N, 4), columns `COMMAND_COLUMNS`, each in [-1, 1] (beyond is cut): forward
-                and left in fractions of the top speed, turn in fractions of the top turn rate,
-                gripper > 0.5 hold, < -0.5 open, between as it is. Absent robots' rows are ignored.
-                With `message_size` M, (N, 4 + M): the message to broadcast, zeros if left out.
+            commands: (N, 4), each in [-1, 1] (beyond is cut): forward and left in fractions of the
+                top speed, turn in fractions of the top turn rate, gripper > 0.5 hold, < -0.5 open,
+                between as it is. Absent robots' rows are ignored. With `message_size` M,
+                (N, 4 + M): the message to broadcast, zeros if left out.
 
         Returns:
             Observations (N, D) float32, an array of the caller's own.
@@ -253,9 +252,8 @@ class Warehouse:
         if given.dtype.kind not in "fiub":  # NumPy makes numbers of texts and times, too
             raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
         n, n_columns = self._command_shape
-        plain = len(COMMAND_COLUMNS)
-        if given.shape == (n, plain):
-            return np.pad(given, ((0, 0), (0, n_columns - plain)))
+        if given.shape == (n, MESSAGE):
+            return np.pad(given, ((0, 0), (0, n_columns - MESSAGE)))
         if given.shape != self._command_shape:
             raise CommandError(f"commands of shape {given.shape}: should be {self._command_shape}")
         return given
@@ -270,7 +268,7 @@ class Warehouse:
         # and few of them in vain.
         self._robot_grid = blank_grid(width, height, hears / 2, n)
         self._item_grid = blank_grid(width, height, sees / 2, n_items)
-        self._command_shape = (n, len(COMMAND_COLUMNS) + scenario.message_size)
+        self._command_shape = (n, MESSAGE + scenario.message_size)
         self._row_shape = (n, n_columns(scenario))
         size = math.prod(self._command_shape)
         self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
@@ -310,13 +308,15 @@ class Warehouse:
 
     def _apply_faults(self) -> None:
         state = self.state
-        now, next_step = state.time, (state.step + 1) * self.scenario.control_period
+        period = self.scenario.control_period
+        now, next_step = state.time, (state.step + 1) * period
         change = min(
             (each.next_change(now, next_step) for each in self._occurrences), default=math.inf
         )
         state.progress.is_changed[0] = True
-        # The first step that ends when it has come.
-        state.progress.pause_step[0] = self._step_of(change)
+        # The first step that ends when it has come; or none of any episode.
+        is_ever = change <= LARGEST
+        state.progress.pause_step[0] = math.ceil((change - GRACE) / period) if is_ever else NOBODY
         gone = apply_faults(state, self.scenario, self._occurrences)
         for robot in np.flatnonzero(gone & state.robot_present).tolist():
             self._remove(robot)
@@ -337,17 +337,6 @@ class Warehouse:
         state.robot_memory[robot] = NOBODY
         for zeroed in (state.robot_position, state.robot_velocity, state.robot_heading):
             zeroed[robot] = 0.0
-
-    def _step_of(self, time: float) -> int:
-        """Return the first step at whose end `time` [s] has come, or NOBODY: in no episode."""
-        if time > LARGEST:
-            return NOBODY
-        period = self.scenario.control_period
-        step = math.ceil((time - GRACE) / period)
-        # Rounding may have taken it one too far, or not far enough.
-        if (step - 1) * period >= time - GRACE:
-            return step - 1
-        return step if step * period >= time - GRACE else step + 1
 
     def _blank_rows(self) -> Sensed:
         # New memory every time: what was handed out stays as it was.

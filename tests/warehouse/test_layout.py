@@ -77,15 +77,12 @@ def test_every_item_is_requested_once_and_in_an_order_keyed_by_item(seed: int, c
 def test_places_are_spread_evenly() -> None:
     scenario = Scenario(n_robots=1)
     starts = [layout.place_robots(scenario, seed, NOTHING) for seed in range(800)]
-    places = np.array([centres[0] for centres, _ in starts])
+    drawn = np.array([[*centres[0], heading[0]] for centres, heading in starts])
+    spans = np.array([8.0 - 0.25, 10.0 - 0.25, 2.0 * np.pi])
     # Means of uniform numbers, within five standard errors.
-    for axis, side in enumerate((8.0, 10.0)):
-        span = side - 0.25
-        error = span / np.sqrt(12 * 800)
-        assert abs(places[:, axis].mean() - side / 2) < 5 * error
-        assert abs(places[:, axis].std() - span / np.sqrt(12)) < 0.15
-    mean_heading = np.mean([heading[0] for _, heading in starts])
-    assert abs(mean_heading) < 5 * 2 * np.pi / np.sqrt(12 * 800)
+    shares = (drawn - [0.125, 0.125, -np.pi]) / spans
+    assert shares.mean(axis=0) == pytest.approx([0.5] * 3, abs=5.0 / np.sqrt(12 * 800))
+    assert shares.std(axis=0) == pytest.approx([1.0 / np.sqrt(12)] * 3, abs=0.02)
 
 
 def test_a_restocked_item_stands_clear_and_each_elsewhere() -> None:

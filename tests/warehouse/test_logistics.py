@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env import Fault
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 from tests.warehouse.conftest import (
@@ -71,6 +71,10 @@ HANDS: dict[str, tuple[Any, ...]] = {
     "nothing beyond the pick-up range, whose end belongs to it": (
         [(2.0, 2.0), (5.0, 5.0), (2.0, 8.0)], [(2.251, 2.0), (5.249, 5.0), (2.25, 8.0)],
         [[HOLD] * 3], [-1, 1, 2]),
+    "who opens an empty hand changes nothing": (
+        [(2.0, 2.0), (5.0, 5.0)], [FAR, (4.0, 9.0), (5.0, 5.1)], [[STAY, HOLD], [OPEN, STAY]],
+        [-1, 2]),
+    "an item goes where its carrier goes": (ONE, [FAR, (2.1, 2.1)], [[HOLD], *[[EAST]] * 3], [1]),
     "nothing more than one item": (ONE, [(2.1, 2.0), (1.8, 2.0)], [[HOLD]] * 3, [0]),
     "FM2 masks no item": (PAIR, [(2.18, 2.0)], BOTH, [-1, 0], [Fault("FM2", (0,))]),
     "who stays masks no item": (PAIR, [(2.18, 2.0)], [[STAY, HOLD]], [-1, 0]),
@@ -114,27 +118,6 @@ def test_what_is_in_whose_hand(build: Build, case: str) -> None:
             np.testing.assert_array_equal(state.item_position[item], state.robot_position[carrier])
 
 
-def test_an_empty_robot_that_opens_its_gripper_changes_nothing(build: Build) -> None:
-    world = build([(2.0, 2.0), (5.0, 5.0)], [FAR, (4.0, 9.0), (5.0, 5.1)])
-    follow(world, [[STAY, HOLD], [OPEN, STAY]])
-    assert world.state.robot_item.tolist() == [NOBODY, 2]
-    assert world.state.item_status.tolist() == [STORED, STORED, CARRIED]
-    assert world.state.item_carrier.tolist() == [NOBODY, NOBODY, 1]
-    assert (world.state.robot_memory == NOBODY).all()
-
-
-def test_an_item_goes_where_its_carrier_goes_and_is_put_down_there(build: Build) -> None:
-    world = build([(2.0, 2.0)], [FAR, (2.1, 2.1)])
-    state = world.state
-    for command in (HOLD, EAST, EAST, EAST, OPEN):
-        world.step([command])
-        np.testing.assert_array_equal(state.item_position[1], state.robot_position[0])
-    assert state.item_position[1, 0] > 2.3
-    assert (state.item_status[1], state.item_carrier[1]) == (STORED, NOBODY)
-    steps(world, WEST, times=3)
-    assert state.item_position[1, 0] > state.robot_position[0, 0]
-
-
 def test_only_who_lifts_collides_with_items_and_only_until_it_lets_go(build: Build) -> None:
     # An item lies ahead of each robot; 1 and 2 lift in the same step, 0 never does.
     robots = [(2.0, 2.0), (2.0, 4.0), (2.0, 6.0)]
@@ -153,12 +136,6 @@ def test_only_who_lifts_collides_with_items_and_only_until_it_lets_go(build: Bui
     assert place[0, 0] > 3.2
     assert place[1, 0] < 2.95
     assert place[2, 0] > 3.2
-
-
-def test_who_lifts_after_another_put_something_down_collides_with_items(build: Build) -> None:
-    world = build([(2.0, 2.0), (2.0, 4.0)], [FAR, (2.0, 2.1), (2.0, 4.1), (3.0, 4.0)])
-    follow(world, [[HOLD, STAY], [OPEN, STAY], [STAY, HOLD], *[[STAY, EAST]] * 10])
-    assert world.state.robot_position[1, 0] == pytest.approx(2.75, abs=0.02)
 
 
 # -- the memory ---------------------------------------------------------------------------------
@@ -183,15 +160,6 @@ def test_the_memory_holds_the_items_last_put_down_newest_first(
     assert set(lifted) == {*range(1, len(items))}  # each is forgotten after so many others
 
 
-def test_a_remembered_item_can_be_seen_to_be_so(build: Build) -> None:
-    world = build([(2.0, 2.0), (2.6, 2.0)], [FAR, (2.1, 2.0)])
-    steps(world, HOLD, STAY)
-    rows = steps(world, OPEN, STAY)
-    held = row.ITEMS + row.ITEM_FEATURES.index("recently_held")
-    assert rows[:, row.ITEMS].tolist() == [1.0, 1.0]
-    assert rows[:, held].tolist() == [1.0, 0.0]
-
-
 def test_a_delivery_clears_everybodys_memory(build: Build) -> None:
     world = build(
         [(2.0, 2.0), (3.0, 5.0), (INSIDE, 5.0)], [(INSIDE, 5.1), (2.1, 2.0), (3.1, 5.0), FAR]
@@ -203,13 +171,6 @@ def test_a_delivery_clears_everybodys_memory(build: Build) -> None:
     assert (world.state.robot_memory == NOBODY).all()
     steps(world, STAY, HOLD, STAY)
     assert world.state.robot_item[1] == 2
-
-
-def test_letting_go_of_an_item_asked_for_earlier_is_ignored_there_too(build: Build) -> None:
-    world = build([(INSIDE, 5.0)], [(INSIDE, 5.1), FAR, FAR])
-    world.state.requested = 1
-    follow(world, [[HOLD], [OPEN]])
-    assert world.state.robot_item[0] == 0
 
 
 # -- delivering ---------------------------------------------------------------------------------
@@ -229,47 +190,8 @@ def test_an_item_is_delivered_as_soon_as_its_carriers_centre_is_inside(build: Bu
     assert state.robot_item.tolist() == [NOBODY, 2]
     assert state.robot_in_delivery.all()
     assert state.requested == 1
-
-
-def test_the_very_border_belongs_to_the_delivery_area(build: Build) -> None:
-    world = build([(8.0, 5.0), (7.999, 7.0)], [FAR])
-    steps(world, STAY, STAY)
-    assert world.state.robot_in_delivery.tolist() == [True, False]
-
-
-def test_a_shuffled_item_that_becomes_requested_is_delivered_at_once(build: Build) -> None:
-    heights = (5.0, 7.0, 3.0)
-    items = [*((INSIDE, y + 0.1) for y in heights), FAR]
-    world = build([(INSIDE, y) for y in heights], items)
-    steps(world, STAY, HOLD, HOLD)
-    assert world.state.delivered == 0
-    steps(world, HOLD, STAY, STAY)
-    assert world.state.delivered_by == [0, 1, 2]
-    assert len(set(world.state.delivery_times)) == 1
-    assert world.state.requested == 3
-
-
-def test_after_the_last_item_nothing_is_requested(build: Build) -> None:
-    world = build([(INSIDE, 5.0)], [(INSIDE, 5.1), (INSIDE, 4.9)])
-    steps(world, HOLD)
-    assert not world.all_delivered
-    rows = steps(world, HOLD)
-    assert world.all_delivered
-    assert world.state.requested == NOBODY
-    assert rows[0, row.RANGE_ITEMS : row.RANGE_ITEMS + row.N_BEAMS].min() == 2.0
-    steps(world, HOLD)
-    assert world.state.delivered == 2
-
-
-def test_restock_brings_a_delivered_item_back_and_goes_on(build: Build) -> None:
-    world = build([(INSIDE, 5.0)], [(INSIDE, 5.1)], restock=True, pickup_range=12.0)
-    state = world.state
-    for delivered in range(1, 6):
-        steps(world, HOLD)
-        assert (state.delivered, state.requested) == (delivered, 0)
-        assert state.item_status.tolist() == [STORED]
-        assert 0.125 <= state.item_position[0, 0] <= 8.0 - 0.125
-    assert not world.all_delivered
+    border = follow(build([(8.0, 5.0), (7.999, 7.0)], [FAR]), [[STAY, STAY]])  # belongs to it
+    assert border.state.robot_in_delivery.tolist() == [True, False]
 
 
 @pytest.mark.parametrize("restock", [(False, True), (True, False)])
@@ -287,35 +209,6 @@ def test_when_restock_is_switched_what_is_there_is_asked_for(
     # One came back and goes on coming back; or all three were there and left for good.
     assert state.delivered == (12 if restock[1] else 5)
     assert world.all_delivered is restock[0]
-
-
-def test_with_restock_each_cycle_of_requests_has_an_order_of_its_own() -> None:
-    world = Warehouse(Scenario(n_robots=1, n_items=5, pickup_range=20.0, restock=True))
-    world.reset(0)
-    world.change(delivery_width=9.5)
-    state, asked = world.state, []
-    while state.delivered < 25:
-        asked.append(state.requested)
-        heading = float(state.robot_heading[0])
-        world.step([[np.cos(heading), -np.sin(heading), 0.0, 1.0]])
-        asked = asked[: state.delivered]
-        assert state.step < 200
-    cycles = np.reshape(asked, (5, 5)).tolist()
-    assert all(sorted(cycle) == list(range(5)) for cycle in cycles)
-    assert len({tuple(cycle) for cycle in cycles}) > 2
-
-
-def test_an_fm4_carrier_blocks_the_request_until_it_lets_go(build: Build) -> None:
-    robots = [(INSIDE, 5.0), (INSIDE, 5.3)]
-    world = build(robots, [(INSIDE, 5.05), FAR], [Fault("FM4", (0,))], pickup_range=0.4)
-    state = world.state
-    steps(world, HOLD, HOLD, times=3)
-    assert (state.robot_item[0], state.robot_in_delivery[0], state.delivered) == (0, True, 0)
-    steps(world, OPEN, STAY)
-    assert state.item_status[0] == STORED  # the requested item, even inside
-    steps(world, STAY, HOLD)
-    assert state.delivered_by == [1]
-    assert state.requested == 1
 
 
 def test_who_is_removed_puts_its_item_down_for_others(build: Build) -> None:
@@ -352,18 +245,6 @@ def test_a_timer_counts_seconds_since_the_area_and_falls_silent_at_its_limit(bui
     assert state.robot_timer[0] == 0.0
 
 
-def test_an_fm1_robot_tells_zero_always_whatever_its_timer(build: Build) -> None:
-    world = build([(2.0, 2.0), (3.0, 2.0)], [FAR], [Fault("FM1", (0,))])
-    heard = row.NEIGHBOURS + row.NEIGHBOUR_FEATURES.index("timer_heard")
-    for _ in range(3):
-        assert world.state.robot_told[0] == 0.0
-        assert np.isnan(world.state.robot_timer[0])
-        rows = world.observe()
-        assert rows[1, [heard, heard + 1, row.LOWEST_TIMER]].tolist() == [1.0, 0.0, 1.0]
-        assert rows[0, row.TIMER_RUNS] == 0.0  # it is not told of its own lie
-        steps(world, STAY, STAY)
-
-
 LINE = [(INSIDE, 5.0), (5.0, 5.0), (1.5, 5.0)]  # each hears only the next
 
 
@@ -374,33 +255,3 @@ def test_gossip_carries_a_timer_on_and_ages_it_by_every_hop(build: Build) -> Non
     rows = steps(build(LINE, [FAR], relay="gossip"), STAY, STAY, STAY, times=10)
     assert rows[1, lowest] == pytest.approx([1, 3.5, 0, 0.0])
     assert rows[2, lowest] == pytest.approx([1, 3.5, 0, 0.1])
-
-
-def test_with_gossip_the_lower_of_ones_own_timer_and_an_aged_one_is_told(build: Build) -> None:
-    # Robot 1 leaves the area; robot 0 stays there until it is taken out, robot 2 is never heard.
-    faults = [Fault("removed", (0,), onset=2.0)]
-    world = build([(9.5, 5.0), (8.2, 5.0), (1.0, 1.0)], [FAR], faults, relay="gossip")
-    for step in range(1, 31):
-        steps(world, STAY, WEST if step <= 5 else STAY, STAY)
-        own, told = world.state.robot_timer[1], world.state.robot_told[1]
-        if 6 <= step < 20:
-            assert own > 0.3
-            assert told == pytest.approx(0.1)
-        if step > 21:
-            assert told == own
-
-
-def test_gossip_does_not_keep_a_timer_alive_for_ever(build: Build) -> None:
-    # The visitor is taken out; the others go on telling each other, ever older, then nothing.
-    faults = [Fault("removed", (0,), onset=1.0)]
-    world = build(LINE, [FAR], faults, relay="gossip", timer_limit=2.0)
-    told = []
-    for _ in range(60):
-        steps(world, STAY, STAY, STAY)
-        told.append(world.state.robot_told.copy())
-        assert (np.nan_to_num(told[-1]) < 2.0 - 1e-9).all()
-    assert np.isnan([each[0] for each in told[9:]]).all()  # who is gone is silent at once
-    assert not np.isnan(told[9][1:]).any()
-    ages = np.nanmin(np.array(told[10:28])[:, 1:], axis=1)
-    assert (np.diff(ages) > 0.0).all()
-    assert np.isnan(told[30:]).all()

@@ -12,12 +12,7 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.warehouse import packing, physics
 from swarm_logistics_env.warehouse.packing import blank, hints, packed, unpacked_at
-from swarm_logistics_env.warehouse.structs import (
-    Flags,
-    Functions,
-    Keys,
-    Numbers,
-)
+from swarm_logistics_env.warehouse.structs import Claims, Flags, Functions, Keys, Numbers
 
 
 class Inner(NamedTuple):
@@ -71,19 +66,12 @@ def test_an_array_that_is_not_as_declared_is_refused(rows: Any) -> None:
         packed(outer)
 
 
-class Shaped(NamedTuple):
-    """Arrays of named and of fixed lengths."""
-
-    places: Annotated[Numbers, "things", 2]
-    flags: Annotated[Flags, 3]
-
-
 def test_blank_arrays_have_the_lengths_that_their_shapes_name() -> None:
-    shaped = blank(Shaped, {"things": 4, "others": 7})
-    assert shaped.places.shape == (4, 2)
-    assert shaped.places.dtype == np.float64
-    assert shaped.flags.tolist() == [False, False, False]
-    assert packed(shaped)[1:3].tolist() == [4, 2]
+    claims = blank(Claims, {"I": 4, "4 N": 8, "N": 2})
+    assert [len(each) for each in claims] == [4, 4, 8, 2]
+    assert claims.events.shape == (8, 3)
+    assert claims.events.dtype == np.int64
+    assert packed(claims)[[1, 5, 6]].tolist() == [4, 8, 3]
 
 
 nb: Any = numba  # typed in parts only

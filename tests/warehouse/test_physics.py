@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -22,12 +21,6 @@ def deepest_overlap(world: Warehouse) -> float:
     return float(DIAMETER - gaps[~np.eye(len(position), dtype=bool)].min())
 
 
-def deepest_in_walls(world: Warehouse) -> float:
-    at, scenario = world.state.robot_position, world.scenario
-    far = np.array([scenario.warehouse_width, scenario.warehouse_height]) - at
-    return float(DIAMETER / 2 - min(at.min(), far.min()))
-
-
 @pytest.mark.parametrize("gap", np.linspace(0.3, 0.45, 7))
 def test_two_robots_that_meet_head_on_never_pass_through_each_other(
     build: Build, gap: float
@@ -44,22 +37,6 @@ def test_two_robots_that_meet_head_on_never_pass_through_each_other(
     assert abs(deepest_overlap(world)) <= SUSTAINED
     assert pushed.state.robot_position[1, 0] > max(pushed.state.robot_position[0, 0], 3.1)
     assert world.state.robot_heading.tolist() == [0.0, 0.0]  # no collision turns a robot
-
-
-@pytest.mark.parametrize("way", [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1)])
-def test_walls_stop_a_robot(build: Build, way: tuple[int, int]) -> None:
-    world = build([(5.0, 5.0)], [FAR], control_period=0.02)
-    for _ in range(250):
-        world.step([(*way, 0.0, 0.0)])
-        assert deepest_in_walls(world) <= CLOSING / 2
-    assert abs(deepest_in_walls(world)) <= SUSTAINED
-
-
-def test_an_obstacle_stops_a_robot(build: Build) -> None:
-    world = build([(2.0, 5.0)], [FAR], obstacles=[(4.0, 5.0)], obstacle_radius=0.3)
-    steps(world, EAST, times=20)
-    assert world.state.robot_position[0, 0] == pytest.approx(4.0 - 0.3 - 0.125, abs=SUSTAINED)
-    assert world.state.robot_contact[0]
 
 
 @pytest.mark.parametrize(("top", "acceleration"), [(2.0, 20.0), (1.0, 2.0)])
@@ -119,21 +96,6 @@ def test_an_item_that_a_robot_lifted_above_is_in_its_way_once_it_has_left(build:
     assert world.state.robot_contact[0]
 
 
-def test_an_item_is_in_nobodys_way_while_any_laden_robot_stands_above_it(build: Build) -> None:
-    # Robot 0 lifts above item 2, robot 1 drives onto it; when robot 0 has left it still is free.
-    items = [FAR, (2.0, 5.1), (2.2, 5.0), (3.0, 5.1)]
-    world = build([(2.0, 5.0), (3.0, 5.0)], items, pickup_range=0.15)
-    steps(world, HOLD, HOLD)
-    for commands in [[STAY, WEST]] * 6 + [[WEST, STAY]] * 8:
-        world.step(commands)
-    left, right = world.state.robot_position[:, 0]
-    assert left < 2.2 - DIAMETER
-    assert right < 2.2 + DIAMETER
-    assert world.state.item_covered[2] == 1
-    steps(world, STAY, EAST, times=8)
-    assert world.state.item_covered[2] == 0
-
-
 def test_an_item_put_down_beneath_a_laden_robot_does_not_push_it(build: Build) -> None:
     # Items are wider than robots here: what robot 0 puts down reaches below robot 1.
     items = [FAR, (2.0, 5.0), (2.3, 5.0)]
@@ -170,17 +132,3 @@ def test_a_removed_robot_is_in_nobodys_way(build: Build) -> None:
         steps(world, EAST, STAY)
         free.step([EAST])
     np.testing.assert_array_equal(world.state.robot_position[0], free.state.robot_position[0])
-
-
-def test_the_mirror_image_of_a_world_moves_as_its_mirror_image(build: Build) -> None:
-    # No order of robots is favoured beyond rounding while nothing touches.
-    rng = np.random.default_rng(0)
-    places = np.array(list(itertools.product((2.0, 4.0, 6.0), (2.0, 5.0, 8.0))))
-    commands = rng.uniform(-0.5, 0.5, (9, 4))
-    world, mirrored = build(places, [FAR]), build(places[::-1], [FAR])
-    for _ in range(5):
-        world.step(commands)
-        mirrored.step(commands[::-1])
-    np.testing.assert_allclose(
-        world.state.robot_position, mirrored.state.robot_position[::-1], atol=1e-9
-    )

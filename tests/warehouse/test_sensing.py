@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +11,11 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.observations import unflatten
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
-from tests.warehouse.conftest import HOLD, STAY, Build
+from tests.warehouse.conftest import Build
 
 TOLERANCE = 2e-5  # [m]: rows are of single precision
+BEAMS = np.exp(2j * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
 
 FAULTS = (
     Fault("FM1", 2),
@@ -66,234 +67,128 @@ def test_rows_agree_with_a_plain_computation(name: str) -> None:
             commands[:, 0], commands[:, 1] = np.cos(heading), -np.sin(heading)
         rows = world.step(commands)
         if step % 12 == 11:
-            check_rows(world, rows)
+            for me in range(scenario.n_robots):
+                plain = Plain(world, me).row()
+                np.testing.assert_allclose(rows[me], plain, atol=TOLERANCE, err_msg=str(me))
 
 
-def check_rows(world: Warehouse, rows: NDArray[np.float32]) -> None:
-    state = world.state
-    for me in range(state.n_robots):
-        if not state.robot_present[me]:
-            assert not rows[me].any()
-            continue
-        parts = unflatten(rows[me], world.scenario)
-        check_scans(world, me, parts)
-        check_items(world, me, parts)
-        check_neighbours(world, me, parts)
-        check_itself(world, me, parts)
+class Plain:
+    """What a robot senses, with places in its own frame as complex numbers: forward + 1j left."""
+
+    def __init__(self, world: Warehouse, me: int) -> None:
+        self.state, self.scenario, self.me = world.state, world.scenario, me
+        self.modes = [set(modes) for modes in world.state.failure_modes]
+        there = world.state.robot_present.copy()
+        there[me] = False
+        self.others = np.flatnonzero(there)
+        self.items = np.flatnonzero(world.state.item_status == STORED)
+
+    def row(self) -> NDArray[np.float64]:
+        if not self.state.robot_present[self.me]:
+            return np.zeros(row.N_COLUMNS)
+        blocks = (self.scans(), self.items_in_view(), self.robots_near(), self.itself())
+        return np.concatenate([np.ravel(block) for block in blocks])
+
+    def seen(self, places: NDArray[np.float64]) -> NDArray[np.complex128]:
+        away = (places - self.state.robot_position[self.me]) @ np.array([1.0, 1j])
+        return np.asarray(away * np.exp(-1j * self.state.robot_heading[self.me]))
+
+    @property
+    def view(self) -> float:
+        share = 0.3 if "view_reduced" in self.modes[self.me] else 1.0
+        return 0.0 if "dead" in self.modes[self.me] else self.scenario.view_range * share
+
+    def scans(self) -> list[NDArray[np.float64]]:
+        s, state = self.scenario, self.state
+        to_obstacles = to_discs(self.seen(state.obstacle_position), s.obstacle_radius)
+        found = [
+            to_discs(self.seen(state.robot_position[self.others]), s.robot_radius),
+            np.minimum(self.to_walls(), to_obstacles),
+            to_discs(self.seen(state.item_position[self.items]), s.item_radius),
+        ]
+        is_blind = bool({"rangers_blind", "dead"} & self.modes[self.me])
+        return [np.minimum(each + 99.0 * is_blind, s.ranger_range) for each in found]
+
+    def to_walls(self) -> NDArray[np.float64]:
+        """Return how far each beam goes until it leaves the arena."""
+        way = BEAMS * np.exp(1j * self.state.robot_heading[self.me])
+        nearest = np.full(row.N_BEAMS, np.inf)
+        sides = (self.scenario.warehouse_width, self.scenario.warehouse_height)
+        for at, along, side in zip(
+            self.state.robot_position[self.me], (way.real, way.imag), sides, strict=True
+        ):
+            far = np.where(along > 0.0, side, 0.0) - at
+            nearest = np.minimum(nearest, np.where(np.abs(along) > 1e-12, far / along, np.inf))
+        return np.asarray(np.maximum(nearest, 0.0))
+
+    def items_in_view(self) -> NDArray[np.float64]:
+        block, place = np.zeros((row.N_ITEMS_IN_VIEW, 5)), 0
+        away = self.seen(self.state.item_position[self.items])
+        for at in np.argsort(abs(away))[: row.N_ITEMS_IN_VIEW]:
+            if abs(away[at]) <= self.view:
+                item = self.items[at]
+                is_known = item in self.state.robot_memory[self.me]
+                asked = item == self.state.requested
+                block[place] = 1, away[at].real, away[at].imag, asked, is_known
+                place += 1
+        return block
+
+    def robots_near(self) -> NDArray[np.float64]:
+        """Return the neighbours, nearest first, and the teller of the lowest timer heard."""
+        deaf, mute = {"FM3", "FM3_hear", "dead"}, {"FM3", "FM3_send", "dead"}
+        block, place, tellers = np.zeros((row.N_NEIGHBOURS, 5)), 0, []
+        away = self.seen(self.state.robot_position[self.others])
+        for at in np.argsort(abs(away)):
+            other, x, y = self.others[at], away[at].real, away[at].imag
+            is_mute = deaf & self.modes[self.me] or mute & self.modes[other]
+            is_heard = abs(away[at]) <= self.scenario.radio_range and not is_mute
+            told = self.state.robot_told[other]
+            tells = is_heard and not math.isnan(told)
+            if tells:
+                tellers.append((told, abs(away[at]), x, y))
+            if (is_heard or abs(away[at]) <= self.view) and place < row.N_NEIGHBOURS:
+                block[place] = 1, x, y, tells, told if tells else self.scenario.timer_limit
+                place += 1
+        told, _, x, y = min(tellers, default=(0.0, 0.0, 0.0, 0.0))
+        return np.array([*block.ravel(), bool(tellers), x, y, told])
+
+    def itself(self) -> list[float]:
+        s, state, me = self.scenario, self.state, self.me
+        item, timer, (x, _) = state.robot_item[me], state.robot_timer[me], state.robot_position[me]
+        velocity = self.seen(state.robot_position[me] + state.robot_velocity[[me]])[0]
+        limited = np.clip([velocity.real, velocity.imag], -s.max_speed, s.max_speed)
+        runs, gap = not math.isnan(timer), self.gap()
+        touches = state.robot_contact[me] if 0.001 < gap < 0.02 else gap < 0.01
+        assert state.robot_contact[me] == touches
+        return [
+            item != NOBODY, item != NOBODY and item == state.requested, x >= s.storage_width, runs,
+            timer if runs else s.timer_limit, *limited, touches,
+        ]  # fmt: skip
+
+    def gap(self) -> float:
+        """Return the gap [m] to what is nearest of all that is solid to the robot."""
+        s, state = self.scenario, self.state
+        at = state.robot_position[self.me]
+        gaps = [*at, *(np.array([s.warehouse_width, s.warehouse_height]) - at)]
+        solid = self.items[state.item_covered[self.items] == 0]
+        things = [
+            (state.robot_position[self.others], s.robot_radius),
+            (state.obstacle_position, s.obstacle_radius),
+            (state.item_position[solid[: len(solid) * (state.robot_item[self.me] != NOBODY)]],
+             s.item_radius),
+        ]  # fmt: skip
+        for places, radius in things:
+            gaps += (abs(self.seen(places)) - radius).tolist()
+        return float(min(gaps)) - s.robot_radius
 
 
-def modes_of(world: Warehouse, robot: int) -> set[str]:
-    return set(world.state.failure_modes[robot])
-
-
-def view_of(world: Warehouse, robot: int) -> float:
-    reduced = 0.3 if "view_reduced" in modes_of(world, robot) else 1.0
-    return 0.0 if "dead" in modes_of(world, robot) else world.scenario.view_range * reduced
-
-
-def seen_from(world: Warehouse, me: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return `places` (n, 2) in the frame of robot `me`."""
-    state = world.state
-    heading = state.robot_heading[me]
-    turn = np.array(
-        [[math.cos(heading), math.sin(heading)], [-math.sin(heading), math.cos(heading)]]
-    )
-    return np.asarray((places - state.robot_position[me]) @ turn.T)
-
-
-def others_of(world: Warehouse, me: int) -> NDArray[np.int64]:
-    others = world.state.robot_present.copy()
-    others[me] = False
-    return np.flatnonzero(others)
-
-
-def free_items(world: Warehouse) -> NDArray[np.int64]:
-    return np.flatnonzero(world.state.item_status == STORED)
-
-
-def check_scans(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
-    state, scenario = world.state, world.scenario
-    items = state.item_position[free_items(world)]
-    robots = state.robot_position[others_of(world, me)]
-    blind = bool({"rangers_blind", "dead"} & modes_of(world, me))
-    for beam in range(row.N_BEAMS):
-        angle = beam * math.tau / row.N_BEAMS
-        way = np.array([math.cos(angle), math.sin(angle)])
-        wall = min(
-            to_walls(world, me, beam),
-            to_discs(seen_from(world, me, state.obstacle_position), scenario.obstacle_radius, way),
-        )
-        seen = {
-            "range_robots": to_discs(seen_from(world, me, robots), scenario.robot_radius, way),
-            "range_items": to_discs(seen_from(world, me, items), scenario.item_radius, way),
-            "range_walls": wall,
-        }
-        for name, distance in seen.items():
-            expected = scenario.ranger_range if blind else min(distance, scenario.ranger_range)
-            assert parts[name][beam] == pytest.approx(expected, abs=TOLERANCE)
-
-
-def to_discs(centres: NDArray[np.float64], radius: float, way: NDArray[np.float64]) -> float:
-    """Return how far a beam from the origin goes until it meets a disc: the quadratic's root."""
-    nearest = math.inf
-    for centre in centres:
-        if np.hypot(*centre) <= radius:
-            return 0.0
-        half, offset = -float(way @ centre), float(centre @ centre) - radius**2
-        root = half * half - offset
-        if root > 0.0 and -half > 0.0:
-            nearest = min(nearest, -half - math.sqrt(root))
-    return nearest
-
-
-def to_walls(world: Warehouse, me: int, beam: int) -> float:
-    """Return how far a beam goes until it leaves the arena."""
-    x, y = world.state.robot_position[me]
-    angle = world.state.robot_heading[me] + beam * math.tau / row.N_BEAMS
-    width, height = world.scenario.warehouse_width, world.scenario.warehouse_height
-    distances: list[float] = []
-    for place, way, far in ((x, math.cos(angle), width), (y, math.sin(angle), height)):
-        if abs(way) > 1e-12:
-            distances.append(((far if way > 0.0 else 0.0) - place) / way)
-    return max(min(distances), 0.0)
-
-
-def check_items(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
-    state = world.state
-    items, view = free_items(world), view_of(world, me)
-    places = seen_from(world, me, state.item_position[items])
-    distance = np.hypot(places[:, 0], places[:, 1])
-    order = [at for at in np.argsort(distance) if distance[at] <= view][: row.N_ITEMS_IN_VIEW]
-    expected = np.zeros((row.N_ITEMS_IN_VIEW, 5))
-    for place, at in enumerate(order):
-        item = items[at]
-        is_requested = item == state.requested
-        expected[place] = 1, *places[at], is_requested, item in state.robot_memory[me]
-    names = ("item_present", "item_x", "item_y", "item_requested", "item_recently_held")
-    sensed = np.column_stack([parts[name] for name in names])
-    np.testing.assert_allclose(sensed, expected, atol=TOLERANCE)
-
-
-def check_neighbours(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
-    state, scenario = world.state, world.scenario
-    view = view_of(world, me)
-    deaf, mute = {"FM3", "FM3_hear", "dead"}, {"FM3", "FM3_send", "dead"}
-    near: list[tuple[float, int, float, float, bool]] = []
-    for other in others_of(world, me):
-        x, y = seen_from(world, me, state.robot_position[[other]])[0]
-        distance = math.hypot(x, y)
-        heard = distance <= scenario.radio_range and not (
-            deaf & modes_of(world, me) or mute & modes_of(world, int(other))
-        )
-        if heard or distance <= view:
-            near.append((distance, int(other), x, y, heard))
-    near.sort()
-
-    expected = np.zeros((row.N_NEIGHBOURS, 5))
-    tellers = []
-    for place, (distance, other, x, y, heard) in enumerate(near):
-        told = state.robot_told[other]
-        tells = heard and not math.isnan(told)
-        if tells:
-            tellers.append((told, distance, x, y))
-        if place < row.N_NEIGHBOURS:
-            expected[place] = 1, x, y, tells, told if tells else scenario.timer_limit
-    names = ("present", "x", "y", "timer_heard", "timer")
-    sensed = np.column_stack([parts[f"neighbour_{name}"] for name in names])
-    np.testing.assert_allclose(sensed, expected, atol=TOLERANCE)
-
-    lowest = [parts[f"lowest_timer{end}"][0] for end in ("_present", "_x", "_y", "")]
-    told, _, x, y = min(tellers, default=(0.0, 0.0, 0.0, 0.0))
-    np.testing.assert_allclose(lowest, [float(bool(tellers)), x, y, told], atol=TOLERANCE)
-
-
-def check_itself(world: Warehouse, me: int, parts: dict[str, NDArray[np.float32]]) -> None:
-    state, scenario = world.state, world.scenario
-    item, timer = state.robot_item[me], state.robot_timer[me]
-    velocity = seen_from(world, me, state.robot_position[me] + state.robot_velocity[[me]])[0]
-    expected = {
-        "carrying": item != NOBODY,
-        "carrying_requested": item != NOBODY and item == state.requested,
-        "in_delivery_area": state.robot_position[me, 0] >= scenario.storage_width,
-        "timer_runs": not math.isnan(timer),
-        "timer": scenario.timer_limit if math.isnan(timer) else timer,
-        "velocity": np.clip(velocity, -scenario.max_speed, scenario.max_speed),
-    }
-    for name, value in expected.items():
-        np.testing.assert_allclose(parts[name], value, atol=TOLERANCE)
-
-    gap = narrowest_gap(world, me)
-    if gap < 0.001:
-        assert parts["contact"][0] == 1.0
-    if gap > 0.02:
-        assert parts["contact"][0] == 0.0
-    assert parts["contact"][0] == state.robot_contact[me]
-
-
-def narrowest_gap(world: Warehouse, me: int) -> float:
-    """Return the gap [m] to what is nearest of all that is solid to robot `me`."""
-    state, scenario = world.state, world.scenario
-    x, y = state.robot_position[me]
-    walls = (x, y, scenario.warehouse_width - x, scenario.warehouse_height - y)
-    gaps = [min(walls) - scenario.robot_radius]
-    things = [
-        (state.robot_position[others_of(world, me)], scenario.robot_radius),
-        (state.obstacle_position, scenario.obstacle_radius),
-    ]
-    if state.robot_item[me] != NOBODY:
-        solid = free_items(world)
-        solid = solid[state.item_covered[solid] == 0]
-        things.append((state.item_position[solid], scenario.item_radius))
-    for places, radius in things:
-        distances = np.linalg.norm(places - state.robot_position[me], axis=1)
-        gaps.extend((distances - radius - scenario.robot_radius).tolist())
-    return float(min(gaps))
-
-
-# -- by hand ------------------------------------------------------------------------------------
-
-
-def test_a_scan_in_an_empty_corner_by_hand(build: Build) -> None:
-    world = build([(1.0, 0.5)], [(1.5, 0.5)])
-    parts = unflatten(world.observe()[0], world.scenario)
-    walls = parts["range_walls"]
-    assert walls[0] == 2.0  # ahead: nothing in range
-    assert walls[8] == pytest.approx(1.0)  # behind
-    assert walls[12] == pytest.approx(0.5)  # to the right
-    assert walls[10] == pytest.approx(0.5 * math.sqrt(2.0))
-    assert parts["range_items"][0] == pytest.approx(0.5 - 0.125)
-    assert (parts["range_items"][1:] == 2.0).all()
-    assert (parts["range_robots"] == 2.0).all()
-
-
-def test_the_lowest_timer_is_heard_beyond_the_neighbours_in_the_row(build: Build) -> None:
-    # Nine robots nearer than the one that tells; it is not in the row, yet heard.
-    ring = [(5.0 + math.cos(k * math.tau / 9), 5.0 + math.sin(k * math.tau / 9)) for k in range(9)]
-    world = build([(5.0, 5.0), *ring, (8.5, 5.0)], [(1.0, 1.0)])
-    rows = world.step([STAY] * 11)
-    parts = unflatten(rows[0], world.scenario)
-    assert (parts["neighbour_present"] == 1.0).all()
-    assert (parts["neighbour_timer_heard"] == 0.0).all()
-    assert parts["lowest_timer_present"][0] == 1.0
-    assert parts["lowest_timer_x"][0] == pytest.approx(3.5)
-
-
-def test_equal_timers_are_settled_by_the_nearest_teller(build: Build) -> None:
-    robots = [(7.0, 5.0), (8.6, 6.0), (8.4, 5.0), (8.5, 4.0)]
-    world = build(robots, [(1.0, 1.0)])
-    rows = world.step([STAY] * 4)
-    lowest = rows[0, row.LOWEST_TIMER : row.LOWEST_TIMER + 4]
-    assert lowest == pytest.approx([1.0, 1.4, 0.0, 0.0])
-
-
-@pytest.mark.parametrize(("x", "feels"), [(2.255, True), (2.24, False)])
-def test_a_laden_robot_feels_items_but_for_those_that_it_lifted_above(
-    build: Build, x: float, feels: bool
-) -> None:
-    world = build([(2.0, 2.0)], [(1.8, 2.0), (x, 2.0)])
-    assert not world.state.robot_contact[0]
-    world.step([HOLD])
-    assert (world.state.robot_item[0], world.state.robot_contact[0]) == (0, feels)
+def to_discs(centres: NDArray[np.complex128], radius: float) -> NDArray[np.float64]:
+    """Return how far each beam from the origin goes until it meets a disc: the quadratic's root."""
+    along = (centres[:, None] * BEAMS.conj()).real
+    root = along**2 - (abs(centres) ** 2 - radius**2)[:, None]
+    met = np.where((root > 0.0) & (along > 0.0), along - np.sqrt(np.maximum(root, 0.0)), np.inf)
+    met[abs(centres) <= radius] = 0.0
+    return np.asarray(met.min(axis=0, initial=np.inf))
 
 
 @pytest.mark.parametrize("x", np.linspace(1.0, 3.0, 21))
@@ -312,3 +207,72 @@ def test_a_dead_robot_does_not_see_the_item_at_its_very_centre(build: Build) -> 
     np.testing.assert_array_equal(world.state.item_position[1], world.state.robot_position[0])
     assert world.state.failure_modes == (("dead",),)
     assert rows[0, row.ITEMS] == 0.0
+
+
+# -- errors ---------------------------------------------------------------------------------------
+
+
+def beams(faults: list[Fault] | None = None, **fields: Any) -> NDArray[np.float32]:
+    scenario = Scenario(n_robots=4, n_items=3, ranger_range=1.4, sensing_mix=(1.0, 0.5), **fields)
+    return Warehouse(scenario).reset(seed=0, faults=faults or [])[:, row.RANGE_WALLS : row.ITEMS]
+
+
+def test_a_dropped_beam_reports_how_far_the_robot_itself_can_see() -> None:
+    own = np.array([0.7, 0.7, 1.4, 1.4], np.float32)
+    seen = beams(sensor_dropout=1.0)
+    np.testing.assert_array_equal(np.sort(seen[:, 0]), own)
+    assert (seen == seen[:, :1]).all()
+
+
+@pytest.mark.parametrize("faults", [[], [Fault("rangers_blind", 2)]])
+def test_noise_leaves_beams_that_meet_nothing_as_they_are(faults: list[Fault]) -> None:
+    true, noisy = beams(faults), beams(faults, ranger_noise=0.05)
+    meets_nothing = true == true.max(axis=1, keepdims=True)
+    np.testing.assert_array_equal(noisy[meets_nothing], true[meets_nothing])
+    assert (noisy[~meets_nothing] != true[~meets_nothing]).any()
+    assert (noisy <= true.max(axis=1, keepdims=True)).all()
+    assert (noisy >= 0.0).all()
+
+
+def test_what_is_missed_is_drawn_for_each_robot_thing_and_sense_alone(build: Build) -> None:
+    places = np.array([(1.0, 5.0), (1.4, 5.0), (2.0, 5.0)])
+    world = build(
+        places, [(1.2, 5.5)], radio_loss=0.5, sensor_dropout=0.5, message_size=1, view_range=2.0
+    )
+    n, far = len(places), np.abs(places[:, :1] - places[:, 0])
+    missed = []
+    for _ in range(250):
+        rows = world.step(np.hstack([np.zeros((n, 4)), np.ones((n, 1))]))
+        heard, there = np.zeros((n, n), bool), np.zeros((n, n), bool)
+        for me in range(n):
+            for place in range(n - 1):
+                at = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * place
+                if rows[me, at]:
+                    other = np.abs(far[me] - np.hypot(*rows[me, at + 1 : at + 3])).argmin()
+                    there[me, other], heard[me, other] = True, rows[me, row.MESSAGES + place]
+        items = rows[:, row.ITEMS] > 0.5
+        pairs = ~np.eye(n, dtype=bool)
+        missed.append([*heard[pairs], *items, (there & ~heard)[0, 2], (there & ~heard)[2, 0]])
+    shares = np.mean(missed, axis=0)
+    assert shares[:9] == pytest.approx(np.full(9, 0.5), abs=0.12)
+    assert shares[9:] == pytest.approx(np.full(2, 0.25), abs=0.1), "seen, though not heard"
+    alike = np.corrcoef(np.array(missed)[:, :9].T) - np.eye(9)
+    assert np.abs(alike).max() < 0.3
+
+
+def test_every_error_is_drawn_by_itself(build: Build) -> None:
+    places = [(1.0, 1.0), (1.4, 1.0), (1.0, 1.4), (1.4, 1.4)]
+    items = [(x + 0.2, y + 0.2) for x, y in places] + [(0.6, 1.2), (1.2, 0.6)]
+    exact, noisy = (
+        build(places, items, warehouse_width=3.0, warehouse_height=2.0, delivery_width=1.0,
+              ranger_noise=noise, position_noise=noise)
+        for noise in (0.0, 0.01)
+    )  # fmt: skip
+    stay = np.zeros((len(places), 4))
+    errors = np.array([(noisy.step(stay) - exact.step(stay)).ravel() for _ in range(60)])
+    errors = errors[:, errors.std(axis=0) > 1e-4]
+    assert errors.shape[1] > 100
+    assert errors.std() == pytest.approx(0.01, rel=0.1)
+    alike = np.corrcoef(errors.T) - np.eye(errors.shape[1])
+    # The nearest teller of a timer stands in a row twice, each time with an error of its own.
+    assert np.abs(alike).max() < 0.8

@@ -107,25 +107,12 @@ def test_helpers_end_with_the_pool(is_closed: bool) -> None:
     assert not any(helper.is_alive() for helper in helpers)
 
 
-def test_all_worlds_are_taken_over_when_the_caller_fails_at_one() -> None:
+def test_what_is_refused_is_raised_before_any_world_has_moved() -> None:
     made = worlds()
-    pool = WorldThreadPool(made, FIRSTS, 1)
-    pool.is_watched[:] = 1
-    rows = np.zeros((sum(SIZES), COLUMNS), np.float32)
-
-    def arrived(place: int, sensed: NDArray[np.float32]) -> None:
-        raise RuntimeError(f"not {place}")
-
-    with pytest.raises(RuntimeError, match="not 0"):
-        pool.step(commands(0), rows, arrived)
-    assert [world.state.step for world in made] == [1, 1, 1, 1]
-    step(pool, made, commands(1))
-    assert [world.state.step for world in made] == [2, 2, 2, 2]
-    pool.close()
-
-
-def test_a_command_that_is_refused_is_raised_before_any_world_has_moved() -> None:
-    made = worlds()
+    never = WorldThreadPool([Warehouse(Scenario(n_robots=2, **SMALL)), *made[1:]], FIRSTS, 1)
+    with pytest.raises(SetupError, match="reset"):
+        step(never, made, commands(1))
+    never.close()
     pool, given = WorldThreadPool(made, FIRSTS, 1), commands(0)
     given[3, 1] = np.nan
     before = [world.state.robot_position.copy() for world in made]
@@ -136,15 +123,6 @@ def test_a_command_that_is_refused_is_raised_before_any_world_has_moved() -> Non
         np.testing.assert_array_equal(world.state.robot_position, position)
     step(pool, made, commands(0))
     assert [world.state.step for world in made] == [1, 1, 1, 1]
-    pool.close()
-
-
-def test_a_world_that_was_never_reset_is_refused() -> None:
-    made = [Warehouse(Scenario(n_robots=2, **SMALL)), *worlds()[1:]]
-    pool = WorldThreadPool(made, FIRSTS, 1)
-    with pytest.raises(SetupError, match="reset"):
-        step(pool, made, commands(1))
-    assert [world.state.step for world in made] == [0, 0, 0, 0]
     pool.close()
 
 

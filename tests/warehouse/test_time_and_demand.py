@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.kernels import uniform
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.streams import key, row_keys
@@ -171,27 +170,6 @@ def test_the_dock_counts_the_oldest_request_first_and_the_others_wait(
     assert (state.robot_item == NOBODY).all()
 
 
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"n_requests": 61}, "n_requests = 61: should be at most n_items = 60"),
-        ({"n_requests": 0}, "Scenario.n_requests = 0: should be greater than 0"),
-        ({"dock_capacity": 10.1}, "dock_capacity = 10.1: should be at most .* 10 per second"),
-        ({"dock_capacity": 0.0}, "Scenario.dock_capacity = 0.0: should be greater than 0"),
-        ({"handling_time": -1.0}, "Scenario.handling_time = -1.0: should be greater than or"),
-        ({"demand": "random"}, "Scenario.demand = 'random'"),
-    ],
-)
-def test_what_cannot_be_is_refused(fields: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(ScenarioError, match=complaint):
-        Scenario(**fields)
-
-
-def test_robots_of_the_preset_realistic_take_their_time() -> None:
-    assert Scenario.preset("realistic").handling_steps == 10
-    assert Scenario().handling_steps == 0
-
-
 def requests_of(demand: str, seed: int, n_items: int, count: int) -> list[int]:
     """Return the first requests of a world whose items come back, by a plain computation."""
     if demand == "closed":
@@ -244,29 +222,3 @@ def test_random_worlds_keep_their_items_their_order_and_their_bits(
         assert (np.diff(times) >= 1.0 / capacity - 1e-6).all()
         within = [((times >= t - 1e-6) & (times < t + 1.0 - 1e-6)).sum() for t in times]
         assert max(within, default=0) <= max(capacity, 1.0)
-
-
-def test_how_requests_are_drawn_changes_no_other_stream() -> None:
-    fields: list[dict[str, Any]] = [
-        {},
-        {"demand": "zipf"},
-        {"n_requests": 4, "dock_capacity": 1.0},
-        TIMED,
-    ]
-    worlds = [Warehouse(Scenario(sensor_dropout=0.2, ranger_noise=0.1, **each)) for each in fields]
-    starts = [world.reset(3) for world in worlds]
-    asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
-    for rows in starts:
-        rows[:, asked : row.NEIGHBOURS : row.ITEM_WIDTH] = 0.0
-        np.testing.assert_array_equal(rows, starts[0])
-    moved = [world.step(np.full((25, 4), [1.0, 0.3, 0.1, 0.0])) for world in worlds]
-    for rows in moved:
-        rows[:, asked : row.NEIGHBOURS : row.ITEM_WIDTH] = 0.0
-        np.testing.assert_array_equal(rows, moved[0])
-
-
-def test_zipf_asks_for_the_first_items_most_often() -> None:
-    counts = np.bincount(requests_of("zipf", 1, 10, 4000), minlength=10)
-    assert counts / 4000 == pytest.approx(
-        1 / np.arange(1, 11) / (1 / np.arange(1, 11)).sum(), abs=0.03
-    )

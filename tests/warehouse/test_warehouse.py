@@ -98,13 +98,13 @@ def test_impossible_commands_are_refused_and_change_nothing(commands: Any, compl
     assert world.state.time == undisturbed.state.time
 
 
-def test_the_row_of_a_removed_robot_is_ignored_whatever_it_holds() -> None:
+def test_the_rows_of_removed_and_dead_robots_are_ignored_whatever_they_hold() -> None:
     worlds = [Warehouse(Scenario(n_robots=3, n_items=3)) for _ in range(3)]
     commands = [np.full((3, 4), 3.0) for _ in worlds]
-    commands[1][1] = [-1.0, 1.0, 1.0, -1.0]
-    commands[2][1] = np.nan
+    commands[1][1:] = [-1.0, 1.0, 1.0, -1.0]
+    commands[2][1:] = np.nan
     for world in worlds:
-        world.reset(0, [Fault("removed", (1,))])
+        world.reset(0, [Fault("removed", (1,)), Fault("dead", (2,))])
     for _ in range(5):
         plain, other, nan = (world.step(given) for world, given in zip(worlds, commands))
         np.testing.assert_array_equal(plain, other)
