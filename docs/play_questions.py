@@ -1,7 +1,7 @@
 """Plays the studies that answer the field's questions: `python docs/play_questions.py [NAME ...]`.
 
-Each study of examples/questions has a page of its name, whose tables and figure this writes. What
-is played is kept, as by `play_tables.py`.
+Of each study in examples/questions this writes the tables into one page, and a figure. What is
+played is kept, as by `play_tables.py`.
 """
 
 from __future__ import annotations
@@ -103,33 +103,6 @@ def wear_and_repair(found: StudyResults) -> Answer:
     return blocks, draw, 0.5 + 1.9 * len(panels)
 
 
-def mixed_swarms(found: StudyResults) -> Answer:
-    """Answer with P and R against the share."""
-    blocks = {
-        "shares": f"{tables.shares(found)}\n\n{tables.over(found)}. [95 %]. "
-        f"{tables.LEGEND}; the steps are one family, straight lines are unadjusted."
-    }
-    cells = [cell for cell in found.cells if cell.n_seeds]
-    faults = list(dict.fromkeys(cell.words for cell in cells))
-    panels = []
-    for policies in tables.replacements(found):
-        points = tuple(
-            Point(
-                cell.words,
-                faults.index(cell.words),
-                f"{policies.index(cell.policy) / (len(policies) - 1):.0%}",
-                *cell.mean,
-                decided=True,
-                saturated=cell.saturated,
-            )
-            for cell in cells
-            if cell.policy in policies
-        )
-        title, share = f"from {policies[0]} to {policies[-1]}", f"share of {policies[-1]}"
-        panels.append(Panel(title, "P [items in 500 s]", points, (0.0,), share))
-    return blocks, partial(drawing.intervals, panels=panels), 0.5 + 2.5 * len(panels)
-
-
 def realistic_robots(found: StudyResults) -> Answer:
     """Answer with all policies, and each beside itself in the ideal world."""
     blocks, draw, height = policies_compared(found)
@@ -141,20 +114,20 @@ QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
     "central_or_swarm": policies_compared,
     "larger_swarms": larger_swarms,
     "wear_and_repair": wear_and_repair,
-    "mixed_swarms": mixed_swarms,
     "realistic_robots": realistic_robots,
 }
 
 
 def main(names: list[str]) -> None:
-    """Play the studies of these names, and rewrite their pages and figures."""
+    """Play the studies of these names, and rewrite their tables and figures."""
+    page = DOCS / "research" / "questions_of_the_field.md"
     for name in names or QUESTIONS:
         (found,) = play([study(name)])
         blocks, draw, height = QUESTIONS[name](found)
         svg, _ = drawing.images(draw, height)
         (DOCS / "media" / f"{name}.svg").write_text(svg, encoding="utf-8")
-        page = DOCS / f"{name}.md"
-        page.write_text(rewritten(page.read_text(encoding="utf-8"), blocks), encoding="utf-8")
+        named = {f"{name} {part}": block for part, block in blocks.items()}
+        page.write_text(rewritten(page.read_text(encoding="utf-8"), named), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
-"""The tables of the pages that answer a question of the field, from the results of its study."""
+"""The tables of the page that answers questions of the field, from the results of its studies."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -12,8 +11,8 @@ from tables import table
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.estimate import SIGNS, Estimate
-from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.measures import (
     cells_against_baseline,
     indicators_against_baseline,
@@ -212,51 +211,6 @@ def wear(found: StudyResults) -> str:
             policy, label = test.compared.policy, test.compared.label
             body.append((f"`{policy}`", label, with_sign(test), _share(change)))
     return table(("policy", "worn robots", "R", "change of P [%]"), body)
-
-
-# -- mixed swarms -------------------------------------------------------------------------------
-
-
-def replacements(found: StudyResults) -> list[tuple[str, ...]]:
-    """Return the policies from each pure swarm to the next one, the mixes between them."""
-    named = found.plan.specification.policies
-    pure = [place for place, one in enumerate(named) if "=" not in one.name]
-    ends = sorted({0, *pure, len(named) - 1})
-    return [found.policies[first : last + 1] for first, last in itertools.pairwise(ends)]
-
-
-def shares(found: StudyResults) -> str:
-    """Return P and R by share, the step from share to share, and what the mix adds to its parts."""
-    p = {cell.policy: cell for cell in found.cells if cell.arm.setting == NO_FAULT}
-    tests = grouped(found.verdicts, lambda test: test.compared.policy)
-    policies = found.policies
-    steps = [
-        spi.relative_change(p[before].by_seed, p[after].by_seed)
-        for before, after in itertools.pairwise(policies)
-    ]
-    told = {
-        policy: f"{_share(step)} {SIGNS[verdict].mark}"
-        for policy, step, verdict in zip(policies[1:], steps, spi.adjust(steps))
-    }
-    more = {}
-    for own in replacements(found):
-        first, last = (p[own[place]].by_seed for place in (0, -1))
-        for place, policy in enumerate(own[1:-1], 1):
-            part = place / (len(own) - 1)
-            beyond = p[policy].by_seed - (1 - part) * first - part * last
-            more[policy] = section.bracketed(t_interval(beyond), 1)
-    body = [
-        (
-            f"`{policy}`",
-            section.mean_p(p[policy]),
-            told.get(policy, ""),
-            more.get(policy, ""),
-            *map(with_sign, tests[policy]),
-        )
-        for policy in policies
-    ]
-    heads = (f"R, {test.compared.label}" for test in tests[policies[0]])
-    return table(("", "P", "step [%]", "P less the straight line", *heads), body)
 
 
 # -- two studies of the same questions ----------------------------------------------------------

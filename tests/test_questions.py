@@ -1,8 +1,9 @@
-"""The studies of the field's questions, and the pages that their results are written into."""
+"""The studies of the field's questions, and the page that their results are written into."""
 
 from __future__ import annotations
 
 import importlib
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAINING
 ROOT = Path(__file__).parents[1]
 FILES = sorted((ROOT / "examples" / "questions").glob("*.toml"))
 VARIED = ("sizes", "faults", "parameters")
+PAGE = ROOT / "docs" / "research" / "questions_of_the_field.md"
+TEXT = PAGE.read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -35,7 +38,7 @@ def in_small(name: str, out: Path) -> Study:
         one["modes"] = ["FM4"] if "FM4" in one["modes"] else one["modes"][:1]
     return Study(
         out=out / name,
-        policies=["homing"] if late else ["homing", "homing=20,swarm-dt=5"],
+        policies=["homing"] if late else ["homing", "central"],
         seeds=2,
         scenario={**asked.scenario.model_dump(), "duration": 210.0 if late else 40.0},
         indicators=asked.indicators,
@@ -52,11 +55,19 @@ def test_seeds_are_clear_of_those_that_anything_was_fitted_on(file: Path) -> Non
     assert plan.cases
 
 
-def test_every_question_has_a_page(script: Any) -> None:
+def test_every_question_has_its_command_and_figure(script: Any) -> None:
     assert sorted(script.QUESTIONS) == [file.stem for file in FILES]
     for name in script.QUESTIONS:
-        page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
-        assert f"`python docs/play_questions.py {name}`" in page
+        assert f"`python docs/play_questions.py {name}`" in TEXT
+        assert f"](../media/{name}.svg)" in TEXT
+    assert TEXT.count("What it leans on: ") == TEXT.count("\n## ")
+
+
+def test_every_interval_in_the_text_stands_in_a_table() -> None:
+    prose = re.sub(r"<!-- tables: .*?<!-- end of tables -->", "", TEXT, flags=re.DOTALL)
+    values = re.findall(r"-?[\d.]*\d \[[^]]+\]", " ".join(prose.split()))
+    assert len(values) > 30
+    assert [value for value in values if f"| {value} " not in TEXT] == []
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -65,9 +76,10 @@ def test_page_quotes_what_was_played(
 ) -> None:
     pytest.importorskip("matplotlib", reason="needs the extra study")
     name = file.stem
-    (tmp_path / "media").mkdir()
-    page = tmp_path / f"{name}.md"
-    shutil.copy(ROOT / "docs" / page.name, page)
+    for folder in ("media", PAGE.parent.name):
+        (tmp_path / folder).mkdir()
+    page = tmp_path / PAGE.parent.name / PAGE.name
+    shutil.copy(PAGE, page)
     monkeypatch.setattr(script, "DOCS", tmp_path)
     monkeypatch.setattr(script, "study", lambda asked, **_: in_small(asked, tmp_path / "out"))
     monkeypatch.setattr(importlib.import_module("play_tables"), "PROCESSES", 1)
@@ -80,4 +92,3 @@ def test_page_quotes_what_was_played(
         if cell.arm.setting.kind == "size":
             assert section.mean_p(cell) in text
     assert "<svg" in (tmp_path / "media" / f"{name}.svg").read_text(encoding="utf-8")
-    assert "## What this leans on" in text
