@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,6 @@ from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.estimate import SIGNS, Estimate
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
-from swarm_logistics_env.studies.measures import (
-    cells_against_baseline,
-    indicators_against_baseline,
-    jackknife_interval,
-)
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
@@ -62,6 +57,23 @@ def difference(one: Judged, other: Judged) -> Interval:
     return jackknife_interval(len(seeds), lambda some: value(one, some) - value(other, some))
 
 
+def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], float]) -> Interval:
+    """Return a statistic of seeds with the 95 % t-interval of its jackknife pseudo-values.
+
+    For differences of two ratios over the same seeds, which have no Fieller interval (Tukey 1958).
+
+    Args:
+        n_seeds: number of seeds, two or more.
+        statistic: its value from the seeds of these indices, shape (k,).
+    """
+    seeds = np.arange(n_seeds)
+    value = statistic(seeds)
+    left_out = np.array([statistic(np.delete(seeds, seed)) for seed in seeds])
+    pseudo, low, high = t_interval(n_seeds * value - (n_seeds - 1) * left_out)
+    limits = (None if limit is None else limit - pseudo + value for limit in (low, high))
+    return Interval(value, *limits)
+
+
 # -- policies side by side ----------------------------------------------------------------------
 
 
@@ -70,8 +82,8 @@ def side_by_side(found: StudyResults) -> str:
     rows: dict[str, dict[str, str]] = {}
     for label, cell, _ in performances(found):
         rows.setdefault(label, {})[cell.policy] = section.mean_p(cell)
-    for one in indicators_against_baseline(found):
-        rows[asked(one.test)] = {policy: with_sign(own) for policy, own in one.tests.items()}
+    for own in _of_all_policies(found):
+        rows[asked(own[0])] = {test.compared.policy: with_sign(test) for test in own}
     return f"{_columns(rows, found.policies)}\n\n{over(found)}. [95 %]; {LEGEND}."
 
 
@@ -81,25 +93,50 @@ def differences(found: StudyResults) -> str:
     rows: dict[str, dict[str, str]] = {}
     for label, cell, less in performances(found):
         rows.setdefault(label, {})[cell.policy] = section.bracketed(less, 1)
-    for one in indicators_against_baseline(found):
-        rows[asked(one.test)] = {
+    for first, *own in _of_all_policies(found):
+        less_of = {one.compared.policy: _difference(found, one, first) for one in own}
+        rows[asked(first)] = {
             policy: f"{section.bracketed(less, 3)} {_side(less)}"
-            for policy, less in one.differences.items()
+            for policy, less in less_of.items()
         }
     shown = _columns(rows, others, [f"`{policy}` less `{baseline}`" for policy in others])
     told = "An indicator is higher or lower if its interval is clear of 0."
     return f"{shown}\n\n[95 %], paired by seed, unadjusted. {told}"
 
 
+def _of_all_policies(found: StudyResults) -> Iterator[list[Verdict]]:
+    """Yield the verdicts on every question, one a policy, the first policy's first."""
+    compared = [one for one in found.verdicts if one.after.kind != "policy"]
+    for own in grouped(compared, lambda v: (v.compared.table, v.compared.question)).values():
+        if len(own) > 1:
+            yield own
+
+
+def _difference(found: StudyResults, test: Verdict, first: Verdict) -> Interval | None:
+    """Return how much an indicator is above the first policy's; None: one is undefined."""
+    if test.estimate is None or first.estimate is None:
+        return None
+    try:
+        return difference((found, test), (found, first))
+    except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
+        return None
+
+
 def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | None]]:
-    """Yield label, cell and difference of P, each condition once and those with faults not."""
+    """Yield label, cell and difference of P from the first policy's; no condition with faults."""
     known: set[str] = set()
-    cells = [one for own in cells_against_baseline(found).values() for one in own]
-    for one in sorted(cells, key=lambda one: one.cell.arm.setting.kind != "size"):
-        setting, key = one.cell.arm.setting, one.cell.arm.case.key
-        if key not in known and not (setting.kind == "fault" and setting.value):
-            known.add(key)
-            yield f"P, {setting}", one.cell, one.difference
+    cells = [c for c in found.cells if c.arm.setting.kind != "policy" and c.n_seeds]
+    by_condition = grouped(cells, lambda cell: (cell.table, cell.arm.setting))
+    for (_, setting), own in sorted(by_condition.items(), key=lambda one: one[0][1].kind != "size"):
+        first = own[0]
+        for cell in own:
+            key = cell.arm.case.key
+            if key not in known and not (setting.kind == "fault" and setting.value):
+                known.add(key)
+                is_first = cell is first or first.policy != found.policies[0]
+                comparable = not (is_first or cell.problem or first.problem)
+                less = t_interval(cell.by_seed - first.by_seed) if comparable else None
+                yield f"P, {setting}", cell, less
 
 
 def _columns(

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.measures import cells_against_baseline
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 
@@ -204,26 +203,31 @@ def _asked(results: StudyResults) -> str:
 
 
 def _performance(results: StudyResults) -> str:
-    cells = [one for here in cells_against_baseline(results).values() for one in here]
+    shown = [one for one in results.cells if one.arm.setting.kind != "policy" and one.n_seeds]
     # Where the swarm is as it should be, or else in the first condition.
-    base = [c for c in cells if c.cell.arm.setting.kind == "fault" and not c.cell.arm.setting.value]
-    base = base or cells
-    here = {
-        c.cell.policy: c for c in reversed(base) if c.cell.arm.setting == base[0].cell.arm.setting
-    }
+    whole = [c for c in shown if c.arm.setting.kind == "fault" and not c.arm.setting.value]
+    base = whole or shown
+    here = {c.policy: c for c in reversed(base) if c.arm.setting == base[0].arm.setting}
     if not here:
         return "P: no run has succeeded."
-    cell = base[0].cell
+    cell = base[0]
     where = f"N = {cell.arm.case.scenario.n_robots}"
     where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
     several = len(results.policies) > 1
+    baseline = here.get(results.policies[0])
     told = (
-        (f"{one.cell.policy} " if several else "")
-        + _mean(one.cell)
-        + ("" if one.ratio is None else f" ({one.ratio.value:.2f} times)")
-        for one in map(here.__getitem__, reversed(here))
+        (f"{one.policy} " if several else "")
+        + _mean(one)
+        + (_multiple(one, baseline) if baseline and results.plan.paired else "")
+        for one in reversed(here.values())
     )
     return f"P at {where}: {', '.join(told)}."
+
+
+def _multiple(cell: Cell, baseline: Cell) -> str:
+    if cell is baseline or cell.problem or baseline.problem or not baseline.by_seed.any():
+        return ""
+    return f" ({cell.mean.value / baseline.mean.value:.2f} times)"
 
 
 def _mean(cell: Cell) -> str:
@@ -248,7 +252,7 @@ def _last(results: StudyResults) -> str:
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
     if results.exploratory:
-        parts.append("exploratory: other seeds than were declared")
+        parts.append("exploratory: other seeds than were declared, whose report this replaces")
     if any(test.saturated for test in tests):
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):

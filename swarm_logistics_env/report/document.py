@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.results import StudyResults
@@ -15,7 +15,7 @@ from swarm_logistics_env.studies.verdict import grouped
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
 from .section import Figure, Section, sentence
-from .tables import fault_sections, policy_sections, tables, warnings
+from .tables import fault_sections, tables, warnings
 
 
 @dataclass(frozen=True)
@@ -93,19 +93,12 @@ def document(results: StudyResults) -> Document:
             result_tables,
         ),
         Chapter(
-            "Policies compared",
-            "Side by side, seed by seed; the first policy of the study is the one that the others "
-            "are measured against.",
-            tuple(policy_sections(results)),
-        ),
-        Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
             faults,
         ),
         Chapter("Set-up", "", setup_sheet(plan)),
         Chapter("Methods", "", (Section("", lines=(methods(plan),)),)),
-        Chapter("Glossary", "", (glossary(plan),)),
     ]
     whole = Document(
         f"Study {plan.specification.name!r}",
@@ -232,40 +225,3 @@ def methods(plan: Plan) -> str:
         "swarm-logistics-env "
         f"{version('swarm-logistics-env')}."
     )
-
-
-def glossary(plan: Plan) -> Section:
-    """Return what the words and letters of the report mean."""
-    asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
-    rows = [
-        ("P", f"performance: {plan.specification.played.performance}"),
-        ("P_o, P_new", "P in the original condition, and in the changed one"),
-        *((DEFINITIONS[symbol].heading, _meaning(DEFINITIONS[symbol])) for symbol in asked),
-        *_WORDS,
-    ]
-    return Section("", ("word", "meaning"), tuple(rows))
-
-
-def _meaning(definition: Definition) -> str:
-    """Return an indicator's formula, which its function's docstring begins with, and its words."""
-    first, *_ = (definition.function.__doc__ or definition.heading).strip().splitlines()
-    formula = first.partition(" (paper")[0].rstrip(".")
-    adjectives = (f"above {x:g} {adjective}" for x, adjective in definition.adjectives.items())
-    return "; ".join([formula, *adjectives])
-
-
-_WORDS = (
-    ("N, m", "number of robots of the swarm; number of those added, faulty or removed"),
-    ("seed", "number that decides the layout, the requests, which robots fail and the behaviour"),
-    ("paired", "all conditions are played over the same seeds, and compared seed by seed"),
-    ("twin", "the run of the same seed in the original condition"),
-    ("supported, refuted", "above, or below, the threshold beyond chance"),
-    ("equivalent", "the indicator is open, but P changes by less than the declared margin"),
-    ("open", "these seeds cannot tell; in CSV files inconclusive"),
-    ("same runs", "both conditions gave the same runs: exact, and no evidence"),
-    ("undefined", "nothing was delivered in the reference, or runs failed or are missing"),
-    ("Holm", "adjustment of a family of verdicts so that any error among them has 5 % at most"),
-    ("provisional", "the verdict assumes normal differences: below ten seeds, or unpaired"),
-    ("claim", "what the reference says of an indicator"),
-    ("†", "P is capped: every item was delivered in at least one run"),
-)

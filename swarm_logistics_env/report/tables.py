@@ -1,21 +1,16 @@
-"""Tables: results, agreement with published values, policies side by side, faults; warnings."""
+"""Tables: results, agreement with published values, faults; warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.measures import (
     Agreement,
-    CellAgainstBaseline,
-    IndicatorAgainstBaseline,
     RepairCurve,
     Resilience,
     agreements,
-    cells_against_baseline,
-    indicators_against_baseline,
     resiliences,
 )
 from swarm_logistics_env.studies.presets import Reference, load_reference
@@ -187,59 +182,6 @@ def warnings(results: StudyResults) -> Iterator[str]:
             compared = test.compared
             what = f"{compared.policy}, {compared.indicator}, {compared.label}"
             yield f"{what} is undefined: {test.problem}."
-
-
-_HOW_TO_READ = (
-    "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
-    "differences are paired by seed, their intervals jackknifed. Differences of P are paired by "
-    "seed (t-interval), and so are ratios of mean P (Fieller)."
-)
-
-
-def policy_sections(results: StudyResults) -> Iterator[Section]:
-    """Yield policy x indicator: values with differences, then P cell by cell."""
-    if len(results.policies) < 2:
-        return
-    yield Section("", lines=(_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
-    questions = list(indicators_against_baseline(results))
-    by_table = grouped(questions, lambda one: one.test.compared.table)
-    for table, here in by_table.items():
-        yield _side_by_side(table, here, results.policies)
-    for table, cells in cells_against_baseline(results).items():
-        yield _cells_beside(table, cells, results.policies[0])
-
-
-def _side_by_side(
-    table: str, questions: Sequence[IndicatorAgainstBaseline], policies: Sequence[str]
-) -> Section:
-    def answer(one: IndicatorAgainstBaseline, policy: str) -> str:
-        test = one.tests.get(policy)
-        return f"{section.ratio(test)} {section.answered(test)}" if test else section.NOTHING
-
-    def difference(one: IndicatorAgainstBaseline, policy: str) -> str:
-        return section.bracketed(one.differences.get(policy), 3)
-
-    baseline, *others = policies
-    columns: list[tuple[str, Callable[[IndicatorAgainstBaseline], str]]] = [
-        ("question", lambda one: f"{one.test.asked}, {one.test.compared.label}"),
-        *((f"{policy} [95 %]", partial(answer, policy=policy)) for policy in policies),
-        *((f"{one} - {baseline} [95 %]", partial(difference, policy=one)) for one in others),
-    ]
-    return Section.table(f"Indicators side by side: {table}", questions, columns)
-
-
-def _cells_beside(table: str, cells: Sequence[CellAgainstBaseline], baseline: str) -> Section:
-    return Section.table(
-        f"P side by side: {table}",
-        cells,
-        [
-            ("condition", lambda one: str(one.cell.arm.setting)),
-            ("policy", lambda one: one.cell.policy),
-            ("mean P [95 %]", lambda one: section.mean_p(one.cell)),
-            (f"P - {baseline}'s [95 %]", lambda one: section.bracketed(one.difference, 1)),
-            (f"P / {baseline}'s [95 %]", lambda one: section.bracketed(one.ratio, 2)),
-        ],
-    )
 
 
 _SINGLE_TEXT = (
