@@ -18,7 +18,7 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.report.answer import answer
-from swarm_logistics_env.report.page import bars, watch_command
+from swarm_logistics_env.report.page import axis, watch_command
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
 from verification.browser import Browser
@@ -94,20 +94,21 @@ def test_every_seed_stands_behind_its_interval(data: Any, found: StudyResults) -
         np.testing.assert_allclose(point["seeds"], (after - before) / before + m / 4, atol=1e-3)
 
 
-def test_bars_of_the_answer_stand_in_the_order_of_their_values(found: StudyResults) -> None:
-    lines = answer(found)
-    zero, rows = bars(lines)
-    drawn = {bar.number: bar for row in rows for bar in row}
-    known = [(n, test) for n, test in enumerate(found.verdicts) if test.interval]
-    assert set(drawn) == {n for n, _ in known}
-    for number, test in known:
-        bar = drawn[number]
-        assert bar.verdict == test.conclusion
-        assert 0 <= bar.low <= bar.at <= bar.high <= 100
-        assert (bar.at > zero) == ((test.value or 0.0) > 0)
-    by_value = sorted(known, key=lambda one: one[1].value or 0.0)
-    places = [drawn[number].at for number, _ in by_value]
-    assert places == sorted(places)
+def test_intervals_of_the_answer_are_drawn_to_the_ends_of_their_axis(
+    page: str, found: StudyResults
+) -> None:
+    first, last = axis(answer(found))
+    shape = r'<g class="(\w+)" data-question="(\d+)"><path d="M(\S+),\S+H(\S+)"/>.*?d="M([^,]+),'
+    drawn = {int(number): (word, *ends) for word, number, *ends in re.findall(shape, page)}
+    known = {n: test for n, test in enumerate(found.verdicts) if test.interval}
+    assert drawn.keys() == known.keys()
+    for number, test in known.items():
+        word, *places = drawn[number]
+        value, low, high = test.interval or (0.0, None, None)
+        assert word == test.conclusion
+        ends = max(first, low or value), min(last, high or value), value
+        assert [float(x) for x in places] == pytest.approx(ends)
+        assert first < value < last
 
 
 def test_command_of_a_run_plays_the_stored_one(
