@@ -64,7 +64,7 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
     found = _agreement(with_drift)
     send = _agreement(with_drift, reading="FM3_send")
     exact = _agreement(_published_cells(parts[3:]))
-    missed = {cell.arm.setting for cell in found.misses or ()}
+    missed = {cell.arm.setting for cell in found.misses}
     rows = [
         _row(label, [with_drift[level] for level in levels], missed)
         for label, levels in _paper_rows(with_drift)
@@ -119,7 +119,7 @@ def _agreement(cells: Mapping[Setting, Cell], reading: str = "FM3") -> Agreement
 
 def _near(found: Agreement) -> str:
     """Return how near the published values are to ours, in words."""
-    inside = f"{len(found.met or ())} of {len(found.cells)}"
+    inside = f"{len(found.met)} of {len(found.cells)}"
     return f"{found.mean_log_error or 0.0:.3f}, {inside}"
 
 

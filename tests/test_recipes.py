@@ -291,6 +291,6 @@ def test_an_indicator(copy: Copy) -> None:
     copy.insert("spi/definitions.py", "def scalability(", INDICATOR)
     copy.insert("spi/definitions.py", '        Definition(\n            symbol="S"', DEFINITION)
     report = copy.run("-c", STUDY)
-    assert "swarm-dt, alive? Failure mode FM4, m = 1 of N = 4." in report
+    assert "swarm-dt, alive? FM4, m = 1, N = 4." in report
     assert "performance kept K; above " in report
     assert copy.changed == files_of("An indicator")

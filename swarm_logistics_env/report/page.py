@@ -158,7 +158,7 @@ def _indicator_views(results: StudyResults) -> Iterator[Json]:
             "name": f"{panel.tests[0].compared.indicator}: {where}",
             "y": f"{panel.y_label} over {panel.x_label}",
             "thresholds": [float(threshold) for threshold in panel.thresholds],
-            "categories": categories,
+            "categories": [*categories],
             "points": [
                 {
                     "policy": point.series,

@@ -31,7 +31,11 @@ def tables(results: StudyResults) -> Iterator[Section]:
     """
     for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
         rows = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
-        tests = [test for test in results.verdicts if test.where == (policy, table)]
+        tests = [
+            test
+            for test in results.verdicts
+            if (test.compared.policy, test.compared.table) == (policy, table)
+        ]
         published = any(cell.published is not None for cell in rows)
         setting: CellColumn = ("", lambda cell: cell.words)
         columns = [setting]
@@ -134,14 +138,13 @@ def _times_to_clear(results: StudyResults) -> Iterator[Section]:
 def _agreement(found: Agreement) -> Section:
     total = len(found.cells)
     lines = ["Cells inside the 95 % prediction interval: one seed gives no interval."]
-    if found.misses is not None and found.met is not None:
+    if all(cell.n_seeds > 1 for cell in found.cells):
         lines = [
             (
                 f"Cells whose published P lies inside the 95 % prediction interval of one of our "
                 f"runs: {total - len(found.misses)} of {total}; inside that of our mean: "
                 f"{len(found.met)} of {total}."
             ),
-            f"Mean width of those intervals: {found.mean_interval_width:.1f} items.",
             f"Misses: {'; '.join(cell.words for cell in found.misses) or 'none'}.",
         ]
     if found.mean_log_error is not None:

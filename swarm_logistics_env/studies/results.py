@@ -197,7 +197,7 @@ VERDICT_COLUMNS: Columns = {
     "n_seeds": (float, "estimate.n_seeds", "number of seeds; missing: undefined"),
     "stopped_at": (float, "stopped_at", "number of seeds at which it was clear; missing: open"),
     "pairing_correlation": (float, "estimate.pairing_correlation", "of the two P over seeds"),
-    "flags": (str, "marks", "marks on the verdict, see `Estimate`, with blanks between"),
+    "flags": (str, "flags", "marks on the verdict, see `Estimate`, with blanks between"),
     "saturated": (bool, "saturated", "whether it rests on a P that is capped"),
     "property": (str, "asked", "what is asked, e.g. tolerant, FT > 0.5 or P falls"),
     "answer": (str, "answer", "verdict on the property"),
@@ -246,4 +246,4 @@ def _frame(rows: Sequence[Cell | Verdict], columns: Columns) -> pd.DataFrame:
 def _at(record: object, place: str) -> object:
     for name in place.split("."):
         record = getattr(record, name, None)
-    return record
+    return " ".join(record) if isinstance(record, tuple) else record

@@ -192,19 +192,9 @@ class Verdict:
         return definition.property_name(self.compared.threshold, claimed_below=below)
 
     @property
-    def where(self) -> tuple[str, str]:
-        """Policy and table that it stands in."""
-        return self.compared.policy, self.compared.table
-
-    @property
     def after(self) -> Setting:
         """The setting of the changed condition."""
         return self.compared.changed.setting
-
-    @property
-    def marks(self) -> str:
-        """The flags with blanks between."""
-        return " ".join(self.flags)
 
     @property
     def plain(self) -> str | None:
@@ -280,26 +270,14 @@ class Verdict:
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
 
 
-@dataclass(frozen=True)
-class Level:
-    """The level at which a comparison is judged.
-
-    Attributes:
-        confidence: of the indicator's interval and verdict, in (0, 1).
-        alpha: error of each of the two tests of equivalence, in (0, 0.5).
-    """
-
-    confidence: float = CONFIDENCE
-    alpha: float = ALPHA
-
-
 def judge_one(
     comparison: Comparison,
     cells: Mapping[Arm, Cell],
     *,
     paired: bool,
     margin: float,
-    level: Level | None = None,
+    confidence: float = CONFIDENCE,
+    alpha: float = ALPHA,
 ) -> Verdict:
     """Return a comparison's verdict, without what Holm makes of it.
 
@@ -307,8 +285,9 @@ def judge_one(
 
     Args:
         cells: those of the comparison's arms.
+        confidence: of the indicator's interval and verdict, in (0, 1).
+        alpha: error of each of the two tests of equivalence, in (0, 0.5).
     """
-    level = level or Level()
     saturated = [arm for arm in comparison.arms if cells[arm].saturated]
     estimate, same = None, None
     problems = [
@@ -324,7 +303,7 @@ def judge_one(
                 paired=paired,
                 saturated=saturated,
                 identical=identical,
-                confidence=level.confidence,
+                confidence=confidence,
             )
             same = comparison.equivalence(
                 samples,
@@ -332,7 +311,7 @@ def judge_one(
                 paired=paired,
                 saturated=saturated,
                 identical=identical,
-                alpha=level.alpha,
+                alpha=alpha,
             )
         except spi.IndicatorError as error:
             nothing = not samples[comparison.original].any()

@@ -90,7 +90,7 @@ def test_every_seed_stands_behind_its_interval(data: Any, found: StudyResults) -
     for point in robustness["points"]:
         asked = data["questions"][point["question"]]
         before, after = (np.array(data["conditions"][c]["p"]) for _, _, c in asked["arms"])
-        m = int(asked["head"].split("m = ")[1].split()[0])
+        m = int(asked["head"].split("m = ")[1].split(",")[0])
         np.testing.assert_allclose(point["seeds"], (after - before) / before + m / 4, atol=1e-3)
 
 

@@ -42,14 +42,11 @@ def test_the_papers_own_values_agree_with_the_paper(found: StudyResults) -> None
     assert words(figure.misses) <= {"warehouse_width = 10"}
     assert figure.mean_log_error is not None
     assert figure.mean_log_error < 0.03
-    assert len(figure.met or ()) > 25
-    assert figure.mean_interval_width == pytest.approx(2 * 2.26 * 1.05, rel=0.25)
+    assert len(figure.met) > 25
 
 
 def test_misses_lie_outside_the_interval_of_one_run() -> None:
     (figure,) = agreements(paper(lambda *where: published(*where) + 2.0))
-    assert figure.misses is not None
-    assert figure.met is not None
     assert len(figure.cells) - len(figure.misses) > 20
     assert len(figure.met) < 5
     logs = [abs(math.log(c.by_seed.mean() / (c.published or 0.0))) for c in figure.cells]
