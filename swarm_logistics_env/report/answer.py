@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
@@ -298,12 +299,8 @@ def digest(found: Answer, width: int, most: int | None = MOST_LINES) -> str:
 
 def _rows(found: Answer, width: int) -> Iterator[str]:
     """Yield the lines in columns; the verdict is folded where the terminal is narrow."""
-    columns: tuple[Callable[[Line], str], ...] = (
-        lambda line: line.question,
-        lambda line: line.value,
-        lambda line: line.interval,
-    )
-    widths = [max(len(of(line)) for line in found.lines) for of in columns]
+    columns = zip(*((line.question, line.value, line.interval) for line in found.lines))
+    widths = [max(map(len, column)) for column in columns]
     widths[0] = min(widths[0], max(8, width - sum(widths[1:]) - 16))
     for policy, lines in grouped(found.lines, lambda line: line.policy).items():
         if len({line.policy for line in found.lines}) > 1:
@@ -313,13 +310,8 @@ def _rows(found: Answer, width: int) -> Iterator[str]:
             left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {line.interval:{widths[2]}}"
             verdict = textwrap.wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
             yield f"{left}  {verdict[0]}".rstrip()
-            for first, second in _filled(more, verdict[1:]):
+            for first, second in zip_longest(more, verdict[1:], fillvalue=""):
                 yield f"{first:{len(left)}}  {second}".rstrip()
-
-
-def _filled(first: Sequence[str], second: Sequence[str]) -> Iterator[tuple[str, str]]:
-    for place in range(max(len(first), len(second))):
-        yield "".join(first[place : place + 1]), "".join(second[place : place + 1])
 
 
 def _fold(text: str, width: int) -> list[str]:

@@ -61,7 +61,7 @@ class StoredSpecification(BaseModel):
         How far it is played, and how it is judged, may change: `Declaration` guards these.
         """
         declared = self.read(place, task=asked.played)
-        free = ("name", "seeds", "first_seed", "looks", "until_clear", "margin", "reference")
+        free = ("seeds", "first_seed", "looks", "until_clear", "margin", "reference")
         mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
         theirs["task"] = self.task
         return [name for name in mine if name not in free and mine[name] != theirs[name]]

@@ -19,7 +19,6 @@ from .comparison import Comparison
 from .results import StudyResults, Times
 from .verdict import Cell, grouped, same_runs
 
-Pair = tuple[Times, Times]
 Outcomes = tuple[Outcome, ...]
 
 
@@ -27,13 +26,11 @@ class RepairCurve(NamedTuple):
     """Kaplan and Meier's curve of the times after which single runs are back.
 
     Attributes:
-        runs: which runs: "fault", or "no fault" for the null pair.
         curve: share of runs that are not back yet.
         censored: how many were not back by then.
         total: of how many.
     """
 
-    runs: str
     curve: SurvivalCurve
     censored: int
     total: int
@@ -76,8 +73,8 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
         try:
             if removed is None:
                 raise StudyError("no runs with the robots removed are there to compare with")
-            null = _null(results, comparison)
-            single = _repair_curves(comparison, (_times(faulty), _times(removed)), null)
+            pairs = (_times(faulty), _times(removed)), _null(results, comparison)
+            single = tuple(_repair_curve(comparison, *pair) for pair in pairs)
         except (StudyError, spi.IndicatorError) as error:
             yield Resilience(comparison, *indices, problem=str(error))
         else:
@@ -116,7 +113,7 @@ def _index(
         return None
 
 
-def _null(results: StudyResults, comparison: Comparison) -> Pair:
+def _null(results: StudyResults, comparison: Comparison) -> tuple[Times, Times]:
     """Return the pair without fault.
 
     Raises:
@@ -133,17 +130,13 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
     return original, other
 
 
-def _repair_curves(comparison: Comparison, pair: Pair, null: Pair) -> tuple[RepairCurve, ...]:
+def _repair_curve(comparison: Comparison, times: Times, reference: Times) -> RepairCurve:
     onset = comparison.changed.setting.onset
     end = comparison.original.case.scenario.duration
-    curves = []
-    for runs, times in (("fault", pair), ("no fault", null)):
-        window = window_of(comparison)
-        seconds, back = spi.repair_times(*times, onset=onset, end=end, window=window)
-        curve = spi.kaplan_meier(seconds, back)
-        censored = int(np.count_nonzero(~back))
-        curves.append(RepairCurve(runs, curve, censored, back.size))
-    return tuple(curves)
+    window = window_of(comparison)
+    seconds, back = spi.repair_times(times, reference, onset=onset, end=end, window=window)
+    censored = int(np.count_nonzero(~back))
+    return RepairCurve(spi.kaplan_meier(seconds, back), censored, back.size)
 
 
 _LONGEST_WINDOW = 100.0  # s

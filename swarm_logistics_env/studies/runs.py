@@ -95,9 +95,10 @@ class Runs:
         path = directory / FILE_NAME
         if not path.is_file():
             raise StudyError(f"no study in {directory}: there is no file {path}")
-        log = path.with_name(f"{path.name}-wal")
-        # The latest runs are merged by writing; without them a full or locked folder is no matter.
-        return cls(path, read_only=not (log.is_file() and log.stat().st_size))
+        # A log is there while somebody writes, and after they were killed: it is merged by writing.
+        # Without one, a full or locked folder is no matter.
+        is_whole = path.stat().st_size and not path.with_name(f"{path.name}-wal").exists()
+        return cls(path, read_only=bool(is_whole))
 
     @classmethod
     @contextmanager
@@ -280,8 +281,6 @@ class Runs:
                 f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
             )
         if self._read_only:
-            if not is_ours:
-                raise StudyError(f"{self.path} is empty, and not the store of a study")
             return
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._change_to_wal()
