@@ -18,7 +18,7 @@ from swarm_logistics_env.report.tables import sentences
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.measures import Agreement, agreement
-from swarm_logistics_env.studies.presets import PAPER, PAPER_SIZES
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
@@ -44,7 +44,8 @@ def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
     rest: dict[str, object] = {"seeds": SEEDS, "faults": ()}
     faults = {"seeds": SEEDS_WHERE_SKEWED, "sizes": (), "parameters": (), "ablations": ()}
     send = [{"title": "Table II, another reading of FM3", "modes": ["FM3_send"]}]
-    large = [{"values": list(PAPER_SIZES), "scenario": {"preset": "paper_scalability", **NO_DRIFT}}]
+    sizes = [int(setting.value) for setting in PAPER.performance if setting.kind == "size"]
+    large = [{"values": sizes, "scenario": {"preset": "paper_scalability", **NO_DRIFT}}]
     parts = {
         "paper": rest,
         "paper-faults": faults,

@@ -10,9 +10,10 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
-from swarm_logistics_env.studies import Study, presets
+from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.measures import resiliences
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 from tests.studies.made_up import GOLDEN
@@ -28,15 +29,13 @@ def papers_tables() -> str:
         values = [table, robots, fault, m, *{**parameters, **changed}.values(), p]
         rows.append([str(value) for value in values])
 
-    for n, p in presets.PAPER_SIZES.items():
-        add("I", n, "none", 0, p)
-    add("II", 25, "none", 0, presets.PAPER_NO_FAULT)
-    for mode, performances in presets.PAPER_FAULTS.items():
-        for m, p in enumerate(performances, start=1):
-            add("II", 25, mode, m, p)
-    for name, row in presets.PAPER_PARAMETERS.items():
-        for x, p in row.items():
-            add(f"III {name}", 25, "none", 0, p, **{name: x})
+    for (kind, name, value, _), p in PAPER.performance.items():
+        if kind == "size":
+            add("I", int(value), "none", 0, p)
+        elif kind == "parameter":
+            add(f"III {name}", 25, "none", 0, p, **{name: value})
+        elif name != "FM3_send":
+            add("II", 25, name, int(value), p)
     return "".join(",".join(row) + "\n" for row in rows)
 
 
