@@ -15,7 +15,7 @@ from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.measures import resiliences
 from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs
+from swarm_logistics_env.studies.runs import Runs
 from tests.studies.made_up import GOLDEN
 
 
@@ -97,6 +97,13 @@ def test_indicators_of_a_lab_file_are_those_of_spi_by_hand(tmp_path: Path) -> No
         assert found.loc[symbol, "verdict"] == estimate.verdict
     assert found.loc["R", "comparison"] == "wheel, m = 1"
     assert found.loc["A", "comparison"] == "width 2 -> 1.5"
+    (tmp_path / "lab.csv").write_text(LAB)
+    import_results(tmp_path / "lab.csv", tmp_path / "stated", setup={"arena": "4 m x 4 m"})
+    report = markdown(document(Study.stored(tmp_path / "stated").findings()))
+    assert "| arena | 4 m x 4 m |" in report
+    assert "Welch's t-test for independent samples" in report
+    assert "heading_drift" not in report
+    assert "code version" not in report
 
 
 def test_each_value_of_what_else_varies_has_a_table_of_its_own(tmp_path: Path) -> None:
@@ -112,17 +119,11 @@ def test_each_value_of_what_else_varies_has_a_table_of_its_own(tmp_path: Path) -
     ]  # without trials of removed robots for robustness alone
 
 
+SQUARE = {"warehouse_width": 4.0, "warehouse_height": 4.0}
 LATE = Study(
     name="late",
     seeds=3,
-    policies=["swarm-dt"],
-    scenario={
-        "n_robots": 8,
-        "warehouse_width": 4.0,
-        "warehouse_height": 4.0,
-        "duration": 300.0,
-        "restock": True,
-    },
+    scenario={**SQUARE, "n_robots": 8, "duration": 300.0, "restock": True},
     faults=[{"modes": ["FM4"], "robots": [2], "onsets": [100.0]}],
 )
 
@@ -168,16 +169,6 @@ def test_an_event_log_without_seeds_and_removed_robots_has_the_index_alone(tmp_p
     assert found.against_removed is None
     assert not found.single
     assert found.problem == "no runs with the robots removed are there to compare with"
-
-
-def test_the_report_states_the_set_up_and_no_simulators(tmp_path: Path) -> None:
-    (tmp_path / "lab.csv").write_text(LAB)
-    import_results(tmp_path / "lab.csv", tmp_path / "out", setup={"arena": "4 m x 4 m"})
-    report = markdown(document(Study.stored(tmp_path / "out").findings()))
-    assert "| arena | 4 m x 4 m |" in report
-    assert "Welch's t-test for independent samples" in report
-    assert "heading_drift" not in report
-    assert "code version" not in report
 
 
 MANY = "robots,delivered\n5,9\n5,11\n5,10\n10,18\n10,22\n"
@@ -238,6 +229,3 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
         Study(out=tmp_path / "out", **small).run()
     with Runs.existing(tmp_path / "out") as runs:
         assert len(runs) == 5
-    assert [path.name for path in (tmp_path / "out").iterdir()] == [FILE_NAME]
-    with pytest.raises(StudyError, match="was imported: run into a new directory"):
-        Study.stored(tmp_path / "out").run()

@@ -76,9 +76,7 @@ def test_claims_are_judged_in_their_own_direction(
     assert (test.claim_verdict == test.plain) == (test.claimed is True or verdict == "inconclusive")
 
 
-def test_power_is_undefined_where_the_published_value_is_the_threshold(
-    found: StudyResults,
-) -> None:
+def test_power_is_undefined_where_the_published_value_is_the_threshold(found: StudyResults) -> None:
     power = by_question(found)
     at_threshold = power["FT", "FM4, m = 1", 0.0]
     assert (at_threshold.published, at_threshold.seeds_needed) == (0, None)

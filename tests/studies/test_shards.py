@@ -100,10 +100,7 @@ def test_merged_parts_are_the_declared_study_and_success_wins(whole: Path, tmp_p
         (noted("imported", {"file": "x.csv", "digest": "d", "paired": True}), "was imported"),
         (noted("identities", {"policy swarm-dt": "x"}), "differ in the code of their policies"),
         (noted("specification", {"sizes": []}), "differ in sizes"),
-        (noted("specification", {"policies": ["random-walk"]}), "differ in policies"),
-        (noted("specification", {"until_clear": True}), "differ in until_clear"),
         (noted("declared", {"seeds": 3}), "differ in what they declared: should be shards"),
-        (noted("declared", {"margin": 0.3}), "differ in what they declared"),
     ],
 )
 def test_what_is_not_one_study_is_not_merged(
