@@ -76,11 +76,9 @@ def test_every_seed_stands_behind_its_interval(data: Any, found: StudyResults) -
         condition = data["conditions"][point["condition"]]
         assert len(condition["p"]) == 3
         words = condition["name"].removeprefix(f"{point['policy']}, ")
-        value, *limits = means[point["policy"], words]
+        limits = [point["value"], point["low"], point["high"]]
+        assert limits == pytest.approx(means[point["policy"], words], abs=1e-3)
         assert point["value"] == pytest.approx(np.mean(condition["p"]), abs=1e-3)
-        assert [point["value"], point["low"], point["high"]] == pytest.approx(
-            [value, *limits], abs=1e-3
-        )
     for condition in data["conditions"]:
         for p, gaps in zip(condition["p"], condition["curves"]):
             assert len(gaps) == p
@@ -114,13 +112,9 @@ def test_intervals_of_the_answer_are_drawn_to_the_ends_of_their_axis(
 def test_command_of_a_run_plays_the_stored_one(
     data: Any, found: StudyResults, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (faulty,) = {
-        arm
-        for policy, _, arm in found.plan.cells
-        if (policy, str(arm.setting)) == ("swarm-dt", "FM4, m = 2")
-    }
-    command = watch_command(faulty)
-    assert command is not None
+    arms = {(policy, str(arm.setting)): arm for policy, _, arm in found.plan.cells}
+    faulty = arms["swarm-dt", "FM4, m = 2"]
+    command = str(watch_command(faulty))
     assert command in {condition["command"] for condition in data["conditions"]}
     program, watch, *options = shlex.split(command)
     assert (program, watch) == ("swarm-logistics", "watch")
@@ -132,21 +126,14 @@ def test_command_of_a_run_plays_the_stored_one(
 
 def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word() -> None:
     scenario = {"speed_mix": [1.0, 0.5], "restock": True}
-    mid_run = {"modes": ["FM4"], "robots": [1], "onsets": [100.0]}
+    mid_run = {"modes": ["FM4"], "robots": [1], "onsets": [100.0], "duration": 50.0}
     breaks = {"modes": ["FM1"], "robots": [1], "intermittent": [5.0, 5.0]}
-    faults = [mid_run, {**mid_run, "duration": 50.0}, breaks]
-    plan = Study(scenario=scenario, faults=faults).plan()
-    commands = {str(arm.case.faults): watch_command(arm) for _, _, arm in plan.cells}
-    (lasting,) = (c for faults, c in commands.items() if "duration=50" in faults)
-    assert lasting is not None
-    assert lasting.endswith("--fault FM4:1@100+50")
-    (for_good,) = (
-        c for faults, c in commands.items() if "FM4" in faults and c not in (None, lasting)
-    )
-    assert shlex.split(str(for_good))[4:] == [
-        *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100")
+    plan = Study(scenario=scenario, faults=[mid_run, breaks]).plan()
+    commands = {arm.setting.name: watch_command(arm) for _, _, arm in plan.cells}
+    assert shlex.split(str(commands["FM4"]))[4:] == [
+        *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100+50")
     ]
-    assert [c for faults, c in commands.items() if "intermittent=(" in faults] == [None]
+    assert commands["FM1"] is None
     assert {watch_command(null) for null in plan.nulls.values()} == {None}
     given = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
     own = Study(policies=[SwarmDT(), given], sizes=[{"values": [2, 3]}]).plan()
