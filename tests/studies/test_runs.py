@@ -164,7 +164,7 @@ def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
             directory.mkdir()
             for maker in makers:
                 print(directory / FILE_NAME, file=maker.stdin, flush=True)
-            assert [maker.stdout.readline() for maker in makers] == ["made\n"] * 2
+            assert [maker.stdout and maker.stdout.readline() for maker in makers] == ["made\n"] * 2
             with Runs.existing(directory) as runs:
                 assert runs.notes() == {"0": "here", "1": "here"}
 
