@@ -14,7 +14,7 @@ from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
-from .section import Figure, Section, sentence
+from .section import Figure, Section, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
 
@@ -35,14 +35,19 @@ class Document:
         title, text: its heading and the sentences below it.
         answer: what the study found.
         chapters: its parts, in order.
-        summary: the tables, warnings and measures of faults alone, for a terminal.
     """
 
     title: str
     text: tuple[str, ...]
     answer: Answer
     chapters: tuple[Chapter, ...]
-    summary: tuple[Section, ...]
+
+    @property
+    def summary(self) -> tuple[Section, ...]:
+        """Warnings, tables and measures of faults alone, for a terminal."""
+        shown = ("Warnings", "Results", "Beyond the paper")
+        sections = [one for each in self.chapters if each.title in shown for one in each.sections]
+        return tuple(replace(one, figures=()) for one in sections if one.columns or one.lines)
 
     def figures(self) -> Iterator[Figure]:
         """Yield every figure, in the order of the report."""
@@ -54,12 +59,9 @@ class Document:
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
-    what = "seed" if plan.paired else "trial"
-    seeds = f"1 {what}" if len(plan.seeds) == 1 else f"{len(plan.seeds)} {what}s"
-    seeds = seeds if plan.paired else f"at most {seeds}"
     about = (
-        f"{plan.specification.name}: {len(plan.cases)} conditions, {seeds} of each; every verdict "
-        "holds for the conditions of the set-up sheet below and for no others."
+        f"{plan.specification.name}: {len(plan.cases)} conditions, {seeds_text(results)}; every "
+        "verdict holds for the conditions of the set-up sheet below and for no others."
     )
     text = [about]
     if results.reference:
@@ -67,14 +69,9 @@ def document(results: StudyResults) -> Document:
     found = answer(results)
     result_tables, lines = tuple(tables(results)), tuple(warnings(results))
     faults = tuple(fault_sections(results))
-    summary = (
-        *result_tables,
-        *([Section("Warnings", lines=lines)] if lines else []),
-        *(replace(one, figures=()) for one in faults if one.columns or one.lines),
-    )
     figures = forest_figure(results, found), *indicator_figures(results)
     chapters = [
-        Chapter("Warnings", "", (Section("", lines=lines),) if lines else ()),
+        Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
         Chapter(
             "Figures",
             "The paper's indicators; raw P and the numbers stand in the tables below.",
@@ -105,7 +102,6 @@ def document(results: StudyResults) -> Document:
         tuple(text),
         found,
         tuple(chapter for chapter in chapters if chapter.sections),
-        summary,
     )
     # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
@@ -133,7 +129,7 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
         return _recorded_setup(plan)
     policies = {case.policy.title: case.identity for case in plan.cases}
     return (
-        Section("Study", lines=tuple(_study(plan))),
+        Section("Study", lines=(f"{_version()}, code version {plan.code}.",)),
         Section(
             "Policies",
             ("policy", "identity"),
@@ -146,15 +142,6 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
             tuple(plan.specification.scenario.conditions()),
             tuple(_variations(plan)),
         ),
-    )
-
-
-def _study(plan: Plan) -> Iterator[str]:
-    yield (
-        f"Study {plan.specification.name!r}: {len(plan.cases)} conditions x "
-        f"{len(plan.seeds)} seeds ({plan.seeds[0]} to {plan.seeds[-1]}), the same seeds for every "
-        f"condition. swarm-logistics-env {version('swarm-logistics-env')}, code version "
-        f"{plan.code}."
     )
 
 
@@ -222,6 +209,9 @@ def methods(plan: Plan) -> str:
         "side, equivalent where it does not but two one-sided tests find that P changes by less "
         f"than {100 * plan.specification.margin:.3g} % of P_o, else inconclusive; p is adjusted by "
         "Holm's method over all comparisons of one indicator for one policy. Computed with "
-        "swarm-logistics-env "
-        f"{version('swarm-logistics-env')}."
+        f"{_version()}."
     )
+
+
+def _version() -> str:
+    return f"swarm-logistics-env {version('swarm-logistics-env')}"

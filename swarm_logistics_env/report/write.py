@@ -190,18 +190,13 @@ def template(name: str) -> Template:
         keep_trailing_newline=True,
     )
     environment.filters["unbroken"] = _unbroken
-    environment.filters["arrows"] = _arrows
     return environment.get_template(name)
 
 
 def _unbroken(text: str) -> str:
     """Return text whose numbers keep their units, and equations their two sides, on one line."""
     held = r"(?<=\d) (?=%|s\b)| (?=[=<→] )|(?<=[=<→]) "
-    return re.sub(held, "\N{NO-BREAK SPACE}", _arrows(text))
-
-
-def _arrows(text: str) -> str:
-    return text.replace("->", "→")
+    return re.sub(held, "\N{NO-BREAK SPACE}", text.replace("->", "→"))
 
 
 _ESCAPES = {

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import estimate as words
-from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence
+from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
@@ -297,22 +297,20 @@ def judge_one(
         digests = (cells[arm].digests for arm in (comparison.original, comparison.changed))
         identical = comparison.removed is None and same_runs(*digests)
         samples = {arm: cells[arm].by_seed for arm in comparison.arms}
+        shared: dict[str, Any] = {"paired": paired, "identical": identical}
         try:
             estimate = comparison.estimate(
-                samples,
-                paired=paired,
-                saturated=saturated,
-                identical=identical,
-                confidence=confidence,
+                samples, saturated=saturated, confidence=confidence, **shared
             )
-            same = comparison.equivalence(
-                samples,
-                margin=margin,
-                paired=paired,
-                saturated=saturated,
-                identical=identical,
-                alpha=alpha,
-            )
+            if comparison.definition.unchanged(margin) is not None:  # S has no such question
+                named = dict(zip(("p_o", "p_new", "p_s"), comparison.arguments.values()))
+                same = equivalence(
+                    *(samples[arm] for arm in named.values()),
+                    margin=margin,
+                    alpha=alpha,
+                    saturated=[name for name, arm in named.items() if arm in saturated],
+                    **shared,
+                )
         except spi.IndicatorError as error:
             nothing = not samples[comparison.original].any()
             estimate, problems = None, ["it delivers nothing" if nothing else str(error)]
@@ -328,13 +326,11 @@ def under_holm(found: Sequence[Verdict]) -> Iterator[Verdict]:
     for family in grouped(found, lambda one: one.compared.family).values():
         estimates = [one.estimate for one in family if one.estimate]
         same = [one.equivalence for one in family if one.equivalence]
-        p_values: list[float | None] = [None] * len(family)
-        verdicts: list[words.Verdict | None] = [None] * len(family)
-        unchanged: list[words.Verdict | None] = [None] * len(family)
-        if len(estimates) == len(family):
-            p_values, verdicts = [*spi.adjusted_p_values(estimates)], [*spi.adjust(estimates)]
-        if len(same) == len(family):
-            unchanged = [*spi.adjust(same)]
+        none = (None,) * len(family)
+        is_whole = len(estimates) == len(family)
+        p_values = spi.adjusted_p_values(estimates) if is_whole else none
+        verdicts = spi.adjust(estimates) if is_whole else none
+        unchanged = spi.adjust(same) if len(same) == len(family) else none
         for one, p, verdict, as_before in zip(family, p_values, verdicts, unchanged):
             adjusted[one.compared] = replace(
                 one,
