@@ -50,8 +50,7 @@ def difference(one: Judged, other: Judged) -> Interval:
 
     def value(judged: Judged, some: NDArray[np.intp]) -> float:
         results, compared = judged[0], judged[1].compared
-        place = compared.policy, compared.table
-        p = {arm: results.by_place[*place, arm].by_seed[some] for arm in compared.arms}
+        p = {arm: cell.by_seed[some] for arm, cell in results.cells_of(compared).items()}
         return compared.estimate(p).value
 
     return jackknife_interval(len(seeds), lambda some: value(one, some) - value(other, some))

@@ -14,7 +14,7 @@ from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
-from .section import Figure, Section, seeds_text, sentence
+from .section import Figure, Section, listed, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
 
@@ -191,7 +191,6 @@ def methods(plan: Plan) -> str:
     """Return a paragraph for a paper: what was measured, how it was estimated and tested."""
     asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
     names = [DEFINITIONS[symbol].heading for symbol in asked]
-    listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     n = len(plan.seeds)
     if plan.paired:
         what = "trials" if plan.imported_from else "simulated runs"
@@ -203,7 +202,7 @@ def methods(plan: Plan) -> str:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
         test = "Welch's t-test for independent samples"
     return (
-        f"We measured performance P in {trials}. We report {listed}, each a ratio of mean "
+        f"We measured performance P in {trials}. We report {listed(names)}, each a ratio of mean "
         f"performances, with the 95 % interval that inverts {test}. An indicator is called above "
         "its threshold (supported) or below it (refuted) where this test rejects at 2.5 % on that "
         "side, equivalent where it does not but two one-sided tests find that P changes by less "

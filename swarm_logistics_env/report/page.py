@@ -178,8 +178,7 @@ def _seed_by_seed(results: StudyResults, compared: Comparison) -> list[JsonValue
     """Return an indicator's value from each seed alone; None where it is undefined."""
     if not results.plan.paired:
         return []
-    where = compared.policy, compared.table
-    samples = {arm: results.by_place[*where, arm].by_seed for arm in compared.arms}
+    samples = {arm: cell.by_seed for arm, cell in results.cells_of(compared).items()}
     values: list[JsonValue] = []
     for place in range(len(results.plan.seeds)):
         try:

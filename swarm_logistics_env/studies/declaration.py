@@ -246,14 +246,9 @@ def merge(directories: Sequence[Path], out: Path) -> int:
 
 
 def _differing(one: StoredStudy, other: StoredStudy) -> list[str]:
-    """Return in words what two studies do not have in common."""
+    """Return what two studies do not have in common."""
     mine, theirs = (
-        {
-            **found.specification.model_dump(),
-            "code version": found.code,
-            "the code of their policies": found.identities,
-            "what they declared": found.declared,
-        }
-        for found in (one, other)
+        each.specification.model_dump() | each.model_dump(exclude={"specification"})
+        for each in (one, other)
     )
-    return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]
+    return [name for name in mine | theirs if mine.get(name) != theirs.get(name)]

@@ -263,10 +263,10 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
             name += f" ({comparison.table})"
         if gate.at not in name:
             continue
-        where = comparison.policy, comparison.table
-        cells = {arm: new.by_place[*where, arm] for arm in comparison.arms}
         margin = new.plan.specification.margin
-        found = judge_one(comparison, cells, paired=new.plan.paired, margin=margin)
+        found = judge_one(
+            comparison, new.cells_of(comparison), paired=new.plan.paired, margin=margin
+        )
         estimate = found.estimate
         if estimate is None:
             yield name, str(found.problem)

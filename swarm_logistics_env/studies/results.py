@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.tasks.task import Outcome
 
-from .comparison import Arm
+from .comparison import Arm, Comparison
 from .declaration import Declaration
 from .plan import Plan
 from .presets import Reference, load_reference
@@ -59,6 +59,11 @@ class StudyResults:
     def by_place(self) -> dict[Place, Cell]:
         """The cells by policy, table and arm."""
         return {(one.policy, one.table, one.arm): one for one in self.cells}
+
+    def cells_of(self, comparison: Comparison) -> dict[Arm, Cell]:
+        """Return the cells of a comparison's arms."""
+        where = comparison.policy, comparison.table
+        return {arm: self.by_place[*where, arm] for arm in comparison.arms}
 
     @property
     def policies(self) -> tuple[str, ...]:

@@ -94,13 +94,13 @@ def test_merged_parts_are_the_declared_study_and_success_wins(whole: Path, tmp_p
             ),
             "has another result",
         ),
-        (noted("code", "old"), "differ in code version"),
+        (noted("code", "old"), "differ in code"),
         (lambda database: database.execute("DELETE FROM notes"), "does not note its study"),
         (noted("identities", 3), "its note 'identities' does not read"),
         (noted("imported", {"file": "x.csv", "digest": "d", "paired": True}), "was imported"),
-        (noted("identities", {"policy swarm-dt": "x"}), "differ in the code of their policies"),
+        (noted("identities", {"policy swarm-dt": "x"}), "differ in identities"),
         (noted("specification", {"sizes": []}), "differ in sizes"),
-        (noted("declared", {"seeds": 3}), "differ in what they declared: should be shards"),
+        (noted("declared", {"seeds": 3}), "differ in declared: should be shards"),
     ],
 )
 def test_what_is_not_one_study_is_not_merged(
