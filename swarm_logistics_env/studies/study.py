@@ -176,7 +176,7 @@ class Study:
                 tried |= {run.key for run in missing}
                 errors += [one.error for one in outcomes if one.error is not None]
                 seconds += took
-                if left:
+                if left or not self.specification.until_clear:
                     break
         error = errors[0].strip().splitlines()[-1] if errors else None
         return Tally(played, len(errors), kept, seconds, error, left)
