@@ -157,21 +157,16 @@ def test_published_tables_give_the_golden_values_and_every_claim_follows_from_th
     for symbol, golden in GOLDEN.items():
         asked = (c for c in comparisons if (c.indicator, c.threshold) == (symbol, 0))
         assert [published(c) for c in asked] == pytest.approx(golden, abs=5e-4)
-    claims = {
-        comparison: PAPER.claims[comparison.question]
-        for comparison in comparisons
-        if comparison.indicator != "change"
-    }
+    claims = {c: PAPER.claims[c.question] for c in comparisons if c.indicator != "change"}
     assert len(claims) == 41
     # Those of the other reading of FM3 are asked of that alone.
-    rest = {asked for asked in PAPER.claims if asked not in {c.question for c in claims}}
+    rest = PAPER.claims.keys() - {comparison.question for comparison in claims}
     assert {asked.changed.name for asked in rest} == {"FM3_send"}
     for comparison, claim in claims.items():
         assert (published(comparison) > comparison.threshold) == claim, comparison.label
 
 
 FILE = """
-seeds = 3
 policies = ["swarm-dt", "random-walk"]
 scenario = { preset = "paper", duration = 50 }
 sizes = [{ values = [5, 10] }]
@@ -187,7 +182,6 @@ def test_file_says_what_python_says(tmp_path: Path) -> None:
     path.write_text(FILE)
     written = Study(
         name="small",
-        seeds=3,
         policies=("swarm-dt", "random-walk"),
         scenario={"duration": 50},
         sizes=[{"values": (5, 10)}],
@@ -195,6 +189,8 @@ def test_file_says_what_python_says(tmp_path: Path) -> None:
     )
     assert Study.from_file(path).specification == written.specification
     assert Study.from_file(path, seeds=5).plan().seeds == range(5)
+    with pytest.raises(StudyError, match=r"cannot read the study file .*No such file"):
+        Study.from_file(tmp_path / "none.toml")
 
 
 def test_robots_may_fail_and_be_repaired_at_random_lose_parts_of_a_mode_or_a_factor() -> None:
@@ -232,5 +228,3 @@ def test_bad_file_is_refused_in_one_sentence_that_names_it(
     assert str(path) in str(caught.value)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
-    with pytest.raises(StudyError, match=r"cannot read the study file .*No such file"):
-        Study.from_file(tmp_path / "none.toml")
