@@ -57,14 +57,7 @@ def difference(one: Judged, other: Judged) -> Interval:
 
 
 def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], float]) -> Interval:
-    """Return a statistic of seeds with the 95 % t-interval of its jackknife pseudo-values.
-
-    For differences of two ratios over the same seeds, which have no Fieller interval (Tukey 1958).
-
-    Args:
-        n_seeds: number of seeds, two or more.
-        statistic: its value from the seeds of these indices, shape (k,).
-    """
+    """Return a statistic of seeds with the 95 % t-interval of its jackknife (Tukey 1958)."""
     seeds = np.arange(n_seeds)
     value = statistic(seeds)
     left_out = np.array([statistic(np.delete(seeds, seed)) for seed in seeds])
@@ -93,48 +86,39 @@ def differences(found: StudyResults) -> str:
     for label, cell, less in performances(found):
         rows.setdefault(label, {})[cell.policy] = section.bracketed(less, 1)
     for first, *own in _of_all_policies(found):
-        less_of = {one.compared.policy: _difference(found, one, first) for one in own}
-        rows[asked(first)] = {
-            policy: f"{section.bracketed(less, 3)} {_side(less)}"
-            for policy, less in less_of.items()
-        }
+        rows[asked(first)] = {one.compared.policy: _less(found, one, first) for one in own}
     shown = _columns(rows, others, [f"`{policy}` less `{baseline}`" for policy in others])
     told = "An indicator is higher or lower if its interval is clear of 0."
     return f"{shown}\n\n[95 %], paired by seed, unadjusted. {told}"
 
 
-def _of_all_policies(found: StudyResults) -> Iterator[list[Verdict]]:
-    """Yield the verdicts on every question, one a policy, the first policy's first."""
+def _of_all_policies(found: StudyResults) -> list[list[Verdict]]:
+    """Return the verdicts on every question, one a policy, the first policy's first."""
     compared = [one for one in found.verdicts if one.after.kind != "policy"]
-    for own in grouped(compared, lambda v: (v.compared.table, v.compared.question)).values():
-        if len(own) > 1:
-            yield own
+    questions = grouped(compared, lambda v: (v.compared.table, v.compared.question))
+    return [own for own in questions.values() if len(own) > 1]
 
 
-def _difference(found: StudyResults, test: Verdict, first: Verdict) -> Interval | None:
-    """Return how much an indicator is above the first policy's; None: one is undefined."""
-    if test.estimate is None or first.estimate is None:
-        return None
+def _less(found: StudyResults, test: Verdict, first: Verdict) -> str:
+    """Return how much an indicator is above the first policy's, and on which side."""
     try:
-        return difference((found, test), (found, first))
+        less = difference((found, test), (found, first))
     except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
-        return None
+        return f"{section.NOTHING} open"
+    side = "higher" if (less.low or 0) > 0 else "lower" if (less.high or 0) < 0 else "open"
+    return f"{section.bracketed(less, 3)} {side}"
 
 
 def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | None]]:
     """Yield label, cell and difference of P from the first policy's; no condition with faults."""
     known: set[str] = set()
-    cells = [c for c in found.cells if c.arm.setting.kind != "policy" and c.n_seeds]
+    cells = [c for c in found.cells if c.arm.setting.kind != "policy" and not c.arm.case.faults]
     by_condition = grouped(cells, lambda cell: (cell.table, cell.arm.setting))
     for (_, setting), own in sorted(by_condition.items(), key=lambda one: one[0][1].kind != "size"):
-        first = own[0]
         for cell in own:
-            key = cell.arm.case.key
-            if key not in known and not (setting.kind == "fault" and setting.value):
-                known.add(key)
-                is_first = cell is first or first.policy != found.policies[0]
-                comparable = not (is_first or cell.problem or first.problem)
-                less = t_interval(cell.by_seed - first.by_seed) if comparable else None
+            if cell.arm.case.key not in known:
+                known.add(cell.arm.case.key)
+                less = None if cell is own[0] else t_interval(cell.by_seed - own[0].by_seed)
                 yield f"P, {setting}", cell, less
 
 
@@ -143,12 +127,6 @@ def _columns(
 ) -> str:
     body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
     return table(("", *(heads or [f"`{policy}`" for policy in policies])), body)
-
-
-def _side(difference: Interval | None) -> str:
-    if difference is None or difference.low is None or difference.high is None:
-        return "open"
-    return "higher" if difference.low > 0 else "lower" if difference.high < 0 else "open"
 
 
 # -- larger swarms ------------------------------------------------------------------------------

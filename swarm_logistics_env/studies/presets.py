@@ -7,11 +7,10 @@ Fault Tolerance, Scalability and Adaptability; Tables I to III and the text arou
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -74,17 +73,16 @@ def _read_reference(path: Path) -> Reference:
     }
     repeated = {Setting(*one) for one in told["repeated"]}
     cells = tuple(setting for setting in performance if setting not in repeated)
-    sentences = {one["text"]: dict(_claims(one["claims"])) for one in told["sentences"]}
+    sentences: dict[str, dict[Question, bool]] = {}
+    for sentence in told["sentences"]:
+        claims = sentences.setdefault(sentence["text"], {})
+        for one in sentence["claims"]:
+            symbol, name, threshold = one["indicator"], one["name"], one.get("threshold", 0.0)
+            kind = DEFINITIONS[symbol].compares
+            for before, after in one["steps"]:
+                settings = _setting(kind, name, before), _setting(kind, name, after)
+                claims[Question(symbol, *settings, threshold)] = one["above"]
     return Reference(told["source"], performance, cells, sentences, told["whose"])
-
-
-def _claims(told: Iterable[dict[str, Any]]) -> Iterator[tuple[Question, bool]]:
-    for one in told:
-        symbol, name, threshold = one["indicator"], one["name"], one.get("threshold", 0.0)
-        kind = DEFINITIONS[symbol].compares
-        for before, after in one["steps"]:
-            settings = _setting(kind, name, before), _setting(kind, name, after)
-            yield Question(symbol, *settings, threshold), one["above"]
 
 
 PAPER = _read_reference(Path(__file__).parent / "paper_values.toml")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -297,10 +297,13 @@ def judge_one(
         digests = (cells[arm].digests for arm in (comparison.original, comparison.changed))
         identical = comparison.removed is None and same_runs(*digests)
         samples = {arm: cells[arm].by_seed for arm in comparison.arms}
-        shared: dict[str, Any] = {"paired": paired, "identical": identical}
         try:
             estimate = comparison.estimate(
-                samples, saturated=saturated, confidence=confidence, **shared
+                samples,
+                paired=paired,
+                saturated=saturated,
+                identical=identical,
+                confidence=confidence,
             )
             if comparison.definition.unchanged(margin) is not None:  # S has no such question
                 named = dict(zip(("p_o", "p_new", "p_s"), comparison.arguments.values()))
@@ -308,8 +311,9 @@ def judge_one(
                     *(samples[arm] for arm in named.values()),
                     margin=margin,
                     alpha=alpha,
+                    paired=paired,
                     saturated=[name for name, arm in named.items() if arm in saturated],
-                    **shared,
+                    identical=identical,
                 )
         except spi.IndicatorError as error:
             nothing = not samples[comparison.original].any()
