@@ -18,7 +18,7 @@ from swarm_logistics_env.report.tables import sentences
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.measures import Agreement, agreement
-from swarm_logistics_env.studies.presets import PAPER, PAPER_SIZES
+from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
@@ -44,7 +44,8 @@ def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
     rest: dict[str, object] = {"seeds": SEEDS, "faults": ()}
     faults = {"seeds": SEEDS_WHERE_SKEWED, "sizes": (), "parameters": (), "ablations": ()}
     send = [{"title": "Table II, another reading of FM3", "modes": ["FM3_send"]}]
-    large = [{"values": list(PAPER_SIZES), "scenario": {"preset": "paper_scalability", **NO_DRIFT}}]
+    sizes = [int(setting.value) for setting in PAPER.performance if setting.kind == "size"]
+    large = [{"values": sizes, "scenario": {"preset": "paper_scalability", **NO_DRIFT}}]
     parts = {
         "paper": rest,
         "paper-faults": faults,
@@ -64,7 +65,7 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
     found = _agreement(with_drift)
     send = _agreement(with_drift, reading="FM3_send")
     exact = _agreement(_published_cells(parts[3:]))
-    missed = {cell.arm.setting for cell in found.misses or ()}
+    missed = {cell.arm.setting for cell in found.misses}
     rows = [
         _row(label, [with_drift[level] for level in levels], missed)
         for label, levels in _paper_rows(with_drift)
@@ -119,7 +120,7 @@ def _agreement(cells: Mapping[Setting, Cell], reading: str = "FM3") -> Agreement
 
 def _near(found: Agreement) -> str:
     """Return how near the published values are to ours, in words."""
-    inside = f"{len(found.met or ())} of {len(found.cells)}"
+    inside = f"{len(found.met)} of {len(found.cells)}"
     return f"{found.mean_log_error or 0.0:.3f}, {inside}"
 
 

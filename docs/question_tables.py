@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,8 @@ from tables import table
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.estimate import SIGNS, Estimate
-from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.comparison import Arm
-from swarm_logistics_env.studies.measures import (
-    cells_against_baseline,
-    indicators_against_baseline,
-    jackknife_interval,
-)
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
@@ -54,11 +49,20 @@ def difference(one: Judged, other: Judged) -> Interval:
 
     def value(judged: Judged, some: NDArray[np.intp]) -> float:
         results, compared = judged[0], judged[1].compared
-        place = compared.policy, compared.table
-        p = {arm: results.by_place[*place, arm].by_seed[some] for arm in compared.arms}
+        p = {arm: cell.by_seed[some] for arm, cell in results.cells_of(compared).items()}
         return compared.estimate(p).value
 
     return jackknife_interval(len(seeds), lambda some: value(one, some) - value(other, some))
+
+
+def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], float]) -> Interval:
+    """Return a statistic of seeds with the 95 % t-interval of its jackknife (Tukey 1958)."""
+    seeds = np.arange(n_seeds)
+    value = statistic(seeds)
+    left_out = np.array([statistic(np.delete(seeds, seed)) for seed in seeds])
+    pseudo, low, high = t_interval(n_seeds * value - (n_seeds - 1) * left_out)
+    limits = (None if limit is None else limit - pseudo + value for limit in (low, high))
+    return Interval(value, *limits)
 
 
 # -- policies side by side ----------------------------------------------------------------------
@@ -69,8 +73,8 @@ def side_by_side(found: StudyResults) -> str:
     rows: dict[str, dict[str, str]] = {}
     for label, cell, _ in performances(found):
         rows.setdefault(label, {})[cell.policy] = section.mean_p(cell)
-    for one in indicators_against_baseline(found):
-        rows[asked(one.test)] = {policy: with_sign(own) for policy, own in one.tests.items()}
+    for own in _of_all_policies(found):
+        rows[asked(own[0])] = {test.compared.policy: with_sign(test) for test in own}
     return f"{_columns(rows, found.policies)}\n\n{over(found)}. [95 %]; {LEGEND}."
 
 
@@ -80,25 +84,41 @@ def differences(found: StudyResults) -> str:
     rows: dict[str, dict[str, str]] = {}
     for label, cell, less in performances(found):
         rows.setdefault(label, {})[cell.policy] = section.bracketed(less, 1)
-    for one in indicators_against_baseline(found):
-        rows[asked(one.test)] = {
-            policy: f"{section.bracketed(less, 3)} {_side(less)}"
-            for policy, less in one.differences.items()
-        }
+    for first, *own in _of_all_policies(found):
+        rows[asked(first)] = {one.compared.policy: _less(found, one, first) for one in own}
     shown = _columns(rows, others, [f"`{policy}` less `{baseline}`" for policy in others])
     told = "An indicator is higher or lower if its interval is clear of 0."
     return f"{shown}\n\n[95 %], paired by seed, unadjusted. {told}"
 
 
+def _of_all_policies(found: StudyResults) -> list[list[Verdict]]:
+    """Return the verdicts on every question, one a policy, the first policy's first."""
+    compared = [one for one in found.verdicts if one.after.kind != "policy"]
+    questions = grouped(compared, lambda v: (v.compared.table, v.compared.question))
+    return [own for own in questions.values() if len(own) > 1]
+
+
+def _less(found: StudyResults, test: Verdict, first: Verdict) -> str:
+    """Return how much an indicator is above the first policy's, and on which side."""
+    try:
+        less = difference((found, test), (found, first))
+    except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
+        return f"{section.NOTHING} open"
+    side = "higher" if (less.low or 0) > 0 else "lower" if (less.high or 0) < 0 else "open"
+    return f"{section.bracketed(less, 3)} {side}"
+
+
 def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | None]]:
-    """Yield label, cell and difference of P, each condition once and those with faults not."""
+    """Yield label, cell and difference of P from the first policy's; no condition with faults."""
     known: set[str] = set()
-    cells = [one for own in cells_against_baseline(found).values() for one in own]
-    for one in sorted(cells, key=lambda one: one.cell.arm.setting.kind != "size"):
-        setting, key = one.cell.arm.setting, one.cell.arm.case.key
-        if key not in known and not (setting.kind == "fault" and setting.value):
-            known.add(key)
-            yield f"P, {setting}", one.cell, one.difference
+    cells = [c for c in found.cells if c.arm.setting.kind != "policy" and not c.arm.case.faults]
+    by_condition = grouped(cells, lambda cell: (cell.table, cell.arm.setting))
+    for (_, setting), own in sorted(by_condition.items(), key=lambda one: one[0][1].kind != "size"):
+        for cell in own:
+            if cell.arm.case.key not in known:
+                known.add(cell.arm.case.key)
+                less = None if cell is own[0] else t_interval(cell.by_seed - own[0].by_seed)
+                yield f"P, {setting}", cell, less
 
 
 def _columns(
@@ -106,12 +126,6 @@ def _columns(
 ) -> str:
     body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
     return table(("", *(heads or [f"`{policy}`" for policy in policies])), body)
-
-
-def _side(difference: Interval | None) -> str:
-    if difference is None or difference.low is None or difference.high is None:
-        return "open"
-    return "higher" if difference.low > 0 else "lower" if difference.high < 0 else "open"
 
 
 # -- larger swarms ------------------------------------------------------------------------------

@@ -8,8 +8,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
@@ -68,6 +70,13 @@ def test_every_interval_in_the_text_stands_in_a_table() -> None:
     values = re.findall(r"-?[\d.]*\d \[[^]]+\]", " ".join(prose.split()))
     assert len(values) > 30
     assert [value for value in values if f"| {value} " not in TEXT] == []
+
+
+def test_jackknife_of_a_mean_is_its_t_interval(script: Any) -> None:
+    sample = np.array([3.0, 5.0, 4.0, 9.0])
+    jackknife = importlib.import_module("question_tables").jackknife_interval
+    found = jackknife(4, lambda seeds: float(sample[seeds].mean()))
+    assert found == pytest.approx(spi.mean_interval(sample))
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

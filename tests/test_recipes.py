@@ -138,7 +138,7 @@ study = Study(
 study.run(engine="local")
 study.report(Path())
 report = Path("report.md").read_text()
-assert "swarm-dt, alive? Failure mode FM4, m = 1 of N = 4." in report
+assert "swarm-dt, alive? FM4, m = 1, N = 4." in report
 assert "performance kept K; above " in report
 
 walking = Study(task="lane", policies=["walker"], seeds=2, sizes=[{"values": [2, 4]}])

@@ -77,17 +77,20 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         tasks = "clearing", "warehouse", "warehouse"
         return tuple(Study(out=out / f"l{i}", task=task, **fields) for i, task in enumerate(tasks))
 
-    monkeypatch.setattr(tables, "PAGE", page)
     monkeypatch.setattr(tables.front_page, "main", lambda: None)
-    monkeypatch.setattr(tables, "record_scores", lambda out: None)
-    monkeypatch.setattr(tables, "OUT", tmp_path / "out")
-    monkeypatch.setattr(tables, "BENCHMARK", tmp_path / "benchmark.json")
-    monkeypatch.setattr(tables, "PROCESSES", 1)
-    monkeypatch.setattr(tables, "paper_studies", paper_studies)
-    monkeypatch.setattr(tables, "policy_studies", policy_studies)
-    monkeypatch.setattr(tables, "clearing_study", clearing_study)
-    monkeypatch.setattr(tables, "ladder_studies", ladder_studies)
-    monkeypatch.setattr(tables, "MEDIA", tmp_path)
+    for name, value in {
+        "PAGE": page,
+        "record_scores": lambda out: None,
+        "OUT": tmp_path / "out",
+        "BENCHMARK": tmp_path / "benchmark.json",
+        "PROCESSES": 1,
+        "paper_studies": paper_studies,
+        "policy_studies": policy_studies,
+        "clearing_study": clearing_study,
+        "ladder_studies": ladder_studies,
+        "MEDIA": tmp_path,
+    }.items():
+        monkeypatch.setattr(tables, name, value)
     return page
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.measures import cells_against_baseline
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 
@@ -204,26 +204,31 @@ def _asked(results: StudyResults) -> str:
 
 
 def _performance(results: StudyResults) -> str:
-    cells = [one for here in cells_against_baseline(results).values() for one in here]
+    shown = [one for one in results.cells if one.arm.setting.kind != "policy" and one.n_seeds]
     # Where the swarm is as it should be, or else in the first condition.
-    base = [c for c in cells if c.cell.arm.setting.kind == "fault" and not c.cell.arm.setting.value]
-    base = base or cells
-    here = {
-        c.cell.policy: c for c in reversed(base) if c.cell.arm.setting == base[0].cell.arm.setting
-    }
+    whole = [c for c in shown if c.arm.setting.kind == "fault" and not c.arm.setting.value]
+    base = whole or shown
+    here = {c.policy: c for c in reversed(base) if c.arm.setting == base[0].arm.setting}
     if not here:
         return "P: no run has succeeded."
-    cell = base[0].cell
+    cell = base[0]
     where = f"N = {cell.arm.case.scenario.n_robots}"
     where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
     several = len(results.policies) > 1
+    baseline = here.get(results.policies[0])
     told = (
-        (f"{one.cell.policy} " if several else "")
-        + _mean(one.cell)
-        + ("" if one.ratio is None else f" ({one.ratio.value:.2f} times)")
-        for one in map(here.__getitem__, reversed(here))
+        (f"{one.policy} " if several else "")
+        + _mean(one)
+        + (_multiple(one, baseline) if baseline and results.plan.paired else "")
+        for one in reversed(here.values())
     )
     return f"P at {where}: {', '.join(told)}."
+
+
+def _multiple(cell: Cell, baseline: Cell) -> str:
+    if cell is baseline or cell.problem or baseline.problem or not baseline.by_seed.any():
+        return ""
+    return f" ({cell.mean.value / baseline.mean.value:.2f} times)"
 
 
 def _mean(cell: Cell) -> str:
@@ -248,7 +253,7 @@ def _last(results: StudyResults) -> str:
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
     if results.exploratory:
-        parts.append("exploratory: other seeds than were declared")
+        parts.append("exploratory: other seeds than were declared, whose report this replaces")
     if any(test.saturated for test in tests):
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
@@ -294,12 +299,8 @@ def digest(found: Answer, width: int, most: int | None = MOST_LINES) -> str:
 
 def _rows(found: Answer, width: int) -> Iterator[str]:
     """Yield the lines in columns; the verdict is folded where the terminal is narrow."""
-    columns: tuple[Callable[[Line], str], ...] = (
-        lambda line: line.question,
-        lambda line: line.value,
-        lambda line: line.interval,
-    )
-    widths = [max(len(of(line)) for line in found.lines) for of in columns]
+    columns = zip(*((line.question, line.value, line.interval) for line in found.lines))
+    widths = [max(map(len, column)) for column in columns]
     widths[0] = min(widths[0], max(8, width - sum(widths[1:]) - 16))
     for policy, lines in grouped(found.lines, lambda line: line.policy).items():
         if len({line.policy for line in found.lines}) > 1:
@@ -309,13 +310,8 @@ def _rows(found: Answer, width: int) -> Iterator[str]:
             left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {line.interval:{widths[2]}}"
             verdict = textwrap.wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
             yield f"{left}  {verdict[0]}".rstrip()
-            for first, second in _filled(more, verdict[1:]):
+            for first, second in zip_longest(more, verdict[1:], fillvalue=""):
                 yield f"{first:{len(left)}}  {second}".rstrip()
-
-
-def _filled(first: Sequence[str], second: Sequence[str]) -> Iterator[tuple[str, str]]:
-    for place in range(max(len(first), len(second))):
-        yield "".join(first[place : place + 1]), "".join(second[place : place + 1])
 
 
 def _fold(text: str, width: int) -> list[str]:

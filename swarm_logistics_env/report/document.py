@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.studies.plan import Plan
 from swarm_logistics_env.studies.results import StudyResults
@@ -14,8 +14,8 @@ from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
-from .section import Figure, Section, sentence
-from .tables import fault_sections, policy_sections, tables, warnings
+from .section import Figure, Section, listed, seeds_text, sentence
+from .tables import fault_sections, tables, warnings
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,19 @@ class Document:
         title, text: its heading and the sentences below it.
         answer: what the study found.
         chapters: its parts, in order.
-        summary: the tables, warnings and measures of faults alone, for a terminal.
     """
 
     title: str
     text: tuple[str, ...]
     answer: Answer
     chapters: tuple[Chapter, ...]
-    summary: tuple[Section, ...]
+
+    @property
+    def summary(self) -> tuple[Section, ...]:
+        """Warnings, tables and measures of faults alone, for a terminal."""
+        shown = ("Warnings", "Results", "Beyond the paper")
+        sections = [one for each in self.chapters if each.title in shown for one in each.sections]
+        return tuple(replace(one, figures=()) for one in sections if one.columns or one.lines)
 
     def figures(self) -> Iterator[Figure]:
         """Yield every figure, in the order of the report."""
@@ -54,12 +59,9 @@ class Document:
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
-    what = "seed" if plan.paired else "trial"
-    seeds = f"1 {what}" if len(plan.seeds) == 1 else f"{len(plan.seeds)} {what}s"
-    seeds = seeds if plan.paired else f"at most {seeds}"
     about = (
-        f"{plan.specification.name}: {len(plan.cases)} conditions, {seeds} of each; every verdict "
-        "holds for the conditions of the set-up sheet below and for no others."
+        f"{plan.specification.name}: {len(plan.cases)} conditions, {seeds_text(results)}; every "
+        "verdict holds for the conditions of the set-up sheet below and for no others."
     )
     text = [about]
     if results.reference:
@@ -67,14 +69,9 @@ def document(results: StudyResults) -> Document:
     found = answer(results)
     result_tables, lines = tuple(tables(results)), tuple(warnings(results))
     faults = tuple(fault_sections(results))
-    summary = (
-        *result_tables,
-        *([Section("Warnings", lines=lines)] if lines else []),
-        *(replace(one, figures=()) for one in faults if one.columns or one.lines),
-    )
     figures = forest_figure(results, found), *indicator_figures(results)
     chapters = [
-        Chapter("Warnings", "", (Section("", lines=lines),) if lines else ()),
+        Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
         Chapter(
             "Figures",
             "The paper's indicators; raw P and the numbers stand in the tables below.",
@@ -93,26 +90,18 @@ def document(results: StudyResults) -> Document:
             result_tables,
         ),
         Chapter(
-            "Policies compared",
-            "Side by side, seed by seed; the first policy of the study is the one that the others "
-            "are measured against.",
-            tuple(policy_sections(results)),
-        ),
-        Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
             faults,
         ),
         Chapter("Set-up", "", setup_sheet(plan)),
         Chapter("Methods", "", (Section("", lines=(methods(plan),)),)),
-        Chapter("Glossary", "", (glossary(plan),)),
     ]
     whole = Document(
         f"Study {plan.specification.name!r}",
         tuple(text),
         found,
         tuple(chapter for chapter in chapters if chapter.sections),
-        summary,
     )
     # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
@@ -140,7 +129,7 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
         return _recorded_setup(plan)
     policies = {case.policy.title: case.identity for case in plan.cases}
     return (
-        Section("Study", lines=tuple(_study(plan))),
+        Section("Study", lines=(f"{_version()}, code version {plan.code}.",)),
         Section(
             "Policies",
             ("policy", "identity"),
@@ -153,15 +142,6 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
             tuple(plan.specification.scenario.conditions()),
             tuple(_variations(plan)),
         ),
-    )
-
-
-def _study(plan: Plan) -> Iterator[str]:
-    yield (
-        f"Study {plan.specification.name!r}: {len(plan.cases)} conditions x "
-        f"{len(plan.seeds)} seeds ({plan.seeds[0]} to {plan.seeds[-1]}), the same seeds for every "
-        f"condition. swarm-logistics-env {version('swarm-logistics-env')}, code version "
-        f"{plan.code}."
     )
 
 
@@ -211,7 +191,6 @@ def methods(plan: Plan) -> str:
     """Return a paragraph for a paper: what was measured, how it was estimated and tested."""
     asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
     names = [DEFINITIONS[symbol].heading for symbol in asked]
-    listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     n = len(plan.seeds)
     if plan.paired:
         what = "trials" if plan.imported_from else "simulated runs"
@@ -223,49 +202,15 @@ def methods(plan: Plan) -> str:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
         test = "Welch's t-test for independent samples"
     return (
-        f"We measured performance P in {trials}. We report {listed}, each a ratio of mean "
+        f"We measured performance P in {trials}. We report {listed(names)}, each a ratio of mean "
         f"performances, with the 95 % interval that inverts {test}. An indicator is called above "
         "its threshold (supported) or below it (refuted) where this test rejects at 2.5 % on that "
         "side, equivalent where it does not but two one-sided tests find that P changes by less "
         f"than {100 * plan.specification.margin:.3g} % of P_o, else inconclusive; p is adjusted by "
         "Holm's method over all comparisons of one indicator for one policy. Computed with "
-        "swarm-logistics-env "
-        f"{version('swarm-logistics-env')}."
+        f"{_version()}."
     )
 
 
-def glossary(plan: Plan) -> Section:
-    """Return what the words and letters of the report mean."""
-    asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
-    rows = [
-        ("P", f"performance: {plan.specification.played.performance}"),
-        ("P_o, P_new", "P in the original condition, and in the changed one"),
-        *((DEFINITIONS[symbol].heading, _meaning(DEFINITIONS[symbol])) for symbol in asked),
-        *_WORDS,
-    ]
-    return Section("", ("word", "meaning"), tuple(rows))
-
-
-def _meaning(definition: Definition) -> str:
-    """Return an indicator's formula, which its function's docstring begins with, and its words."""
-    first, *_ = (definition.function.__doc__ or definition.heading).strip().splitlines()
-    formula = first.partition(" (paper")[0].rstrip(".")
-    adjectives = (f"above {x:g} {adjective}" for x, adjective in definition.adjectives.items())
-    return "; ".join([formula, *adjectives])
-
-
-_WORDS = (
-    ("N, m", "number of robots of the swarm; number of those added, faulty or removed"),
-    ("seed", "number that decides the layout, the requests, which robots fail and the behaviour"),
-    ("paired", "all conditions are played over the same seeds, and compared seed by seed"),
-    ("twin", "the run of the same seed in the original condition"),
-    ("supported, refuted", "above, or below, the threshold beyond chance"),
-    ("equivalent", "the indicator is open, but P changes by less than the declared margin"),
-    ("open", "these seeds cannot tell; in CSV files inconclusive"),
-    ("same runs", "both conditions gave the same runs: exact, and no evidence"),
-    ("undefined", "nothing was delivered in the reference, or runs failed or are missing"),
-    ("Holm", "adjustment of a family of verdicts so that any error among them has 5 % at most"),
-    ("provisional", "the verdict assumes normal differences: below ten seeds, or unpaired"),
-    ("claim", "what the reference says of an indicator"),
-    ("†", "P is capped: every item was delivered in at least one run"),
-)
+def _version() -> str:
+    return f"swarm-logistics-env {version('swarm-logistics-env')}"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from swarm_logistics_env.studies.measures import RateCurve
+from swarm_logistics_env.studies.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,13 +104,18 @@ class Point:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes: series over shared categories, and thresholds."""
+    """One pair of axes: series over shared categories, and thresholds.
+
+    Attributes:
+        tests: the verdicts that the points show, in their order; empty: they show something else.
+    """
 
     title: str
     y_label: str
     points: tuple[Point, ...]
     thresholds: tuple[float, ...]
     x_label: str
+    tests: tuple[Verdict, ...] = ()
 
 
 def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:

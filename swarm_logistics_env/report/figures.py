@@ -51,18 +51,12 @@ def forest_figure(results: StudyResults, found: Answer) -> Figure:
 
 def indicator_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield S per step, FT and R per mode and m, A per value, and P without a part."""
-
-    def place(test: Verdict) -> tuple[str, Factor, float, int]:
-        after, by_fault = test.after, test.after.kind == "fault"
-        return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
-
-    for (table, _, onset, swarm), tests in grouped(_once(results), place).items():
-        start = f", faults from {onset:g} s" if onset else ""
-        where = f"{table}, N = {swarm}{start}" if swarm else table
+    for (table, _, onset, swarm), tests in _by_figure(results).items():
         names = table, f"{onset:g}s" if onset else ""
         crosses = "; crosses: published" if any(t.published is not None for t in tests) else ""
-        caption = f"{listed(list(dict.fromkeys(t.compared.policy for t in tests)))}, {where}: "
-        caption += f"{_caption(tests)} {seeds_text(results).capitalize()}. {_MARKS}{crosses}."
+        caption = f"{listed(list(dict.fromkeys(t.compared.policy for t in tests)))}, "
+        caption += f"{_where(table, onset, swarm)}: {_caption(tests)} "
+        caption += f"{seeds_text(results).capitalize()}. {_MARKS}{crosses}."
         panels = [_panel(results, tests, definition) for definition in _definitions(tests)]
         yield Figure(
             slug(*(definition.symbol for definition in _definitions(tests)), *names),
@@ -71,6 +65,30 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
             0.5 + 2.5 * len(panels),
             partial(drawing.intervals, panels=panels),
         )
+
+
+def indicator_panels(results: StudyResults) -> Iterator[tuple[str, Panel]]:
+    """Yield the panels of `indicator_figures`, each with what it is about."""
+    for (table, _, onset, swarm), tests in _by_figure(results).items():
+        for definition in _definitions(tests):
+            yield _where(table, onset, swarm), _panel(results, tests, definition)
+
+
+def _by_figure(
+    results: StudyResults,
+) -> dict[tuple[str, Factor, float, int], list[Verdict]]:
+    """Return each value once, by table, kind, onset, and swarm size where robots fail."""
+
+    def place(test: Verdict) -> tuple[str, Factor, float, int]:
+        after, by_fault = test.after, test.after.kind == "fault"
+        return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
+
+    return grouped(_once(results), place)
+
+
+def _where(table: str, onset: float, swarm: int) -> str:
+    start = f", faults from {onset:g} s" if onset else ""
+    return f"{table}, N = {swarm}{start}" if swarm else table
 
 
 def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definition) -> Panel:
@@ -91,11 +109,11 @@ def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definiti
     # 0 first: it is the threshold that always stands in the picture.
     thresholds = {0.0: None, **dict.fromkeys(definition.adjectives)}
     thresholds |= dict.fromkeys(test.compared.threshold for test in here)
-    x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else _X_LABELS[after.kind]
-    return Panel("", definition.heading, points, tuple(thresholds), x_label)
+    x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else X_LABELS[after.kind]
+    return Panel("", definition.heading, points, tuple(thresholds), x_label, tuple(here))
 
 
-_X_LABELS = {
+X_LABELS = {
     "size": "swarm size N → N + m",
     "fault": "failure mode and number m of faulty robots",
     "policy": "in its place",

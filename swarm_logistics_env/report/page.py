@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparison import Arm, Comparison
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
@@ -22,51 +21,20 @@ from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.fault_text import text_of
 
 from .answer import Answer
+from .figures import X_LABELS, indicator_panels
 from .section import sentence
 
 Json: TypeAlias = dict[str, JsonValue]
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
 
 
-@dataclass(frozen=True)
-class Bar:
-    """One value of the first screen's forest, in percent of its width.
-
-    Attributes:
-        number: of the verdict, which a click shows.
-        verdict: its conclusion, for the colour.
-        at, low, high: the value and its limits.
-    """
-
-    number: int
-    verdict: str
-    at: float
-    low: float
-    high: float
-
-
-def bars(found: Answer) -> tuple[float, tuple[tuple[Bar, ...], ...]]:
-    """Return where 0 stands on the shared axis, in percent, and the bars of every line."""
+def axis(found: Answer) -> tuple[float, float]:
+    """Return the ends of the axis that all intervals of the first screen share."""
     tests = [test for line in found.lines for test in line.tests]
     values = [0.0, *(test.value for test in tests if test.value is not None)]
-    span = max(max(values) - min(values), 0.5)
     # An interval that is much wider than the values lie apart leaves the axis.
-    first, last = min(values) - span, max(values) + span
-
-    def place(x: float | None, missing: float) -> float:
-        within = min(max(missing if x is None else x, first), last)
-        return round(100.0 * (within - first) / (last - first), 2)
-
-    def bar(number: int, test: Verdict) -> Iterator[Bar]:
-        if test.interval is not None:
-            value, low, high = test.interval
-            ends = place(low, value), place(high, value)
-            yield Bar(number, test.conclusion or "blocked", place(value, value), *ends)
-
-    return place(0.0, 0.0), tuple(
-        tuple(one for n, test in zip(line.numbers, line.tests) for one in bar(n, test))
-        for line in found.lines
-    )
+    span = max(max(values) - min(values), 0.5)
+    return min(values) - span, max(values) + span
 
 
 def page_data(results: StudyResults) -> dict[str, JsonValue]:
@@ -160,16 +128,18 @@ def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterato
     shown = [cell for cell in results.cells if cell.arm.setting.kind != "policy"]
     for table, here in grouped(shown, lambda cell: cell.table).items():
         categories = list(dict.fromkeys(row.words for row in here))
+        setting = here[0].arm.setting
         yield {
             "name": f"P: {table}",
-            "y": f"performance P over {_over(here[0].arm)}",
+            "y": f"performance P over {X_LABELS.get(setting.kind, setting.name)}",
             "thresholds": [],
-            "categories": [_short(one) for one in categories],
+            # "N = 10" stands there as "10", "FM1, m = 2" as "FM1 2".
+            "categories": [re.sub(r"^\w+ = |, m =", "", one) for one in categories],
             "points": [
                 {
                     "policy": row.policy,
                     "at": categories.index(row.words),
-                    **_limits(row.mean),
+                    **_limits(*row.mean),
                     "published": _number(row.published),
                     "condition": places[row.arm.case.key],
                 }
@@ -179,54 +149,27 @@ def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterato
         }
 
 
-def _short(told: str) -> str:
-    """Return a condition for an axis: "10" of "N = 10", "FM1 2" of "FM1, m = 2"."""
-    told = told.replace(" -> ", "→")
-    if "→" in told:
-        return told.rpartition(" ")[2]
-    name, equals, value = told.rpartition(" = ")
-    if not equals:
-        return told
-    return value if not name.endswith(", m") else f"{name.removesuffix(', m')} {value}"
-
-
-def _over(arm: Arm) -> str:
-    """Return the label of the axis of a figure on which the conditions stand."""
-    factors = {
-        "size": "swarm size N",
-        "fault": "failure mode and number m of faulty robots",
-        "policy": "the policy in its place",
-    }
-    return factors.get(arm.setting.kind) or arm.setting.name
-
-
 def _indicator_views(results: StudyResults) -> Iterator[Json]:
-    """Yield every indicator of every policy, each with its value at every single seed."""
+    """Yield every pair of axes of the figures, each value with that of every single seed."""
     numbers = {test.compared: number for number, test in enumerate(results.verdicts)}
-    views = grouped(results.verdicts, lambda t: (t.compared.table, t.compared.indicator))
-    for (table, indicator), here in views.items():
-        # A question that is asked against two thresholds has one value.
-        once = {(t.compared.policy, t.compared.label): t for t in reversed(here)}
-        of_factor = grouped(reversed(once.values()), lambda t: t.compared.changed.setting.name)
-        rows = [test for part in of_factor.values() for test in part]
-        categories = list(dict.fromkeys(row.compared.label for row in rows))
-        heading = rows[0].compared.definition.heading
+    for where, panel in indicator_panels(results):
+        categories = list(dict.fromkeys(point.category for point in panel.points))
         yield {
-            "name": f"{indicator}: {table}",
-            "y": f"{heading} over {_over(rows[0].compared.changed)}",
-            "thresholds": [*sorted({float(test.compared.threshold) for test in here})],
-            "categories": [_short(one) for one in categories],
+            "name": f"{panel.tests[0].compared.indicator}: {where}",
+            "y": f"{panel.y_label} over {panel.x_label}",
+            "thresholds": [float(threshold) for threshold in panel.thresholds],
+            "categories": [*categories],
             "points": [
                 {
-                    "policy": row.compared.policy,
-                    "at": categories.index(row.compared.label),
-                    **_limits(row.interval),
-                    "published": _number(row.published),
-                    "question": numbers[row.compared],
-                    "seeds": _seed_by_seed(results, row.compared),
+                    "policy": point.series,
+                    "at": categories.index(point.category),
+                    **_limits(point.value, point.low, point.high),
+                    "published": _number(point.published),
+                    "question": numbers[test.compared],
+                    "seeds": _seed_by_seed(results, test.compared),
                 }
-                for row in rows
-                if row.interval is not None
+                for point, test in zip(panel.points, panel.tests)
+                if point.value is not None
             ],
         }
 
@@ -235,8 +178,7 @@ def _seed_by_seed(results: StudyResults, compared: Comparison) -> list[JsonValue
     """Return an indicator's value from each seed alone; None where it is undefined."""
     if not results.plan.paired:
         return []
-    where = compared.policy, compared.table
-    samples = {arm: results.by_place[*where, arm].by_seed for arm in compared.arms}
+    samples = {arm: cell.by_seed for arm, cell in results.cells_of(compared).items()}
     values: list[JsonValue] = []
     for place in range(len(results.plan.seeds)):
         try:
@@ -248,8 +190,8 @@ def _seed_by_seed(results: StudyResults, compared: Comparison) -> list[JsonValue
     return values
 
 
-def _limits(found: Interval) -> Json:
-    return dict(zip(("value", "low", "high"), map(_number, found)))
+def _limits(*limits: float | None) -> Json:
+    return dict(zip(("value", "low", "high"), map(_number, limits)))
 
 
 def _number(value: float | None) -> float | None:

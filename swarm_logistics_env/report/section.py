@@ -225,7 +225,11 @@ def seeds_text(results: StudyResults) -> str:
 
 def sentence(results: StudyResults, test: Verdict) -> Sentence:
     """Return the verdict on one comparison in words."""
-    head = f"{test.compared.policy}, {test.asked}? {_conditions(test)}."
+    compared = test.compared
+    swarm = (
+        "" if compared.original.setting.kind in ("size", "policy") else f", N = {compared.n_robots}"
+    )
+    head = f"{compared.policy}, {test.asked}? {compared.label}{swarm}."
     return Sentence(head, " ".join(_parts(results, test)), test.conclusion or "blocked")
 
 
@@ -268,20 +272,6 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         yield f"{where} {estimate.n_seeds} of at most {results.looks[-1]} seeds."
     if results.exploratory:
         yield "Exploratory."
-
-
-def _conditions(test: Verdict) -> str:
-    compared = test.compared
-    before, after = compared.original.setting, compared.changed.setting
-    if after.kind == "size":
-        more = after.value - before.value
-        return f"N = {before.value:g} → {after.value:g} (m = {more:g} more)"
-    if after.kind == "fault":
-        start = f" from {after.onset:g} s" if after.onset else ""
-        return f"Failure mode {after.name}{start}, m = {after.value:g} of N = {compared.n_robots}"
-    if after.kind == "policy":
-        return f"{compared.policy} → {after.name}, N = {compared.n_robots}"
-    return f"{after.name} {before.value:g} → {after.value:g}, N = {compared.n_robots}"
 
 
 def _p(p: float | None) -> str:

@@ -1,21 +1,16 @@
-"""Tables: results, agreement with published values, policies side by side, faults; warnings."""
+"""Tables: results, agreement with published values, faults; warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.measures import (
     Agreement,
-    CellAgainstBaseline,
-    IndicatorAgainstBaseline,
     RepairCurve,
     Resilience,
     agreements,
-    cells_against_baseline,
-    indicators_against_baseline,
     resiliences,
 )
 from swarm_logistics_env.studies.presets import Reference, load_reference
@@ -36,7 +31,11 @@ def tables(results: StudyResults) -> Iterator[Section]:
     """
     for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
         rows = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
-        tests = [test for test in results.verdicts if test.where == (policy, table)]
+        tests = [
+            test
+            for test in results.verdicts
+            if (test.compared.policy, test.compared.table) == (policy, table)
+        ]
         published = any(cell.published is not None for cell in rows)
         setting: CellColumn = ("", lambda cell: cell.words)
         columns = [setting]
@@ -139,14 +138,13 @@ def _times_to_clear(results: StudyResults) -> Iterator[Section]:
 def _agreement(found: Agreement) -> Section:
     total = len(found.cells)
     lines = ["Cells inside the 95 % prediction interval: one seed gives no interval."]
-    if found.misses is not None and found.met is not None:
+    if all(cell.n_seeds > 1 for cell in found.cells):
         lines = [
             (
                 f"Cells whose published P lies inside the 95 % prediction interval of one of our "
                 f"runs: {total - len(found.misses)} of {total}; inside that of our mean: "
                 f"{len(found.met)} of {total}."
             ),
-            f"Mean width of those intervals: {found.mean_interval_width:.1f} items.",
             f"Misses: {'; '.join(cell.words for cell in found.misses) or 'none'}.",
         ]
     if found.mean_log_error is not None:
@@ -187,59 +185,6 @@ def warnings(results: StudyResults) -> Iterator[str]:
             compared = test.compared
             what = f"{compared.policy}, {compared.indicator}, {compared.label}"
             yield f"{what} is undefined: {test.problem}."
-
-
-_HOW_TO_READ = (
-    "Indicators: the verdict is the unadjusted one, Holm's in brackets where it differs; "
-    "differences are paired by seed, their intervals jackknifed. Differences of P are paired by "
-    "seed (t-interval), and so are ratios of mean P (Fieller)."
-)
-
-
-def policy_sections(results: StudyResults) -> Iterator[Section]:
-    """Yield policy x indicator: values with differences, then P cell by cell."""
-    if len(results.policies) < 2:
-        return
-    yield Section("", lines=(_HOW_TO_READ, f"All over {section.seeds_text(results)}."))
-    questions = list(indicators_against_baseline(results))
-    by_table = grouped(questions, lambda one: one.test.compared.table)
-    for table, here in by_table.items():
-        yield _side_by_side(table, here, results.policies)
-    for table, cells in cells_against_baseline(results).items():
-        yield _cells_beside(table, cells, results.policies[0])
-
-
-def _side_by_side(
-    table: str, questions: Sequence[IndicatorAgainstBaseline], policies: Sequence[str]
-) -> Section:
-    def answer(one: IndicatorAgainstBaseline, policy: str) -> str:
-        test = one.tests.get(policy)
-        return f"{section.ratio(test)} {section.answered(test)}" if test else section.NOTHING
-
-    def difference(one: IndicatorAgainstBaseline, policy: str) -> str:
-        return section.bracketed(one.differences.get(policy), 3)
-
-    baseline, *others = policies
-    columns: list[tuple[str, Callable[[IndicatorAgainstBaseline], str]]] = [
-        ("question", lambda one: f"{one.test.asked}, {one.test.compared.label}"),
-        *((f"{policy} [95 %]", partial(answer, policy=policy)) for policy in policies),
-        *((f"{one} - {baseline} [95 %]", partial(difference, policy=one)) for one in others),
-    ]
-    return Section.table(f"Indicators side by side: {table}", questions, columns)
-
-
-def _cells_beside(table: str, cells: Sequence[CellAgainstBaseline], baseline: str) -> Section:
-    return Section.table(
-        f"P side by side: {table}",
-        cells,
-        [
-            ("condition", lambda one: str(one.cell.arm.setting)),
-            ("policy", lambda one: one.cell.policy),
-            ("mean P [95 %]", lambda one: section.mean_p(one.cell)),
-            (f"P - {baseline}'s [95 %]", lambda one: section.bracketed(one.difference, 1)),
-            (f"P / {baseline}'s [95 %]", lambda one: section.bracketed(one.ratio, 2)),
-        ],
-    )
 
 
 _SINGLE_TEXT = (

@@ -21,7 +21,7 @@ from swarm_logistics_env.studies.runs import write_csv
 
 from .document import Document, document
 from .drawing import INK, PAPER, images
-from .page import bars, page_data
+from .page import axis, page_data
 from .section import WORDS, Section
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
     return template("page.html.jinja").render(
         document=document,
         answer=document.answer,
-        bars=bars(document.answer),
+        axis=axis(document.answer),
         signs=SIGNS,
         words=WORDS,
         drawings=drawings,
@@ -190,18 +190,13 @@ def template(name: str) -> Template:
         keep_trailing_newline=True,
     )
     environment.filters["unbroken"] = _unbroken
-    environment.filters["arrows"] = _arrows
     return environment.get_template(name)
 
 
 def _unbroken(text: str) -> str:
     """Return text whose numbers keep their units, and equations their two sides, on one line."""
     held = r"(?<=\d) (?=%|s\b)| (?=[=<→] )|(?<=[=<→]) "
-    return re.sub(held, "\N{NO-BREAK SPACE}", _arrows(text))
-
-
-def _arrows(text: str) -> str:
-    return text.replace("->", "→")
+    return re.sub(held, "\N{NO-BREAK SPACE}", text.replace("->", "→"))
 
 
 _ESCAPES = {

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
-from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.tasks.task import Case
 
@@ -161,37 +160,4 @@ class Comparison:
             saturated=[name for name, arm in named.items() if arm in saturated],
             # The removed robots make the third condition another one by construction.
             **({} if self.removed else {"identical": identical}),
-        )
-
-    def equivalence(
-        self,
-        performance: Mapping[Arm, NDArray[np.float64]],
-        *,
-        margin: float,
-        paired: bool = True,
-        saturated: Collection[Arm] = (),
-        identical: bool = False,
-        alpha: float = ALPHA,
-    ) -> Equivalence | None:
-        """Return whether P is unchanged within a margin; None for S, which has no such question.
-
-        Args:
-            performance, paired, saturated, identical: as in `estimate`.
-            margin, alpha: as in `spi.equivalence`.
-
-        Raises:
-            IndicatorError: the change is undefined, e.g. because mean P_o is 0.
-        """
-        if self.definition.unchanged(margin) is None:
-            return None
-        named = {"p_o": self.original, "p_new": self.changed, "p_s": self.removed}
-        return equivalence(
-            performance[self.original],
-            performance[self.changed],
-            performance[self.removed] if self.removed else None,
-            margin=margin,
-            alpha=alpha,
-            paired=paired,
-            saturated=[name for name, arm in named.items() if arm in saturated],
-            identical=identical and not self.removed,
         )

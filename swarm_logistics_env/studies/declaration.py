@@ -61,7 +61,7 @@ class StoredSpecification(BaseModel):
         How far it is played, and how it is judged, may change: `Declaration` guards these.
         """
         declared = self.read(place, task=asked.played)
-        free = ("name", "seeds", "first_seed", "looks", "until_clear", "margin", "reference")
+        free = ("seeds", "first_seed", "looks", "until_clear", "margin", "reference")
         mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
         theirs["task"] = self.task
         return [name for name in mine if name not in free and mine[name] != theirs[name]]
@@ -246,14 +246,9 @@ def merge(directories: Sequence[Path], out: Path) -> int:
 
 
 def _differing(one: StoredStudy, other: StoredStudy) -> list[str]:
-    """Return in words what two studies do not have in common."""
+    """Return what two studies do not have in common."""
     mine, theirs = (
-        {
-            **found.specification.model_dump(),
-            "code version": found.code,
-            "the code of their policies": found.identities,
-            "what they declared": found.declared,
-        }
-        for found in (one, other)
+        each.specification.model_dump() | each.model_dump(exclude={"specification"})
+        for each in (one, other)
     )
-    return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]
+    return [name for name in mine | theirs if mine.get(name) != theirs.get(name)]

@@ -20,7 +20,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import Self
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
@@ -37,44 +37,22 @@ _Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
-class Match(NamedTuple):
-    """One condition that both studies hold.
-
-    Attributes:
-        name: policy, "change" and condition.
-        before, after: the rows of P in the old and of the new study.
-    """
-
-    name: str
-    before: Cell
-    after: Cell
-
-
-class Unmatched(NamedTuple):
-    """A judged policy of one study that the other gives nothing to compare with.
-
-    Attributes:
-        policy: its label.
-        names: of its conditions, as `Match.name`.
-        problem: one sentence that names the policy and says what is missing.
-    """
-
-    policy: str
-    names: tuple[str, ...]
-    problem: str
-
-
 @dataclass(frozen=True)
 class Matching:
-    """The conditions that two studies share, and those that only one of them has.
+    """The conditions that two studies share, and the judged policies and conditions of one alone.
+
+    A condition is named by policy, "change" and the condition in words.
 
     Attributes:
+        matches: name, cell of the old study, and of the new one.
+        unmatched: of each policy that the other study gives nothing to compare with: its label, a
+            sentence that says what is missing, and the names of its conditions.
         seeds: the shared ones; None: one of the studies has no seeds to share.
         notes: sentences on conditions and seeds that only one of the studies has.
     """
 
-    matches: tuple[Match, ...]
-    unmatched: tuple[Unmatched, ...]
+    matches: tuple[tuple[str, Cell, Cell], ...]
+    unmatched: tuple[tuple[str, str, tuple[str, ...]], ...]
     seeds: tuple[int, ...] | None
     notes: tuple[str, ...]
 
@@ -89,7 +67,8 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     partners = {label: label for label in after if label in before}
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
-    matches, unmatched, notes = list[Match](), list[Unmatched](), list[str]()
+    matches = list[tuple[str, Cell, Cell]]()
+    unmatched, notes = list[tuple[str, str, tuple[str, ...]]](), list[str]()
     for study, judged, other, others, known in (
         ("old", before, "new", after, {*partners.values()}),
         ("new", after, "old", before, {*partners}),
@@ -98,7 +77,7 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
             problem = f"policy {label!r} of the {study} study has no match: the {other} study "
             problem += f"judges {', '.join(map(repr, others)) or 'no policy'}"
             names = tuple(_name(label, cell) for cell in judged[label].values())
-            unmatched.append(Unmatched(label, names, problem))
+            unmatched.append((label, problem, names))
     for label, old_label in partners.items():
         named = label if label == old_label else f"{old_label} -> {label}"
         theirs, ours = before[old_label], after[label]
@@ -106,9 +85,9 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
         if not common:
             names = tuple(_name(named, cell) for cell in (*theirs.values(), *ours.values()))
             problem = f"policy {named!r} is judged in both studies, but under no common condition"
-            unmatched.append(Unmatched(named, names, problem))
+            unmatched.append((named, problem, names))
             continue
-        matches += [Match(_name(named, ours[c]), theirs[c], ours[c]) for c in common]
+        matches += [(_name(named, ours[c]), theirs[c], ours[c]) for c in common]
         for study, own in (("old", theirs), ("new", ours)):
             alone = [f"{c.words} ({c.table})" for at, c in own.items() if at not in common]
             if alone:
@@ -284,10 +263,10 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
             name += f" ({comparison.table})"
         if gate.at not in name:
             continue
-        where = comparison.policy, comparison.table
-        cells = {arm: new.by_place[*where, arm] for arm in comparison.arms}
         margin = new.plan.specification.margin
-        found = judge_one(comparison, cells, paired=new.plan.paired, margin=margin)
+        found = judge_one(
+            comparison, new.cells_of(comparison), paired=new.plan.paired, margin=margin
+        )
         estimate = found.estimate
         if estimate is None:
             yield name, str(found.problem)
@@ -297,18 +276,21 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
 
 def _changes(gate: Gate, old: StudyResults, new: StudyResults) -> Iterator[tuple[str, _Found]]:
     matching = match(old, new)
-    for unmatched in matching.unmatched:
-        if any(gate.at in name for name in unmatched.names):
-            yield f"{unmatched.policy}: change", unmatched.problem
-    for matched in matching.matches:
-        if gate.at in matched.name:
-            yield matched.name, _change(gate, old, new, matched, matching.seeds)
+    for policy, problem, names in matching.unmatched:
+        if any(gate.at in name for name in names):
+            yield f"{policy}: change", problem
+    for name, one, other in matching.matches:
+        if gate.at in name:
+            yield name, _change(gate, (old, one), (new, other), matching.seeds)
 
 
 def _change(
-    gate: Gate, old: StudyResults, new: StudyResults, matched: Match, seeds: Sequence[int] | None
+    gate: Gate,
+    before: tuple[StudyResults, Cell],
+    after: tuple[StudyResults, Cell],
+    seeds: Sequence[int] | None,
 ) -> _Found:
-    one, other = matched.before, matched.after
+    (old, one), (new, other) = before, after
     if one.problem or other.problem:
         return str(one.problem or other.problem)
     if seeds is not None:
@@ -321,7 +303,7 @@ def _change(
         # Over shared seeds the runs of these alone tell whether P is capped.
         one, other = (
             Cell.of(of.policy, of.table, of.arm, [results.outcome(of.arm, seed) for seed in seeds])
-            for results, of in ((old, one), (new, other))
+            for results, of in (before, after)
         )
         if same_runs(one.digests, other.digests):
             return 0.0

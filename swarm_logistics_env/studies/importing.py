@@ -21,7 +21,7 @@ from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, Re
 from .comparison import OTHER_BEHAVIOUR, Arm, Comparison, Setting
 from .declaration import Declaration, Origin, note
 from .plan import Plan
-from .runs import FILE_NAME, Runs
+from .runs import Runs
 from .specification import Specification
 from .verdict import grouped
 
@@ -51,8 +51,6 @@ def import_results(
     Raises:
         StudyError: the file cannot be read, a row of it cannot be, or nothing is compared in it.
     """
-    if (out / FILE_NAME).exists():  # before the file is read
-        raise StudyError(f"{out} holds a study already: import into a new directory")
     try:
         trials = read_trials(
             file, columns=columns, ignore=ignore, duration=duration, decimal=decimal

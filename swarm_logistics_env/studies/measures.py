@@ -1,8 +1,8 @@
-"""What the paper does not define: faults in mid-run, policies and published values beside ours."""
+"""What the paper does not define: faults in mid-run, and how near published values are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,14 +13,12 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.resilience import SurvivalCurve
-from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparison import Comparison
 from .results import StudyResults, Times
-from .verdict import Cell, Verdict, grouped, same_runs
+from .verdict import Cell, grouped, same_runs
 
-Pair = tuple[Times, Times]
 Outcomes = tuple[Outcome, ...]
 
 
@@ -28,13 +26,11 @@ class RepairCurve(NamedTuple):
     """Kaplan and Meier's curve of the times after which single runs are back.
 
     Attributes:
-        runs: which runs: "fault", or "no fault" for the null pair.
         curve: share of runs that are not back yet.
         censored: how many were not back by then.
         total: of how many.
     """
 
-    runs: str
     curve: SurvivalCurve
     censored: int
     total: int
@@ -77,8 +73,8 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
         try:
             if removed is None:
                 raise StudyError("no runs with the robots removed are there to compare with")
-            null = _null(results, comparison)
-            single = _repair_curves(comparison, (_times(faulty), _times(removed)), null)
+            pairs = (_times(faulty), _times(removed)), _null(results, comparison)
+            single = tuple(_repair_curve(comparison, *pair) for pair in pairs)
         except (StudyError, spi.IndicatorError) as error:
             yield Resilience(comparison, *indices, problem=str(error))
         else:
@@ -117,7 +113,7 @@ def _index(
         return None
 
 
-def _null(results: StudyResults, comparison: Comparison) -> Pair:
+def _null(results: StudyResults, comparison: Comparison) -> tuple[Times, Times]:
     """Return the pair without fault.
 
     Raises:
@@ -134,17 +130,13 @@ def _null(results: StudyResults, comparison: Comparison) -> Pair:
     return original, other
 
 
-def _repair_curves(comparison: Comparison, pair: Pair, null: Pair) -> tuple[RepairCurve, ...]:
+def _repair_curve(comparison: Comparison, times: Times, reference: Times) -> RepairCurve:
     onset = comparison.changed.setting.onset
     end = comparison.original.case.scenario.duration
-    curves = []
-    for runs, times in (("fault", pair), ("no fault", null)):
-        window = window_of(comparison)
-        seconds, back = spi.repair_times(*times, onset=onset, end=end, window=window)
-        curve = spi.kaplan_meier(seconds, back)
-        censored = int(np.count_nonzero(~back))
-        curves.append(RepairCurve(runs, curve, censored, back.size))
-    return tuple(curves)
+    window = window_of(comparison)
+    seconds, back = spi.repair_times(times, reference, onset=onset, end=end, window=window)
+    censored = int(np.count_nonzero(~back))
+    return RepairCurve(spi.kaplan_meier(seconds, back), censored, back.size)
 
 
 _LONGEST_WINDOW = 100.0  # s
@@ -199,122 +191,6 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
     return tuple(curves)
 
 
-# -- policies beside the first one ------------------------------------------------------
-
-
-class CellAgainstBaseline(NamedTuple):
-    """P of one policy in one cell, beside that of the baseline, the study's first policy.
-
-    Attributes:
-        cell: of the policy.
-        difference: its P minus the baseline's, paired by seed, with 95 % interval [items]; None
-            for the baseline itself, or if runs are missing or share no seeds.
-        ratio: its mean P as a multiple of the baseline's, with Fieller's 95 % interval; None in
-            the same cases, or if the baseline delivers nothing.
-    """
-
-    cell: Cell
-    difference: Interval | None = None
-    ratio: Interval | None = None
-
-
-class IndicatorAgainstBaseline(NamedTuple):
-    """One question asked of every policy.
-
-    Attributes:
-        tests: the verdicts by policy, the baseline first.
-        differences: each further policy's indicator less the baseline's with 95 % jackknife
-            interval; None where it is undefined.
-    """
-
-    tests: dict[str, Verdict]
-    differences: dict[str, Interval | None]
-
-    @property
-    def test(self) -> Verdict:
-        """The first policy's verdict, for what is the same for all of them."""
-        return next(iter(self.tests.values()))
-
-
-def cells_against_baseline(results: StudyResults) -> dict[str, list[CellAgainstBaseline]]:
-    """Return, table by table, every cell of every policy; the policies of a cell one by one."""
-    known = [c for c in results.cells if c.arm.setting.kind != "policy" and c.n_seeds]
-    return {
-        table: [
-            _against_baseline(results, cell, cells[0])
-            for cells in grouped(here, lambda cell: cell.arm.setting).values()
-            for cell in cells
-        ]
-        for table, here in grouped(known, lambda cell: cell.table).items()
-    }
-
-
-def _against_baseline(results: StudyResults, cell: Cell, baseline: Cell) -> CellAgainstBaseline:
-    p, p_o = cell.by_seed, baseline.by_seed
-    is_baseline = cell is baseline or baseline.policy != results.policies[0]
-    if is_baseline or cell.problem or baseline.problem or not results.plan.paired:
-        return CellAgainstBaseline(cell)
-    ratio = None
-    if p_o.any():  # else there is nothing to divide by
-        change = spi.relative_change(p_o, p)
-        low, high = (None if x is None else 1.0 + x for x in (change.low, change.high))
-        ratio = Interval(1.0 + change.value, low, high)
-    return CellAgainstBaseline(cell, t_interval(p - p_o), ratio)
-
-
-def indicators_against_baseline(results: StudyResults) -> Iterator[IndicatorAgainstBaseline]:
-    """Yield every question that more than one policy was asked, with the differences."""
-    baseline = results.policies[0]
-    compared = [one for one in results.verdicts if one.compared.changed.setting.kind != "policy"]
-    for tests in grouped(compared, lambda v: (v.compared.table, v.compared.question)).values():
-        if len(tests) > 1:
-            by_policy = {test.compared.policy: test for test in tests}
-            first = by_policy.get(baseline)
-            differences = {
-                policy: _difference(results, first, test) if first else None
-                for policy, test in by_policy.items()
-                if policy != baseline
-            }
-            yield IndicatorAgainstBaseline(by_policy, differences)
-
-
-def _difference(results: StudyResults, baseline: Verdict, test: Verdict) -> Interval | None:
-    if baseline.estimate is None or test.estimate is None or not results.plan.paired:
-        return None
-
-    def value(one: Verdict, seeds: NDArray[np.intp]) -> float:
-        where = one.compared.policy, one.compared.table
-        samples = {arm: results.by_place[*where, arm].by_seed[seeds] for arm in one.compared.arms}
-        return one.compared.estimate(samples).value
-
-    try:
-        return jackknife_interval(
-            len(results.plan.seeds), lambda seeds: value(test, seeds) - value(baseline, seeds)
-        )
-    except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
-        return None
-
-
-def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], float]) -> Interval:
-    """Return a statistic of seeds with the 95 % t-interval of its jackknife pseudo-values.
-
-    For differences of two ratios over the same seeds, which have no Fieller interval (Tukey 1958).
-
-    Args:
-        n_seeds: number of seeds.
-        statistic: its value from the seeds of these indices, shape (k,).
-    """
-    seeds = np.arange(n_seeds)
-    value = statistic(seeds)
-    if n_seeds == 1:
-        return Interval(value, None, None)
-    left_out = np.array([statistic(np.delete(seeds, seed)) for seed in seeds])
-    pseudo = t_interval(n_seeds * value - (n_seeds - 1) * left_out)
-    if pseudo.low is None or pseudo.high is None:
-        return Interval(value, None, None)
-    return Interval(value, pseudo.low - pseudo.value + value, pseudo.high - pseudo.value + value)
-
-
 # -- a policy beside published values -----------------------------------------------------
 
 
@@ -326,19 +202,16 @@ class Agreement:
         policy: its label.
         cells: those of the reference's tables.
         misses: those whose published value lies outside our 95 % prediction interval of one run: a
-            weak test, which quite different policies pass as well. None at one seed.
-        met: those whose published value lies inside the 95 % interval of our mean. None as above.
+            weak test, which quite different policies pass as well. Empty at one seed.
+        met: those whose published value lies inside the 95 % interval of our mean. Empty as above.
         mean_log_error: mean of |ln(our mean P / published P)|; None where a mean is 0.
-        mean_interval_width: mean width of the prediction intervals [items], since wide intervals
-            meet published values by their width alone. None at one seed.
     """
 
     policy: str
     cells: tuple[Cell, ...]
-    misses: tuple[Cell, ...] | None
-    met: tuple[Cell, ...] | None
+    misses: tuple[Cell, ...]
+    met: tuple[Cell, ...]
     mean_log_error: float | None
-    mean_interval_width: float | None
 
 
 def agreements(results: StudyResults) -> tuple[Agreement, ...]:
@@ -355,21 +228,14 @@ def agreement(policy: str, cells: Sequence[Cell]) -> Agreement:
     """Return the agreement of these cells, all of them with a published value and with runs."""
     known = [(cell, cell.published) for cell in cells if cell.published is not None]
     ratio = np.array([cell.mean.value / published for cell, published in known])
-    width = [
-        c.one_run.high - c.one_run.low
-        for c in cells
-        if c.one_run.low is not None and c.one_run.high is not None
-    ]
-    met = [
-        cell
-        for cell, p in known
-        if cell.mean.low is not None and cell.mean.low <= p <= (cell.mean.high or 0.0)
-    ]
     return Agreement(
         policy,
         tuple(cells),
-        tuple(cell for cell in cells if not cell.published_inside) if width else None,
-        tuple(met) if width else None,
+        tuple(cell for cell in cells if cell.published_inside is False),
+        tuple(
+            cell
+            for cell, p in known
+            if cell.mean.low is not None and cell.mean.low <= p <= (cell.mean.high or 0.0)
+        ),
         float(np.abs(np.log(ratio)).mean()) if ratio.all() else None,
-        float(np.mean(width)) if width else None,
     )

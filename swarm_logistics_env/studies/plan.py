@@ -12,11 +12,11 @@ from typing import Self
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.spi.definitions import comparing
-from swarm_logistics_env.tasks.task import Case, Run
+from swarm_logistics_env.tasks.task import Case, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
 from .presets import load_reference
-from .specification import Ablation, Factor, Faults, Manner, Parameter, Sizes, Specification
+from .specification import Ablation, Factor, Faults, Fields, Manner, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -212,13 +212,20 @@ def _title(factor: Factor, general: str, manner: str = "") -> str:
     return factor.title or (f"{general} ({', '.join(changes)})" if changes else general)
 
 
+def _arm(
+    asked: Specification, base: Case, setting: Setting, changes: Fields, *faults: TaskFault
+) -> Arm:
+    scenario = asked.played.vary(asked.scenario, changes)
+    return Arm(setting, replace(base, scenario=scenario, faults=faults))
+
+
 def _scalability(asked: Specification, sizes: Sizes, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons between neighbouring swarm sizes."""
-    task, table = asked.played, _title(sizes, "Scalability")
-    arms = {}
-    for size in sizes.values:
-        scenario = task.vary(asked.scenario, {**sizes.scenario, "n_robots": size})
-        arms[size] = Arm(Setting("size", "n_robots", size), replace(base, scenario=scenario))
+    table = _title(sizes, "Scalability")
+    arms = {
+        n: _arm(asked, base, Setting("size", "n_robots", n), {**sizes.scenario, "n_robots": n})
+        for n in sizes.values
+    }
     steps = list(zip(sizes.values, sizes.values[1:]))
     for definition in comparing("size"):
         for small, large in steps:
@@ -242,25 +249,22 @@ def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Co
     An indicator that needs robots removed is left out where the task cannot remove any.
     """
     task, table = asked.played, _title(faults, "Fault tolerance and robustness", str(faults))
-    scenario = task.vary(asked.scenario, faults.scenario)
-    for m in faults.robots:
-        if m >= scenario.n_robots:
-            raise StudyError(
-                f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, "
-                "or no working robot is left"
-            )
-    for onset in faults.onsets:
-        if onset >= scenario.duration:
-            raise StudyError(
-                f"faults.onsets = {onset:g} s: should be less than duration = "
-                f"{scenario.duration:g} s, or nothing fails"
-            )
-    original = Arm(NO_FAULT, replace(base, scenario=scenario))
+    original = _arm(asked, base, NO_FAULT, faults.scenario)
+    scenario = original.case.scenario
+    if (m := max(faults.robots)) >= scenario.n_robots:
+        raise StudyError(
+            f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, or no "
+            "working robot is left"
+        )
+    if (onset := max(faults.onsets)) >= scenario.duration:
+        raise StudyError(
+            f"faults.onsets = {onset:g} s: should be less than duration = "
+            f"{scenario.duration:g} s, or nothing fails"
+        )
 
     def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Manner) -> Arm:
         fault = task.fault(mode, m, onset, lasts, manner)
-        case = replace(base, scenario=scenario, faults=(fault,))
-        return Arm(Setting("fault", mode, m, onset), case)
+        return _arm(asked, base, Setting("fault", mode, m, onset), faults.scenario, fault)
 
     wanted = [one for one in comparing("fault") if one.symbol in asked.indicators]
     if task.removed is None:
@@ -274,12 +278,12 @@ def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Co
 
 def _adaptability(asked: Specification, parameter: Parameter, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
-    name, task = parameter.name, asked.played
-    table, arms = _title(parameter, f"Adaptability to {name}"), []
-    for value in parameter.values:
-        scenario = task.vary(asked.scenario, {**parameter.scenario, name: value})
-        arms.append(Arm(Setting("parameter", name, value), replace(base, scenario=scenario)))
-    original, *changed = arms
+    name = parameter.name
+    table = _title(parameter, f"Adaptability to {name}")
+    original, *changed = (
+        _arm(asked, base, Setting("parameter", name, x), {**parameter.scenario, name: x})
+        for x in parameter.values
+    )
     for definition in comparing("parameter"):
         for arm in changed:
             yield Comparison(table, definition.symbol, original, arm)
@@ -288,15 +292,10 @@ def _adaptability(asked: Specification, parameter: Parameter, base: Case) -> Ite
 def _ablation(
     asked: Specification, ablation: Ablation, base: Case, lesser: Case
 ) -> Iterator[Comparison]:
-    table, scenario = (
-        _title(ablation, "Ablation"),
-        asked.played.vary(asked.scenario, ablation.scenario),
-    )
+    table = _title(ablation, "Ablation")
+    n_robots = asked.played.vary(asked.scenario, ablation.scenario).n_robots
     whole, part = (
-        Arm(
-            Setting("policy", case.policy.title, scenario.n_robots),
-            replace(case, scenario=scenario),
-        )
+        _arm(asked, case, Setting("policy", case.policy.title, n_robots), ablation.scenario)
         for case in (base, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".

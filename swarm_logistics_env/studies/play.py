@@ -18,6 +18,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
 from types import ModuleType
 from unittest.mock import patch
@@ -113,10 +114,10 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
             raise StudyError(f"engine local: is one process, not {processes}")
         return serial
     if name == "process":
-        return ProcessPool(processes or os.cpu_count() or 1)
+        return partial(_in_processes, processes or os.cpu_count() or 1)
     if address is not None and processes is not None:
         raise StudyError("engine ray: a cluster that runs already has its own number of cores")
-    return Cluster(address, processes)
+    return partial(_on_ray, address, processes)
 
 
 # One thread per worker: n workers with n threads each would wait for each other.
@@ -125,8 +126,8 @@ _ONE_THREAD = dict.fromkeys(
 )
 
 
-class ProcessPool:
-    """An engine of `count` worker processes.
+def _in_processes(count: int, runs: Iterable[Run]) -> Played:
+    """Play the runs in `count` worker processes.
 
     When a worker dies, each run that was being played is played once more, alone in a new worker; a
     run that ends this worker as well is an outcome with an error.
@@ -134,18 +135,12 @@ class ProcessPool:
     Raises:
         StudyError: a run cannot be sent to another process, or no worker comes up.
     """
-
-    def __init__(self, count: int) -> None:
-        self.count = count
-
-    def __call__(self, runs: Iterable[Run]) -> Played:
-        """Yield each run with its outcome, as they finish."""
-        waiting = deque(runs)
-        while waiting:
-            with workers(min(self.count, len(waiting))) as pool:
-                interrupted = yield from _played(pool, waiting, self.count)
-            for run in interrupted:
-                yield run, _played_alone(run)
+    waiting = deque(runs)
+    while waiting:
+        with workers(min(count, len(waiting))) as pool:
+            interrupted = yield from _played(pool, waiting, count)
+        for run in interrupted:
+            yield run, _played_alone(run)
 
 
 def _played(
@@ -257,8 +252,8 @@ RETRIES = 1  # after a worker's death, as local processes do
 QUEUED_PER_CORE = 2  # so that no core waits for this process
 
 
-class Cluster:
-    """An engine of the cores of a Ray cluster.
+def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Played:
+    """Play the runs on the cores of a Ray cluster.
 
     Start one by `ray start --head` on one machine and `ray start --address ...` on the others,
     all with this version of the package.
@@ -267,63 +262,58 @@ class Cluster:
         address: the cluster's address; "auto" means the one that this machine belongs to; None
             starts one on this machine while the study runs.
         cores: the number of cores of a cluster that is started here; None means all.
+        runs: to play.
 
     Raises:
         StudyError: ray is not installed, or there is no cluster at that address.
     """
+    waiting = deque(runs)
+    if not waiting:
+        return
+    ray, ours = _connected(address, cores)
+    pending: dict[Hashable, Run] = {}
+    try:
+        sent = ray.remote(num_cpus=1, max_retries=RETRIES)(_play)
+        # A policy travels with every run, so only a few runs are sent at a time.
+        limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
+        while pending or waiting:
+            while waiting and len(pending) < limit:
+                message = _pickled(waiting[0], ray.cloudpickle.dumps)
+                pending[sent.remote(message)] = waiting.popleft()
+            for task in ray.wait(list(pending), num_returns=1)[0]:
+                run = pending.pop(task)
+                try:
+                    outcome = ray.get(task)
+                except ray.exceptions.RayError:  # its worker died twice
+                    outcome = Outcome(error=traceback.format_exc())
+                yield run, outcome
+    finally:
+        for task in pending:
+            ray.cancel(task, force=True)
+        if ours:
+            ray.shutdown()
 
-    def __init__(self, address: str | None = None, cores: int | None = None) -> None:
-        self.address = address
-        self.cores = cores
 
-    def __call__(self, runs: Iterable[Run]) -> Played:
-        """Yield each run with its outcome, as they finish."""
-        waiting = deque(runs)
-        if not waiting:
-            return
-        ray, ours = self._connected()
-        pending: dict[Hashable, Run] = {}
-        try:
-            sent = ray.remote(num_cpus=1, max_retries=RETRIES)(_play)
-            # A policy travels with every run, so only a few runs are sent at a time.
-            limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
-            while pending or waiting:
-                while waiting and len(pending) < limit:
-                    message = _pickled(waiting[0], ray.cloudpickle.dumps)
-                    pending[sent.remote(message)] = waiting.popleft()
-                for task in ray.wait(list(pending), num_returns=1)[0]:
-                    run = pending.pop(task)
-                    try:
-                        outcome = ray.get(task)
-                    except ray.exceptions.RayError:  # its worker died twice
-                        outcome = Outcome(error=traceback.format_exc())
-                    yield run, outcome
-        finally:
-            for task in pending:
-                ray.cancel(task, force=True)
-            if ours:
-                ray.shutdown()
-
-    def _connected(self) -> tuple[ModuleType, bool]:
-        """Return ray, and whether the connection was made here."""
-        try:
-            import ray
-        except ImportError:
-            raise StudyError(
-                "the engine ray needs Ray: pip install 'swarm-logistics-env[ray]'"
-            ) from None
-        if ray.is_initialized():
-            return ray, False
-        # Its reports of use are for the user to switch on.
-        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        quiet = {"logging_level": "error", "log_to_driver": False}
-        try:
-            if self.address is None:
-                # "local": never a cluster that happens to run here.
-                ray.init("local", num_cpus=self.cores, include_dashboard=False, **quiet)
-            else:
-                ray.init(self.address, **quiet)
-        except (ConnectionError, RuntimeError, ValueError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise StudyError(f"no Ray cluster at {self.address}: {reason}") from error
-        return ray, True
+def _connected(address: str | None, cores: int | None) -> tuple[ModuleType, bool]:
+    """Return ray, and whether the connection was made here."""
+    try:
+        import ray
+    except ImportError:
+        raise StudyError(
+            "the engine ray needs Ray: pip install 'swarm-logistics-env[ray]'"
+        ) from None
+    if ray.is_initialized():
+        return ray, False
+    # Its reports of use are for the user to switch on.
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    quiet = {"logging_level": "error", "log_to_driver": False}
+    try:
+        if address is None:
+            # "local": never a cluster that happens to run here.
+            ray.init("local", num_cpus=cores, include_dashboard=False, **quiet)
+        else:
+            ray.init(address, **quiet)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise StudyError(f"no Ray cluster at {address}: {reason}") from error
+    return ray, True

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.tasks.task import Outcome
 
-from .comparison import Arm
+from .comparison import Arm, Comparison
 from .declaration import Declaration
 from .plan import Plan
 from .presets import Reference, load_reference
@@ -59,6 +59,11 @@ class StudyResults:
     def by_place(self) -> dict[Place, Cell]:
         """The cells by policy, table and arm."""
         return {(one.policy, one.table, one.arm): one for one in self.cells}
+
+    def cells_of(self, comparison: Comparison) -> dict[Arm, Cell]:
+        """Return the cells of a comparison's arms."""
+        where = comparison.policy, comparison.table
+        return {arm: self.by_place[*where, arm] for arm in comparison.arms}
 
     @property
     def policies(self) -> tuple[str, ...]:
@@ -197,7 +202,7 @@ VERDICT_COLUMNS: Columns = {
     "n_seeds": (float, "estimate.n_seeds", "number of seeds; missing: undefined"),
     "stopped_at": (float, "stopped_at", "number of seeds at which it was clear; missing: open"),
     "pairing_correlation": (float, "estimate.pairing_correlation", "of the two P over seeds"),
-    "flags": (str, "marks", "marks on the verdict, see `Estimate`, with blanks between"),
+    "flags": (str, "flags", "marks on the verdict, see `Estimate`, with blanks between"),
     "saturated": (bool, "saturated", "whether it rests on a P that is capped"),
     "property": (str, "asked", "what is asked, e.g. tolerant, FT > 0.5 or P falls"),
     "answer": (str, "answer", "verdict on the property"),
@@ -246,4 +251,4 @@ def _frame(rows: Sequence[Cell | Verdict], columns: Columns) -> pd.DataFrame:
 def _at(record: object, place: str) -> object:
     for name in place.split("."):
         record = getattr(record, name, None)
-    return record
+    return " ".join(record) if isinstance(record, tuple) else record

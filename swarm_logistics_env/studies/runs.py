@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -55,10 +53,6 @@ _OUTCOME = TypeAdapter(Outcome)
 Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the seed
 
 
-class FullDiskError(StudyError):
-    """A store that cannot be written, because there is no room on its disk."""
-
-
 class Runs:
     """The finished runs of a study. A run is kept from the moment that `add` returns.
 
@@ -66,7 +60,8 @@ class Runs:
 
     Args:
         path: the file, made where it is missing; None: kept in memory only.
-        read_only: write nothing, neither into the file nor beside it.
+        read_only: write nothing, neither into the file nor beside it, for a file that nobody else
+            writes.
 
     Raises:
         StudyError: the file is not a store, or its schema is not this version's.
@@ -77,7 +72,6 @@ class Runs:
         self._read_only = read_only
         place = str(path or ":memory:")
         if path is not None and read_only:
-            _refuse_unmerged(path)
             # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
             place = f"{path.absolute().as_uri()}?immutable=1"
         with self._explained():
@@ -93,7 +87,7 @@ class Runs:
 
     @classmethod
     def existing(cls, directory: Path) -> Self:
-        """Open the store of a study that was run before; to read, where it may not be written.
+        """Open the store of a study that was run before, to read it.
 
         Raises:
             StudyError: there is none.
@@ -101,10 +95,10 @@ class Runs:
         path = directory / FILE_NAME
         if not path.is_file():
             raise StudyError(f"no study in {directory}: there is no file {path}")
-        if os.access(path, os.W_OK) and os.access(directory, os.W_OK):
-            with contextlib.suppress(FullDiskError):  # which it can be read on
-                return cls(path)
-        return cls(path, read_only=True)
+        # A log is there while somebody writes, and after they were killed: it is merged by writing.
+        # Without one, a full or locked folder is no matter.
+        is_whole = path.stat().st_size and not path.with_name(f"{path.name}-wal").exists()
+        return cls(path, read_only=bool(is_whole))
 
     @classmethod
     @contextmanager
@@ -264,10 +258,9 @@ class Runs:
         try:
             yield
         except sqlite3.Error as error:
-            reason = f"cannot use the store {self.path}: {error}"
-            if getattr(error, "sqlite_errorcode", None) in _FULL:
-                raise FullDiskError(f"{reason}: there is no room on its disk") from error
-            raise StudyError(reason) from error
+            is_full = getattr(error, "sqlite_errorcode", None) in _FULL
+            why = f"{error}: there is no room on its disk" if is_full else f"{error}"
+            raise StudyError(f"cannot use the store {self.path}: {why}") from error
 
     def _prepare(self) -> None:
         # One moment's answers: another process may be making the tables.
@@ -288,11 +281,6 @@ class Runs:
                 f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
             )
         if self._read_only:
-            if not is_ours:
-                raise StudyError(
-                    f"{self.path} may not be written: should be a store of schema "
-                    f"{SCHEMA_VERSION} to be read there; copy it to where it may"
-                )
             return
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._change_to_wal()
@@ -334,15 +322,6 @@ def _described(run: Run) -> dict[str, object]:
         "code": run.code,
         "seed": run.seed,
     }
-
-
-def _refuse_unmerged(path: Path) -> None:
-    log = path.with_name(f"{path.name}-wal")
-    if log.is_file() and log.stat().st_size:
-        raise StudyError(
-            f"{path} may not be written, and its latest runs are still in {log.name}: copy both "
-            "to where they may"
-        )
 
 
 def export(runs: Runs, path: Path) -> tuple[int, str]:

@@ -186,11 +186,10 @@ class Study:
 
     def _missing(self, whole: Sequence[Run], store: Runs, tried: Collection[str]) -> list[Run]:
         """Return what is to be played next, but for what was tried already."""
+        done = store.succeeded() | set(tried)
         if not self.specification.until_clear:
-            done = store.succeeded()
             return [run for run in whole if run.key not in done]
-        played = store.succeeded() | set(tried)
-        outcomes = store.outcomes(run for run in whole if run.key in played)
+        outcomes = store.outcomes(run for run in whole if run.key in done)
         return list(standing(self.plan(), outcomes).wanted)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
@@ -272,17 +271,11 @@ class Study:
             return None
         if noted.imported is not None:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
-        # The report and the declared seeds are one study's.
-        name, there = self.specification.name, noted.specification.name
-        if there != name:
-            raise StudyError(
-                f"{self.out} holds the study {there!r}: should be another directory for the study "
-                f"{name!r}, or, if it is the same under a new name, name = {there!r}"
-            )
         if differing := noted.specification.differing(self.specification, self.out or Path()):
             raise StudyError(
-                f"{self.out} holds the study {name!r} with another {', '.join(differing)}: should "
-                "be as it was declared (seeds may be added), or in another directory"
+                f"{self.out} holds the study {noted.specification.name!r} with another "
+                f"{', '.join(differing)}: should be as it was declared (seeds may be added), or in "
+                "another directory"
             )
         return noted
 

@@ -21,7 +21,7 @@ from swarm_logistics_env.tasks.task import Case, Run
 from .comparison import CONFIDENCE, Arm, Comparison
 from .plan import Plan
 from .runs import Outcomes
-from .verdict import Cell, Level, Verdict, grouped, judge_one
+from .verdict import Cell, Verdict, grouped, judge_one
 
 MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"
@@ -123,12 +123,12 @@ class _Family:
         # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
         # side of the margin.
         confidence = 1 - self._runs.alpha(look, 1 - CONFIDENCE)
-        level = Level(confidence, self._runs.alpha(look, 2 * ALPHA) / 2)
+        alpha = self._runs.alpha(look, 2 * ALPHA) / 2
         margin = self._runs.plan.specification.margin
         for comparison in playing:
             cells = self._runs.cells(comparison, n_seeds)
             self._found[comparison] = judge_one(
-                comparison, cells, paired=self._runs.plan.paired, margin=margin, level=level
+                comparison, cells, paired=True, margin=margin, confidence=confidence, alpha=alpha
             )
             self._look[comparison] = look
         if complete:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import estimate as words
-from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence
+from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.tasks.task import Outcome
@@ -192,19 +192,9 @@ class Verdict:
         return definition.property_name(self.compared.threshold, claimed_below=below)
 
     @property
-    def where(self) -> tuple[str, str]:
-        """Policy and table that it stands in."""
-        return self.compared.policy, self.compared.table
-
-    @property
     def after(self) -> Setting:
         """The setting of the changed condition."""
         return self.compared.changed.setting
-
-    @property
-    def marks(self) -> str:
-        """The flags with blanks between."""
-        return " ".join(self.flags)
 
     @property
     def plain(self) -> str | None:
@@ -280,26 +270,14 @@ class Verdict:
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
 
 
-@dataclass(frozen=True)
-class Level:
-    """The level at which a comparison is judged.
-
-    Attributes:
-        confidence: of the indicator's interval and verdict, in (0, 1).
-        alpha: error of each of the two tests of equivalence, in (0, 0.5).
-    """
-
-    confidence: float = CONFIDENCE
-    alpha: float = ALPHA
-
-
 def judge_one(
     comparison: Comparison,
     cells: Mapping[Arm, Cell],
     *,
     paired: bool,
     margin: float,
-    level: Level | None = None,
+    confidence: float = CONFIDENCE,
+    alpha: float = ALPHA,
 ) -> Verdict:
     """Return a comparison's verdict, without what Holm makes of it.
 
@@ -307,8 +285,9 @@ def judge_one(
 
     Args:
         cells: those of the comparison's arms.
+        confidence: of the indicator's interval and verdict, in (0, 1).
+        alpha: error of each of the two tests of equivalence, in (0, 0.5).
     """
-    level = level or Level()
     saturated = [arm for arm in comparison.arms if cells[arm].saturated]
     estimate, same = None, None
     problems = [
@@ -324,16 +303,18 @@ def judge_one(
                 paired=paired,
                 saturated=saturated,
                 identical=identical,
-                confidence=level.confidence,
+                confidence=confidence,
             )
-            same = comparison.equivalence(
-                samples,
-                margin=margin,
-                paired=paired,
-                saturated=saturated,
-                identical=identical,
-                alpha=level.alpha,
-            )
+            if comparison.definition.unchanged(margin) is not None:  # S has no such question
+                named = dict(zip(("p_o", "p_new", "p_s"), comparison.arguments.values()))
+                same = equivalence(
+                    *(samples[arm] for arm in named.values()),
+                    margin=margin,
+                    alpha=alpha,
+                    paired=paired,
+                    saturated=[name for name, arm in named.items() if arm in saturated],
+                    identical=identical,
+                )
         except spi.IndicatorError as error:
             nothing = not samples[comparison.original].any()
             estimate, problems = None, ["it delivers nothing" if nothing else str(error)]
@@ -349,13 +330,11 @@ def under_holm(found: Sequence[Verdict]) -> Iterator[Verdict]:
     for family in grouped(found, lambda one: one.compared.family).values():
         estimates = [one.estimate for one in family if one.estimate]
         same = [one.equivalence for one in family if one.equivalence]
-        p_values: list[float | None] = [None] * len(family)
-        verdicts: list[words.Verdict | None] = [None] * len(family)
-        unchanged: list[words.Verdict | None] = [None] * len(family)
-        if len(estimates) == len(family):
-            p_values, verdicts = [*spi.adjusted_p_values(estimates)], [*spi.adjust(estimates)]
-        if len(same) == len(family):
-            unchanged = [*spi.adjust(same)]
+        none = (None,) * len(family)
+        is_whole = len(estimates) == len(family)
+        p_values = spi.adjusted_p_values(estimates) if is_whole else none
+        verdicts = spi.adjust(estimates) if is_whole else none
+        unchanged = spi.adjust(same) if len(same) == len(family) else none
         for one, p, verdict, as_before in zip(family, p_values, verdicts, unchanged):
             adjusted[one.compared] = replace(
                 one,

@@ -1,4 +1,4 @@
-"""Measures beyond the paper, and policies side by side, from outcomes that are made up."""
+"""Measures beyond the paper, from outcomes that are made up."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from swarm_logistics_env import spi
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
@@ -17,9 +15,6 @@ from swarm_logistics_env.studies.comparison import NO_FAULT, OTHER_BEHAVIOUR, Se
 from swarm_logistics_env.studies.measures import (
     RateCurve,
     Resilience,
-    cells_against_baseline,
-    indicators_against_baseline,
-    jackknife_interval,
     rate_curves,
     resiliences,
 )
@@ -65,14 +60,11 @@ def changed(results: StudyResults, key: str, seed: int) -> StudyResults:
     return judge(results.plan, {**results.outcomes, (key, seed): full})
 
 
-def table(results: StudyResults, title: str) -> list[tuple[str, ...]]:
-    return [
-        row
-        for chapter in document(results).chapters
-        for section in chapter.sections
-        if section.title == title
-        for row in section.rows
-    ]
+def times_back(results: StudyResults) -> tuple[tuple[str, ...], ...]:
+    """The rows of the table of times until single runs are back."""
+    title = "Time until single runs are back"
+    (found,) = (one for one in document(results).summary if one.title == title)
+    return found.rows
 
 
 @pytest.fixture(scope="module")
@@ -95,11 +87,8 @@ def test_swarm_that_comes_back_has_a_time_and_its_null_a_shorter_one(
     assert 500 < median < 700
     assert nothing is not None
     assert nothing < 100
-    ((_, _, shown, _, shown_null, _),) = table(repaired, "Time until single runs are back")
+    ((_, _, shown, _, shown_null, _),) = times_back(repaired)
     assert (shown, shown_null) == (f"{median:g}", f"{nothing:g}")
-    names = {figure.name for figure in document(repaired).figures()}
-    place = "swarm-dt-Fault-tolerance-and-robustness-dead-600s"
-    assert f"deliveries-{place}" in names
 
 
 def test_swarm_that_never_comes_back_is_censored() -> None:
@@ -108,7 +97,7 @@ def test_swarm_that_never_comes_back_is_censored() -> None:
     assert against is not None
     assert against.value == pytest.approx(0.3, abs=0.03)
     assert against.verdict == "refuted"
-    ((_, _, median, censored, *_),) = table(found, "Time until single runs are back")
+    ((_, _, median, censored, *_),) = times_back(found)
     assert (median, censored) == ("not reached", f"{SEEDS} of {SEEDS} runs")
 
 
@@ -161,80 +150,13 @@ def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) ->
         assert top >= max(curve.high.max() for curve in many)
 
 
-def two_policies(seeds: int, factor: float) -> StudyResults:
-    """Random walk delivers `factor` times what Swarm D-T does, in every run."""
-    study = Study(
-        policies=["swarm-dt", "random-walk"],
-        seeds=seeds,
-        sizes=[{"values": [5, 10, 20, 40]}],
-        faults=[{"modes": ["FM1"], "robots": [1]}],
-    )
-    base = {5.0: 10, 10.0: 20, 20.0: 30, 40.0: 36}
-
-    def play(policy: str, level: Setting, seed: int) -> Outcome:
-        # In another order at 40 robots, so that not every difference is the same.
-        noise = 2 * ((3 * seed + 1) % 4 if level.value == 40 else seed % 4)
-        p = (base[level.value] if level.kind == "size" else 32) + noise
-        return delivered(p * (factor if policy == "random-walk" else 1.0))
-
-    return judged(study, play)
-
-
-def test_policies_are_set_against_the_first() -> None:
-    found = two_policies(8, 2.0)
-    entries = {
-        (c.cell.policy, c.cell.words): c for c in cells_against_baseline(found)["Scalability"]
-    }
-    first, second = entries["swarm-dt", "N = 10"], entries["random-walk", "N = 10"]
-    assert first.difference is None
-    assert first.cell.by_seed.tolist() == [20, 22, 24, 26] * 2
-    assert second.difference == spi.mean_interval([20, 22, 24, 26] * 2)
-    assert first.ratio is None
-    assert second.ratio == pytest.approx((2.0, 2.0, 2.0))
-    # Twice the deliveries everywhere leaves every ratio as it was.
-    one, *_ = indicators_against_baseline(found)
-    assert one.differences["random-walk"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
-    ((_, ours, theirs, less), *_) = table(found, "Indicators side by side: Scalability")
-    assert ours == theirs
-    assert less == "0.000 [0.000, 0.000]"
-
-
-def test_policies_compared_over_one_seed_or_without_deliveries_have_values_alone() -> None:
-    found = two_policies(1, 2.0)
-    assert "## Policies compared" in markdown(document(found))
-    one, *_ = indicators_against_baseline(found)
-    assert one.differences["random-walk"] == (0.0, None, None)
-    alone = judge(Study(sizes=[{"values": [5, 10]}]).plan(), {})
-    assert "Policies compared" not in {chapter.title for chapter in document(alone).chapters}
-    study = Study(policies=["swarm-dt", "random-walk"], seeds=3, sizes=[{"values": [5, 10]}])
-    nothing = judged(study, lambda who, _, seed: delivered(who == "random-walk" and 2 + seed))
-    *_, last = cells_against_baseline(nothing)["Scalability"]
-    assert (last.cell.policy, last.ratio) == ("random-walk", None)
-    assert last.difference is not None
-
-
-def test_jackknife_of_a_mean_is_its_t_interval() -> None:
-    sample = np.array([3.0, 5.0, 4.0, 9.0])
-
-    def mean(seeds: NDArray[np.intp]) -> float:
-        return float(sample[seeds].mean())
-
-    assert jackknife_interval(4, mean) == pytest.approx(spi.mean_interval(sample))
-
-
-def test_ablation_is_drawn_with_its_value() -> None:
-    study = Study(seeds=4, ablations=[{"policy": "random-walk", "fall": 0.25}])
+def test_figures_have_files_and_numbers_of_their_own() -> None:
+    sizes = [{"title": title, "values": [5, 10]} for title in ("My sizes", "my-sizes")]
+    study = Study(seeds=4, sizes=sizes, ablations=[{"policy": "random-walk", "fall": 0.25}])
     found = judged(study, lambda _, at, s: delivered((20 if at.name == "random-walk" else 40) + s))
     figures = {figure.name: figure.data for figure in document(found).figures()}
-    assert set(figures) == {"answer", "change-Ablation"}
-    for data in figures.values():
-        (row,) = data.to_dict("records")
-        assert (row["indicator"], row["comparison"]) == ("change", "random-walk, N = 25")
+    assert list(figures) == ["answer", "S-My-sizes", "S-my-sizes-2", "change-Ablation"]
+    for name in ("answer", "change-Ablation"):
+        (row,) = figures[name][figures[name]["indicator"] == "change"].to_dict("records")
+        assert row["comparison"] == "random-walk, N = 25"
         assert row["value"] == pytest.approx(21.5 / 41.5 - 1)
-
-
-def test_figures_that_differ_in_punctuation_have_files_of_their_own() -> None:
-    sizes = [{"title": title, "values": [5, 10]} for title in ("My sizes", "my-sizes")]
-    found = judged(Study(seeds=1, sizes=sizes), lambda *_: delivered(30))
-    names = [figure.name for figure in document(found).figures()]
-    assert names == ["answer", "S-My-sizes", "S-my-sizes-2"]

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.report.answer import answer
-from swarm_logistics_env.report.page import bars, watch_command
+from swarm_logistics_env.report.page import axis, watch_command
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
 from verification.browser import Browser
@@ -29,9 +29,18 @@ SCENARIO = {
 HOSTILE = "</script><script>alert(1)</script>"
 
 
+class Made(NamedTuple):
+    """A study that was played and reported: its directory, results, page and the page's data."""
+
+    directory: Path
+    found: StudyResults
+    page: str
+    data: Any
+
+
 @pytest.fixture(scope="module")
-def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A study of two policies, one of a hostile name, played and reported."""
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """A study of two policies, one of a hostile name."""
     out = tmp_path_factory.mktemp("page")
     Study(
         out=out,
@@ -41,46 +50,29 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
         faults=[{"modes": ["FM4"], "robots": [1, 2]}],
     ).run()
     assert app.run(["study", "report", str(out)]) == 0
-    return out
+    page = (out / "report.html").read_text()
+    (text,) = re.findall(r' id="data">(.*?)</script>', page, re.DOTALL)
+    return Made(out, Study.stored(out).findings(), page, json.loads(text))
 
 
-@pytest.fixture(scope="module")
-def page(directory: Path) -> str:
-    return (directory / "report.html").read_text()
+def test_text_of_a_study_cannot_end_the_script(made: Made) -> None:
+    assert HOSTILE not in made.page
+    assert made.page.count("</script>") == 2
+    assert made.data["policies"] == ["swarm-dt", HOSTILE]
 
 
-@pytest.fixture(scope="module")
-def found(directory: Path) -> StudyResults:
-    return Study.stored(directory).findings()
-
-
-@pytest.fixture(scope="module")
-def data(page: str) -> Any:
-    (text,) = re.findall(
-        r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL
-    )
-    return json.loads(text)
-
-
-def test_text_of_a_study_cannot_end_the_script(page: str, data: Any) -> None:
-    assert HOSTILE not in page
-    assert page.count("</script>") == 2
-    assert data["policies"] == ["swarm-dt", HOSTILE]
-
-
-def test_every_seed_stands_behind_its_interval(data: Any, found: StudyResults) -> None:
+def test_every_seed_stands_behind_its_interval(made: Made) -> None:
+    data = made.data
     view = data["views"][0]
-    means = {(cell.policy, cell.words): cell.mean for cell in found.cells}
+    means = {(cell.policy, cell.words): cell.mean for cell in made.found.cells}
     assert {point["policy"] for point in view["points"]} == {"swarm-dt", HOSTILE}
     for point in view["points"]:
         condition = data["conditions"][point["condition"]]
         assert len(condition["p"]) == 3
         words = condition["name"].removeprefix(f"{point['policy']}, ")
-        value, *limits = means[point["policy"], words]
+        limits = [point["value"], point["low"], point["high"]]
+        assert limits == pytest.approx(means[point["policy"], words], abs=1e-3)
         assert point["value"] == pytest.approx(np.mean(condition["p"]), abs=1e-3)
-        assert [point["value"], point["low"], point["high"]] == pytest.approx(
-            [value, *limits], abs=1e-3
-        )
     for condition in data["conditions"]:
         for p, gaps in zip(condition["p"], condition["curves"]):
             assert len(gaps) == p
@@ -90,62 +82,50 @@ def test_every_seed_stands_behind_its_interval(data: Any, found: StudyResults) -
     for point in robustness["points"]:
         asked = data["questions"][point["question"]]
         before, after = (np.array(data["conditions"][c]["p"]) for _, _, c in asked["arms"])
-        m = int(asked["head"].split("m = ")[1].split()[0])
+        m = int(asked["head"].split("m = ")[1].split(",")[0])
         np.testing.assert_allclose(point["seeds"], (after - before) / before + m / 4, atol=1e-3)
 
 
-def test_bars_of_the_answer_stand_in_the_order_of_their_values(found: StudyResults) -> None:
-    lines = answer(found)
-    zero, rows = bars(lines)
-    drawn = {bar.number: bar for row in rows for bar in row}
-    known = [(n, test) for n, test in enumerate(found.verdicts) if test.interval]
-    assert set(drawn) == {n for n, _ in known}
-    for number, test in known:
-        bar = drawn[number]
-        assert bar.verdict == test.conclusion
-        assert 0 <= bar.low <= bar.at <= bar.high <= 100
-        assert (bar.at > zero) == ((test.value or 0.0) > 0)
-    by_value = sorted(known, key=lambda one: one[1].value or 0.0)
-    places = [drawn[number].at for number, _ in by_value]
-    assert places == sorted(places)
+def test_intervals_of_the_answer_are_drawn_to_the_ends_of_their_axis(made: Made) -> None:
+    first, last = axis(answer(made.found))
+    shape = r'<g class="(\w+)" data-question="(\d+)"><path d="M(\S+),\S+H(\S+)"/>.*?d="M([^,]+),'
+    drawn = {int(number): (word, *ends) for word, number, *ends in re.findall(shape, made.page)}
+    known = {n: test for n, test in enumerate(made.found.verdicts) if test.interval}
+    assert drawn.keys() == known.keys()
+    for number, test in known.items():
+        word, *places = drawn[number]
+        value, low, high = test.interval or (0.0, None, None)
+        assert word == test.conclusion
+        ends = max(first, low or value), min(last, high or value), value
+        assert [float(x) for x in places] == pytest.approx(ends)
+        assert first < value < last
 
 
 def test_command_of_a_run_plays_the_stored_one(
-    data: Any, found: StudyResults, capsys: pytest.CaptureFixture[str]
+    made: Made, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (faulty,) = {
-        arm
-        for policy, _, arm in found.plan.cells
-        if (policy, str(arm.setting)) == ("swarm-dt", "FM4, m = 2")
-    }
-    command = watch_command(faulty)
-    assert command is not None
-    assert command in {condition["command"] for condition in data["conditions"]}
+    arms = {(policy, str(arm.setting)): arm for policy, _, arm in made.found.plan.cells}
+    faulty = arms["swarm-dt", "FM4, m = 2"]
+    command = str(watch_command(faulty))
+    assert command in {condition["command"] for condition in made.data["conditions"]}
     program, watch, *options = shlex.split(command)
     assert (program, watch) == ("swarm-logistics", "watch")
     # `run` takes what `watch` takes, and ends.
     assert app.run(["run", *options, "--seed", "1"]) == 0
-    delivered = found.outcomes[faulty.case.key, 1].delivered
+    delivered = made.found.outcomes[faulty.case.key, 1].delivered
     assert f"P = {delivered} items" in capsys.readouterr().out
 
 
 def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word() -> None:
     scenario = {"speed_mix": [1.0, 0.5], "restock": True}
-    mid_run = {"modes": ["FM4"], "robots": [1], "onsets": [100.0]}
+    mid_run = {"modes": ["FM4"], "robots": [1], "onsets": [100.0], "duration": 50.0}
     breaks = {"modes": ["FM1"], "robots": [1], "intermittent": [5.0, 5.0]}
-    faults = [mid_run, {**mid_run, "duration": 50.0}, breaks]
-    plan = Study(scenario=scenario, faults=faults).plan()
-    commands = {str(arm.case.faults): watch_command(arm) for _, _, arm in plan.cells}
-    (lasting,) = (c for faults, c in commands.items() if "duration=50" in faults)
-    assert lasting is not None
-    assert lasting.endswith("--fault FM4:1@100+50")
-    (for_good,) = (
-        c for faults, c in commands.items() if "FM4" in faults and c not in (None, lasting)
-    )
-    assert shlex.split(str(for_good))[4:] == [
-        *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100")
+    plan = Study(scenario=scenario, faults=[mid_run, breaks]).plan()
+    commands = {arm.setting.name: watch_command(arm) for _, _, arm in plan.cells}
+    assert shlex.split(str(commands["FM4"]))[4:] == [
+        *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100+50")
     ]
-    assert [c for faults, c in commands.items() if "intermittent=(" in faults] == [None]
+    assert commands["FM1"] is None
     assert {watch_command(null) for null in plan.nulls.values()} == {None}
     given = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
     own = Study(policies=[SwarmDT(), given], sizes=[{"values": [2, 3]}]).plan()
@@ -165,28 +145,28 @@ def test_the_pages_script_escapes_what_it_draws() -> None:
 
 @pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
 def test_answer_and_comparison_stand_on_the_first_screen_and_a_click_shows_the_question(
-    size: tuple[int, int], directory: Path, data: Any, tmp_path: Path
+    size: tuple[int, int], made: Made, tmp_path: Path
 ) -> None:
     try:
         browser = Browser(tmp_path, size)
     except FileNotFoundError as missing:
         pytest.skip(str(missing))
     try:
-        browser.open((directory / "report.html").resolve().as_uri())
+        browser.open((made.directory / "report.html").resolve().as_uri())
         browser.wait_for("document.querySelectorAll('#comparison svg').length")
         assert browser.value("document.documentElement.scrollWidth") <= size[0]
         bottom = "document.querySelector('#comparison').getBoundingClientRect().bottom"
         assert browser.value(bottom) <= size[1]
-        asked = len(data["questions"]) - 1
+        asked = len(made.data["questions"]) - 1
         row = f'.answer tr[data-question="{asked}"]'
         place = f"document.querySelector('{row}').getBoundingClientRect()"
         browser.click(browser.value(f"{place}.x") + 4, browser.value(f"{place}.y") + 4)
         shown = browser.wait_for("document.querySelector('.answer tr.chosen').dataset.question")
         assert int(shown) == asked
         head = browser.value("document.querySelector('#question h2').textContent")
-        assert head == data["questions"][asked]["head"]
+        assert head == made.data["questions"][asked]["head"]
         lines = browser.value("document.querySelectorAll('#slopes polyline.thin').length")
-        assert lines == len(data["seeds"])
+        assert lines == len(made.data["seeds"])
         assert browser.console == []
     finally:
         browser.close()

@@ -45,17 +45,9 @@ def test_no_name_breaks_a_table() -> None:
     assert r"\caption{t\_1}" in latex
 
 
-@pytest.mark.parametrize(
-    ("text", "shown"),
-    [
-        ("<img src=x>", "&lt;img src=x>"),
-        ("[a](b)", r"[a]\(b)"),
-        ("![a](b)", r"![a]\(b)"),
-        ("a < b", "a < b"),
-        ("x\x1b[31m", r"x\x1b[31m"),
-    ],
-)
-def test_no_name_is_markup_in_markdown(text: str, shown: str) -> None:
+@pytest.mark.parametrize("text", ["<img src=x>", "[a](b)", "![a](b)", "a < b", "x\x1b[31m"])
+def test_no_name_is_markup_in_markdown(text: str) -> None:
+    shown = text.replace("<i", "&lt;i").replace("](", r"]\(").replace("\x1b", r"\x1b")
     section = Section(text, ("c",), ((text,),), (text,))
     assert [line for line in section_markdown(section).splitlines() if shown in line] == [
         f"## {shown}", f"| {shown} |", shown
@@ -108,48 +100,33 @@ def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Pa
         assert f"](figures/{name}.png)" in text
 
 
-def test_every_verdict_quotes_seeds_interval_and_both_verdicts(few: StudyResults) -> None:
+def test_every_verdict_quotes_seeds_interval_and_what_it_rests_on(few: StudyResults) -> None:
     for test in few.verdicts:
-        estimate = test.estimate
-        assert estimate is not None
+        assert test.estimate is not None
+        low, high = test.estimate.low, test.estimate.high
         told = sentence(few, test)
-        assert "4 paired seeds (0 to 3)" in told.text
-        assert f"95 % interval [{estimate.low:.3f}, {estimate.high:.3f}]" in told.text
+        assert f"95 % interval [{low:.3f}, {high:.3f}] over 4 paired seeds (0 to 3)" in told.text
         assert "Unadjusted: " in told.text
         assert "Holm-adjusted: " in told.text
-        assert re.search(r"N = \d+", told.head)
         assert ("†" in told.text) == test.saturated
         if test.after.kind == "fault":
-            assert f"Failure mode {test.after.name}, m = {test.after.value:g}" in told.head
-
-
-def test_sentences_tell_what_a_verdict_rests_on() -> None:
+            assert f"? {test.after.name}, m = {test.after.value:g}, N = 25." in told.head
     text = markdown(document(paper(same=frozenset({"FM2"}))))
     assert re.search(r"P_F within 10 % of P_o\? Change -0\.[67]\d\d \[.*\]: refuted\.", text)
-    assert "P_F within 10 % of P_o from P_S? Change" in text
     assert "R = 0.080 exactly, over 10 paired seeds (0 to 9): same runs." in text
     assert re.search(r"too few to exclude stalled runs .* It needs at least \d+ seeds\.", text)
-
-
-def test_missing_runs_leave_a_verdict_undefined_with_the_reason(few: StudyResults) -> None:
     place = few.plan.comparisons[0].changed.case.key, 2
-    outcomes = {name: o for name, o in few.outcomes.items() if name != place}
-    blocked = judge(few.plan, outcomes)
-    told = sentence(blocked, blocked.verdicts[0])
-    assert told.verdict == "blocked"
-    assert "N = 10: 1 of 4 runs missing" in told.text
+    blocked = judge(few.plan, {name: o for name, o in few.outcomes.items() if name != place})
+    assert sentence(blocked, blocked.verdicts[0]).verdict == "blocked"
     assert "N = 10: 1 of 4 runs missing" in markdown(document(blocked))
 
 
 def test_capped_cells_and_the_set_up_are_on_the_page(few: StudyResults, directory: Path) -> None:
     page = (directory / "report.html").read_text().replace("\N{NO-BREAK SPACE}", " ")
     assert "† marks a P that is capped" in page
-    for name, marks in (
-        ("A-Table-III-adaptability-to-warehouse-width", 3),
-        ("S-Table-I-scalability", 0),
-    ):
-        drawing = ElementTree.parse(directory / "figures" / f"{name}.svg")
-        assert sum(element.text == "†" for element in drawing.iter()) == marks
+    name = "A-Table-III-adaptability-to-warehouse-width"
+    drawing = ElementTree.parse(directory / "figures" / f"{name}.svg")
+    assert sum(element.text == "†" for element in drawing.iter()) == 3
     for name in few.plan.specification.scenario.model_dump():
         assert f'<th scope="row">{name}</th>' in page
     assert "Table I: scalability differs: n_items = 100." in page
@@ -166,9 +143,7 @@ def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_al
     assert f"need {package}: pip install 'swarm-logistics-env[study]'" in text
     assert "![" not in text
     assert {path.suffix for path in (tmp_path / "figures").iterdir()} == {".csv"}
-    assert "S = 0.611 (no interval) over one seed (0)." in text
-    assert "FT = -0.615 (no interval)" in text
-    assert "Unadjusted: open; Holm-adjusted: open." in text
+    assert "S = 0.611 (no interval) over one seed (0). Unadjusted: open; Holm-adj" in text
     with (tmp_path / "claims.csv").open(newline="") as file:
         assert {row["verdict"] for row in csv.DictReader(file)} == {"inconclusive"}
 
@@ -185,8 +160,3 @@ def test_every_sentence_of_the_paper_stands_beside_its_claims(few: StudyResults)
     tough = paper(lambda _, at: 39.0 if at.name == "FM4" else 20.0)
     against = {row[0]: row[2] for row in sentences(PAPER, tough.verdicts)}
     assert "FM4, m = 3: R = " in next(v for k, v in against.items() if "robust (R > 0)" in k)
-
-
-def test_the_time_to_clear_stands_where_a_run_delivered_everything(few: StudyResults) -> None:
-    (times,) = [section for section in tables(few) if section.title.startswith("Time until")]
-    assert [row[0] for row in times.rows] == ["swarm-dt: warehouse_width = 5"]

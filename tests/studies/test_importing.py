@@ -10,55 +10,17 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
-from swarm_logistics_env.studies import Study, presets
+from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.measures import resiliences
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs
-from tests.studies.made_up import GOLDEN
-
-
-def papers_tables() -> str:
-    """The paper's Tables I to III, one run a row; every parameter of III has its own P_o."""
-    parameters = {"warehouse_width": 10.0, "delivery_width": 2.0, "n_items": 60.0}
-    names = "warehouse_width", "delivery_width", "stock"  # "items" would be those delivered
-    rows = [["table", "robots", "fault", "faulty", *names, "delivered"]]
-
-    def add(table: str, robots: int, fault: str, m: int, p: float, **changed: float) -> None:
-        values = [table, robots, fault, m, *{**parameters, **changed}.values(), p]
-        rows.append([str(value) for value in values])
-
-    for n, p in presets.PAPER_SIZES.items():
-        add("I", n, "none", 0, p)
-    add("II", 25, "none", 0, presets.PAPER_NO_FAULT)
-    for mode, performances in presets.PAPER_FAULTS.items():
-        for m, p in enumerate(performances, start=1):
-            add("II", 25, mode, m, p)
-    for name, row in presets.PAPER_PARAMETERS.items():
-        for x, p in row.items():
-            add(f"III {name}", 25, "none", 0, p, **{name: x})
-    return "".join(",".join(row) + "\n" for row in rows)
+from swarm_logistics_env.studies.runs import Runs
 
 
 def imported(tmp_path: Path, text: str) -> Study:
     (tmp_path / "table.csv").write_text(text)
     import_results(tmp_path / "table.csv", tmp_path / "out")
     return Study.stored(tmp_path / "out")
-
-
-def test_the_papers_own_tables_give_its_values_unpaired_and_without_intervals(
-    tmp_path: Path,
-) -> None:
-    study = imported(tmp_path, papers_tables())
-    table = study.indicators()
-    for symbol, golden in GOLDEN.items():
-        values = table.loc[table["indicator"] == symbol, "value"]
-        assert sorted(values) == pytest.approx(sorted(golden), abs=5e-4)
-    assert table[["low", "high", "p_value"]].isna().all(axis=None)
-    assert set(table["verdict"]) == {"inconclusive"}
-    report = markdown(document(study.findings()))
-    assert "imported from table.csv. Unpaired: it names no seeds." in report
-    assert "the same seeds for every condition" not in report
 
 
 # Own names for the fault and the parameter, no seeds.
@@ -98,32 +60,41 @@ def test_indicators_of_a_lab_file_are_those_of_spi_by_hand(tmp_path: Path) -> No
         assert found.loc[symbol, "verdict"] == estimate.verdict
     assert found.loc["R", "comparison"] == "wheel, m = 1"
     assert found.loc["A", "comparison"] == "width 2 -> 1.5"
+    (tmp_path / "lab.csv").write_text(LAB)
+    import_results(tmp_path / "lab.csv", tmp_path / "stated", setup={"arena": "4 m x 4 m"})
+    report = markdown(document(Study.stored(tmp_path / "stated").findings()))
+    assert "imported from lab.csv. Unpaired: it names no seeds." in report
+    assert "| arena | 4 m x 4 m |" in report
+    assert "Welch's t-test for independent samples" in report
+    assert "heading_drift" not in report
+    assert "code version" not in report
 
 
 def test_each_value_of_what_else_varies_has_a_table_of_its_own(tmp_path: Path) -> None:
-    rows = ["policy,robots,fault,faulty,p"]
+    rows = ["table,policy,robots,fault,faulty,width,p"]
     for n in (8, 16):
-        rows += [f"ours,{n},none,0,{n + k}" for k in (0, 1, 2)]
-        rows += [f"ours,{n},jam,1,{n - k}" for k in (1, 2, 3)]
+        rows += [f"I,ours,{n},none,0,2,{n + k}" for k in (0, 1, 2)]
+        rows += [f"I,ours,{n},jam,1,2,{n - k}" for k in (1, 2, 3)]
+    rows += ["II,ours,8,none,0,2,8", "II,ours,8,none,0,1,6"]
     table = imported(tmp_path, "\n".join(rows)).indicators()
     assert table[["table", "indicator"]].to_numpy().tolist() == [
-        ["Scalability", "S"],
-        ["Fault tolerance and robustness (N = 8)", "R"],
-        ["Fault tolerance and robustness (N = 16)", "R"],
+        ["I: Scalability", "S"],
+        ["I: Fault tolerance and robustness (N = 8, width = 2)", "R"],
+        ["I: Fault tolerance and robustness (N = 16, width = 2)", "R"],
+        ["II: Adaptability to width", "A"],
     ]  # without trials of removed robots for robustness alone
+    # One run gives a value alone.
+    last = table.iloc[-1]
+    assert last["value"] == pytest.approx(-0.25 / 0.5 + 1)
+    assert last[["low", "high", "p_value"]].isna().all()
+    assert last["verdict"] == "inconclusive"
 
 
+SQUARE = {"warehouse_width": 4.0, "warehouse_height": 4.0}
 LATE = Study(
     name="late",
     seeds=3,
-    policies=["swarm-dt"],
-    scenario={
-        "n_robots": 8,
-        "warehouse_width": 4.0,
-        "warehouse_height": 4.0,
-        "duration": 300.0,
-        "restock": True,
-    },
+    scenario={**SQUARE, "n_robots": 8, "duration": 300.0, "restock": True},
     faults=[{"modes": ["FM4"], "robots": [2], "onsets": [100.0]}],
 )
 
@@ -153,32 +124,17 @@ def test_an_event_log_has_the_resilience_of_the_simulators_own_rows(tmp_path: Pa
     assert len(own.single) == len(theirs.single) == 2
     for one, other in zip(own.single, theirs.single):
         assert np.array_equal(np.array(one.curve), np.array(other.curve))
-    report = markdown(document(study.findings()))
-    assert "Resilience: deliveries after the onset" in report
-
-
-def test_an_event_log_without_seeds_and_removed_robots_has_the_index_alone(tmp_path: Path) -> None:
-    LATE.run()
-    log = event_log(LATE.findings(), seeds=False).splitlines()
-    # One run fewer, so that the two conditions have not equally many.
+    assert "Resilience: deliveries after the onset" in markdown(document(study.findings()))
+    # Without seeds and removed robots it has the index alone; one run fewer, so that the two
+    # conditions have not equally many.
+    log = event_log(ours, seeds=False).splitlines()
     kept = [row for row in log if "removed" not in row and row.split(";")[6] != "FM4 2"]
-    study = imported(tmp_path, "\n".join(kept))
-    (found,) = resiliences(study.findings())
+    (tmp_path / "less").mkdir()
+    (found,) = resiliences(imported(tmp_path / "less", "\n".join(kept)).findings())
     assert found.against_whole is not None
     assert not found.against_whole.paired
-    assert found.against_removed is None
-    assert not found.single
+    assert (found.against_removed, found.single) == (None, ())
     assert found.problem == "no runs with the robots removed are there to compare with"
-
-
-def test_the_report_states_the_set_up_and_no_simulators(tmp_path: Path) -> None:
-    (tmp_path / "lab.csv").write_text(LAB)
-    import_results(tmp_path / "lab.csv", tmp_path / "out", setup={"arena": "4 m x 4 m"})
-    report = markdown(document(Study.stored(tmp_path / "out").findings()))
-    assert "| arena | 4 m x 4 m |" in report
-    assert "Welch's t-test for independent samples" in report
-    assert "heading_drift" not in report
-    assert "code version" not in report
 
 
 MANY = "robots,delivered\n5,9\n5,11\n5,10\n10,18\n10,22\n"
@@ -239,6 +195,3 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
         Study(out=tmp_path / "out", **small).run()
     with Runs.existing(tmp_path / "out") as runs:
         assert len(runs) == 5
-    assert [path.name for path in (tmp_path / "out").iterdir()] == [FILE_NAME]
-    with pytest.raises(StudyError, match="was imported: run into a new directory"):
-        Study.stored(tmp_path / "out").run()

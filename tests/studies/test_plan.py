@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,45 +36,38 @@ def test_paper_counted_by_hand() -> None:
         assert seeds == list(range(20))
 
 
-def test_removed_robots_are_those_that_fail(small: dict[str, Any]) -> None:
-    for comparison in Study(**small, indicators=["FT"]).plan().comparisons:
-        assert comparison.removed is not None
-        (removed,), (failed,) = comparison.removed.case.faults, comparison.changed.case.faults
-        assert isinstance(removed, Fault)
-        assert isinstance(failed, Fault)
-        assert removed == Fault("removed", failed.robots, onset=failed.onset)
-        assert comparison.removed.case.scenario == comparison.original.case.scenario
-
-
-def test_only_what_the_indicators_need_is_run(small: dict[str, Any]) -> None:
+def test_removed_robots_are_those_that_fail_and_only_what_indicators_need_is_run(
+    small: dict[str, Any],
+) -> None:
     late = {**small, "faults": [{"modes": ["FM1"], "robots": [1], "onsets": [10.0]}]}
     plans = {asked: Study(**late, indicators=[asked]).plan() for asked in ("FT", "R")}
     # No fault, its twin with other behaviour, the robot failed, the robot removed.
     assert len(plans["FT"].cases) == 4
+    (comparison,) = plans["FT"].comparisons
+    assert comparison.removed is not None
+    assert comparison.removed.case.faults == (Fault("removed", 1, onset=10.0),)
+    assert comparison.changed.case.faults == (Fault("FM1", 1, onset=10.0),)
+    assert comparison.removed.case.scenario == comparison.original.case.scenario
     # Nobody looks at a twin without FT.
     assert len(plans["R"].cases) == 2
     assert {comparison.indicator for comparison in plans["R"].comparisons} == {"R"}
 
 
 def test_cases_and_runs_are_known_by_content() -> None:
-    one = PolicySpec(name="swarm-dt")
-    base = Case(one, "same", Scenario(), (Fault("FM1", 2),), task=WAREHOUSE)
-    other_name = one.replace(label="other")
-    same = Case(other_name, "same", Scenario(n_robots=25), (Fault("FM1", 2),), task=WAREHOUSE)
+    one, fault = PolicySpec(name="swarm-dt"), (Fault("FM1", 2),)
+    base = Case(one, "same", Scenario(), fault, task=WAREHOUSE)
+    same = replace(base, policy=one.replace(label="other"), scenario=Scenario(n_robots=25))
     assert base.key == same.key
     others = [
-        Case(one, "different", Scenario(), (Fault("FM1", 2),), task=WAREHOUSE),
-        Case(one, "same", Scenario(n_robots=26), (Fault("FM1", 2),), task=WAREHOUSE),
-        Case(one, "same", Scenario(), (Fault("FM1", 1),), task=WAREHOUSE),
-        Case(one, "same", Scenario(), (Fault("FM1", 2, onset=1.0),), task=WAREHOUSE),
-        Case(one, "same", Scenario(), task=WAREHOUSE),
-        Case(one, "same", Scenario(), (Fault("FM1", 2),), 1, task=WAREHOUSE),
+        replace(base, identity="different"),
+        replace(base, scenario=Scenario(n_robots=26)),
+        replace(base, faults=(Fault("FM1", 1),)),
+        replace(base, faults=(Fault("FM1", 2, onset=1.0),)),
+        replace(base, faults=()),
+        replace(base, behaviour=1),
     ]
     assert len({base.key, *(other.key for other in others)}) == 7
     assert len({base.run("a", 0).key, base.run("a", 1).key, base.run("b", 0).key}) == 3
-
-
-def test_policy_parameters_make_another_condition() -> None:
     named, built, other = (
         {case.key for case in Study(policies=[policy], sizes=[{"values": [2, 3]}]).plan().cases}
         for policy in ("swarm-dt", SwarmDT(), SwarmDT(taxis_gain=0.1))
@@ -127,13 +121,11 @@ def test_bad_specification_is_refused_in_words(fields: dict[str, Any], words: st
     assert "\n" not in str(caught.value)
 
 
-def test_what_two_factors_ask_alike_is_asked_once() -> None:
+def test_every_preset_can_be_planned_and_an_unknown_one_is_refused() -> None:
+    # What two factors ask alike is asked once.
     faults = [{"modes": ["FM1"]}, {"modes": ["FM1", "FM2"]}]
     comparisons = Study(faults=faults).plan().comparisons
     assert len(comparisons) == len(set(comparisons)) == 2 * 2 * 3
-
-
-def test_every_preset_can_be_planned_and_an_unknown_one_is_refused() -> None:
     assert all(Study.preset(name).plan().comparisons for name in PRESETS)
     quick = Study.preset("quick").plan()
     assert {c.indicator for c in quick.comparisons} == {"S", "FT", "R", "A", "change"}
@@ -149,13 +141,12 @@ def test_resilience_has_both_references_and_a_null() -> None:
     assert len(plan.cases) == 2 + 3 * 4
     (null,) = plan.nulls.values()
     assert null.setting == OTHER_BEHAVIOUR
+    scenario = null.case.scenario
+    assert scenario.model_dump()["restock"]
     for comparison in plan.comparisons:
-        assert comparison.original.case.scenario == null.case.scenario
-        (fault,) = comparison.changed.case.faults
-        assert fault.onset == pytest.approx(comparison.changed.case.scenario.duration / 3, 0.1)
-        assert comparison.changed.case.scenario.model_dump()["restock"]
-        if comparison.removed:
-            assert comparison.removed.case.faults[0].onset == fault.onset
+        assert {arm.case.scenario for arm in comparison.arms} == {scenario}
+        (onset,) = {fault.onset for arm in comparison.arms for fault in arm.case.faults}
+        assert onset == pytest.approx(scenario.duration / 3, 0.1)
 
 
 def test_published_tables_give_the_golden_values_and_every_claim_follows_from_them() -> None:
@@ -169,53 +160,40 @@ def test_published_tables_give_the_golden_values_and_every_claim_follows_from_th
     for symbol, golden in GOLDEN.items():
         asked = (c for c in comparisons if (c.indicator, c.threshold) == (symbol, 0))
         assert [published(c) for c in asked] == pytest.approx(golden, abs=5e-4)
-    claims = {
-        comparison: PAPER.claims[comparison.question]
-        for comparison in comparisons
-        if comparison.indicator != "change"
-    }
+    claims = {c: PAPER.claims[c.question] for c in comparisons if c.indicator != "change"}
     assert len(claims) == 41
     # Those of the other reading of FM3 are asked of that alone.
-    rest = {asked for asked in PAPER.claims if asked not in {c.question for c in claims}}
+    rest = PAPER.claims.keys() - {comparison.question for comparison in claims}
     assert {asked.changed.name for asked in rest} == {"FM3_send"}
     for comparison, claim in claims.items():
         assert (published(comparison) > comparison.threshold) == claim, comparison.label
 
 
 FILE = """
-seeds = 3
 policies = ["swarm-dt", "random-walk"]
 scenario = { preset = "paper", duration = 50 }
-
-[[sizes]]
-values = [5, 10]
+sizes = [{ values = [5, 10] }]
 
 [[faults]]
 modes = ["FM1"]
 robots = [1]
-onsets = [10]
-
-[[parameters]]
-name = "delivery_width"
-values = [2.0, 1.0]
 """
 
 
 def test_file_says_what_python_says(tmp_path: Path) -> None:
     path = tmp_path / "small.toml"
     path.write_text(FILE)
-    from_file = Study.from_file(path)
     written = Study(
         name="small",
-        seeds=3,
         policies=("swarm-dt", "random-walk"),
         scenario={"duration": 50},
         sizes=[{"values": (5, 10)}],
-        faults=[{"modes": ("FM1",), "robots": (1,), "onsets": (10,)}],
-        parameters=[{"name": "delivery_width", "values": (2.0, 1.0)}],
+        faults=[{"modes": ("FM1",), "robots": (1,)}],
     )
-    assert from_file.specification == written.specification
+    assert Study.from_file(path).specification == written.specification
     assert Study.from_file(path, seeds=5).plan().seeds == range(5)
+    with pytest.raises(StudyError, match=r"cannot read the study file .*No such file"):
+        Study.from_file(tmp_path / "none.toml")
 
 
 def test_robots_may_fail_and_be_repaired_at_random_or_keep_a_factor() -> None:
@@ -253,5 +231,3 @@ def test_bad_file_is_refused_in_one_sentence_that_names_it(
     assert str(path) in str(caught.value)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
-    with pytest.raises(StudyError, match=r"cannot read the study file .*No such file"):
-        Study.from_file(tmp_path / "none.toml")

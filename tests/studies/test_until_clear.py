@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import random
-import signal
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import replace
+from functools import partial
 from itertools import islice
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -44,19 +41,25 @@ def made_up(run: Run) -> Outcome:
     return delivered(count, digest=run.key)
 
 
+Played = Generator[tuple[Run, Outcome], None, None]
+
+
 class Engine:
-    """Gives made-up outcomes and counts them; kills its process after `most` of them."""
+    """Gives made-up outcomes, as they are or as `changed` makes them, and notes the runs."""
 
-    def __init__(self, most: int | None = None) -> None:
+    def __init__(self, changed: Callable[[Run, Outcome], Outcome] = lambda _, one: one) -> None:
         self.played: list[Run] = []
-        self._most = most
+        self._changed = changed
 
-    def __call__(self, runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+    def __call__(self, runs: Iterable[Run]) -> Played:
         for run in runs:
-            if len(self.played) == self._most:
-                os.kill(os.getpid(), signal.SIGKILL)
             self.played.append(run)
-            yield run, made_up(run)
+            yield run, self._changed(run, made_up(run))
+
+
+def first(most: int, runs: Iterable[Run]) -> Played:
+    """Play so many runs alone, as a study that is stopped there does."""
+    return Engine()(islice(runs, most))
 
 
 def until_clear(most: int, out: Path | None = None, **fields: Any) -> Study:
@@ -98,12 +101,7 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
     text = markdown(document(study.findings()))
     assert "Clear at 20 of at most 60 seeds." in text
     assert "Open after 60 of at most 60 seeds." in text
-
-
-def test_a_comparison_is_judged_by_its_own_seeds_and_its_repeated_interval(
-    whole: tuple[Study, Engine],
-) -> None:
-    study, _ = whole
+    # Each is judged by its own seeds and its repeated interval.
     looks = looks_up_to(60)
     for test in study.findings().verdicts:
         estimate = test.estimate
@@ -111,31 +109,25 @@ def test_a_comparison_is_judged_by_its_own_seeds_and_its_repeated_interval(
         alpha = spi.look_alphas(looks, spending=SPENDING)[looks.index(estimate.n_seeds)]
         assert estimate.confidence == pytest.approx(1 - alpha)
         p_o, p_f = (
-            [
-                made_up(arm.case.run(study.plan().code, seed)).delivered
-                for seed in range(estimate.n_seeds)
-            ]
+            [made_up(arm.case.run("", seed)).delivered for seed in range(estimate.n_seeds)]
             for arm in test.compared.arms
         )
         alone = spi.robustness(p_o, p_f, n=25, m=1, confidence=estimate.confidence)
-        assert (test.interval, estimate.p_value) == (
-            (alone.value, alone.low, alone.high),
-            alone.p_value,
-        )
+        assert test.interval == (alone.value, alone.low, alone.high)
+        assert estimate.p_value == alone.p_value
 
 
 def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
     looks, softened = looks_up_to(30), 0
     for number in range(10):
 
-        def engine(runs: Iterable[Run], number: int = number) -> Generator[tuple[Run, Outcome]]:
-            for run in runs:
-                fault = "".join(fault.mode for fault in run.case.faults)
-                rng = np.random.default_rng([number, run.seed, *map(ord, fault)])
-                yield run, delivered(rng.poisson(35 if fault else 40))
+        def poisson(run: Run, _: Outcome, number: int = number) -> Outcome:
+            fault = "".join(fault.mode for fault in run.case.faults)
+            rng = np.random.default_rng([number, run.seed, *map(ord, fault)])
+            return delivered(rng.poisson(35 if fault else 40))
 
         study = until_clear(30)
-        study.run(engine)
+        study.run(Engine(poisson))
         found = [
             (e.n_seeds, e.p_value, t.holm) for t in verdicts_of(study).values() if (e := t.estimate)
         ]
@@ -154,62 +146,48 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
     assert softened
 
 
-def test_killed_at_any_moment_it_goes_on_to_the_same_result(
+def test_interrupted_at_any_moment_it_goes_on_to_the_same_result(
     whole: tuple[Study, Engine], tmp_path: Path
 ) -> None:
     study, engine = whole
-    moments, played = random.Random(0), 0
-    for most in (moments.randrange(1, 20) for _ in range(4)):
-        # Killed as by kill -9: no cleaning up, and only what the store holds is left.
-        killed = get_context("fork").Process(
-            target=lambda m: until_clear(60, tmp_path).run(Engine(m)), args=(most,)
-        )
-        killed.start()
-        killed.join()
-        assert killed.exitcode == -signal.SIGKILL
+    interrupted = until_clear(60, tmp_path)
+    played = 0
+    for most in (25, 7, 30, 1):
+        tally = interrupted.run(partial(first, most))
+        assert (tally.kept, tally.played) == (played, most)
         played += most
+        if played == 25:  # it counts the runs of its next look
+            assert tally.left == 55
+            assert interrupted.finished() == (25, 20 * 4)
     last = Engine()
     until_clear(60, tmp_path).run(last)
     assert played + len(last.played) == len(engine.played)
     stored = Study.stored(tmp_path)
+    assert stored.finished() == (len(engine.played),) * 2
     assert told(stored) == told(study)
     assert not stored.findings().exploratory
-
-
-def test_an_interrupted_study_counts_the_runs_of_its_next_look(tmp_path: Path) -> None:
-    study = until_clear(40, tmp_path)
-    assert study.run(lambda runs: Engine()(islice(runs, 25))).left == 55
-    assert study.finished() == (25, 20 * 4)
-    assert study.run(Engine()).kept == 25
-    done, total = study.finished()
-    assert done == total < 4 * 40
 
 
 def test_later_outcomes_of_a_shared_condition_change_no_verdict(
     whole: tuple[Study, Engine],
 ) -> None:
-    def capped_later(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
-        for run in runs:
-            full = not run.case.faults and run.seed >= 20
-            yield run, replace(made_up(run), all_delivered=full)
-
     capped = until_clear(60)
-    capped.run(capped_later)
+    later = Engine(
+        lambda run, one: replace(one, all_delivered=not run.case.faults and run.seed >= 20)
+    )
+    capped.run(later)
     # A capped P_F would block "refuted" only; a capped P_o blocks "supported", and marks the rest.
     assert told(capped)["FM4"] == told(whole[0])["FM4"]
     assert not verdicts_of(capped)["FM4"].saturated
 
 
 def test_a_failed_run_blocks_its_comparison_and_no_other() -> None:
-    def fails_once(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
-        for run in runs:
-            faults = [fault.mode for fault in run.case.faults]
-            broken = faults == ["FM3"] and run.seed == 7
-            yield run, Outcome(error="ValueError: no") if broken else made_up(run)
+    def fails_once(run: Run, one: Outcome) -> Outcome:
+        broken = [fault.mode for fault in run.case.faults] == ["FM3"] and run.seed == 7
+        return Outcome(error="ValueError: no") if broken else one
 
     study = until_clear(30)
-    tally = study.run(fails_once)
-    assert tally.failed == 1
+    assert study.run(Engine(fails_once)).failed == 1
     tests = verdicts_of(study)
     assert "1 of 20 runs failed" in str(tests["FM3"].problem)
     assert tests["FM4"].stopped_at == 20
@@ -219,12 +197,10 @@ def test_a_failed_run_blocks_its_comparison_and_no_other() -> None:
 
 def test_the_same_runs_are_exact_at_the_first_look() -> None:
     study = until_clear(60)
-    same = ((run, delivered(40 + run.seed, digest=f"{run.seed}")) for run in study.plan().runs)
-    known = {run.key: outcome for run, outcome in same}
-    assert study.run(lambda runs: ((run, known[run.key]) for run in runs)).played == 4 * 20
-    assert {(one.stopped_at, one.holm) for one in verdicts_of(study).values()} == {
-        (20, "unaffected")
-    }
+    same = Engine(lambda run, _: delivered(40 + run.seed, digest=f"{run.seed}"))
+    assert study.run(same).played == 4 * 20
+    stopped = {(one.stopped_at, one.holm) for one in verdicts_of(study).values()}
+    assert stopped == {(20, "unaffected")}
 
 
 def test_another_most_is_another_plan_and_exploratory_and_shards_are_refused(
