@@ -6,6 +6,8 @@ differs in lightness or shape as well: grey levels of the three robot states are
 
 from __future__ import annotations
 
+import numpy as np
+
 from swarm_logistics_env.warehouse import FAILURE_MODES
 
 RGB = tuple[int, int, int]
@@ -63,9 +65,11 @@ _EDGES = (
 def film_colours() -> list[RGB]:
     """Return the colours of pictures that may have only a few: under 128, each once."""
     smooth = [
-        _mixed(one, other, (step + 1) / (steps + 1))
+        (red, green, blue)
         for one, other, steps in _EDGES
-        for step in range(steps)
+        for red, green, blue in np.rint(np.linspace(one, other, steps + 2)[1:-1])
+        .astype(int)
+        .tolist()
     ]
     return list(dict.fromkeys([*COLOURS.values(), *smooth]))
 
@@ -73,9 +77,3 @@ def film_colours() -> list[RGB]:
 def mark(modes: tuple[str, ...]) -> str:
     """Return the mark of a robot that fails in these modes, as `1+V`; other modes by name."""
     return "+".join(MARKS.get(mode, mode) for mode in modes)
-
-
-def _mixed(colour: RGB, other: RGB, share: float) -> RGB:
-    """Return `colour` with a `share` in [0, 1] of `other`."""
-    red, green, blue = (round(a + (b - a) * share) for a, b in zip(colour, other, strict=True))
-    return red, green, blue
