@@ -58,9 +58,6 @@ def test_actions_may_be_given_in_any_order_and_beyond_their_bounds() -> None:
     assert data_equivalence(first.step(far), second.step(cut))
 
 
-# -- wrong input --------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
@@ -73,6 +70,7 @@ def test_actions_may_be_given_in_any_order_and_beyond_their_bounds() -> None:
         ({"robot_0": np.zeros(4, complex)}, "should be numbers"),
         ({"robot_0": [None] * 4}, "should be numbers"),
         ({"robot_0": [[1.0, 2.0], [3.0]]}, r"\(type list\) cannot be read: should be numbers"),
+        ({"robot_1": np.zeros(4, "datetime64[s]")}, "commands should be numbers"),
         ({"robot_1": [0, np.nan, 0, 0]}, r"\[1, 1\] = nan: should be finite"),
         ({"robot_1": [0, 0, 0, np.inf]}, r"\[1, 3\] = inf: should be finite"),
     ],
@@ -87,42 +85,26 @@ def test_wrong_commands_are_refused_and_nothing_has_happened(
     wrong = {agent: command for agent, command in actions.items() if command is not None}
     with pytest.raises(CommandError, match=complaint):
         env.step(wrong)
+    with pytest.raises(CommandError, match=r"actions of type .*: should be a dict"):
+        env.step(list(actions.values()))  # type: ignore[arg-type]
     assert env.agents == ["robot_0", "robot_1"]
     assert data_equivalence(env.step(still(env)), undisturbed.step(still(undisturbed)))
-
-
-@pytest.mark.parametrize("actions", [None, [np.zeros(4)] * 2, np.zeros((2, 4))])
-def test_what_is_no_dict_of_commands_is_refused(actions: Any) -> None:
-    env = parallel_env(n_robots=2)
-    env.reset(seed=0)
-    with pytest.raises(CommandError, match=r"actions of type .*: should be a dict"):
-        env.step(actions)
-    assert env.warehouse.state.step == 0
 
 
 @pytest.mark.parametrize(
     ("arguments", "error", "complaint"),
     [
         ({"n_robot": 3}, ScenarioError, "did you mean 'n_robots'"),
-        ({"n_robots": 0}, ScenarioError, "n_robots = 0: should be greater than 0"),
         ({"rewards": {"delivry": 1.0}}, SetupError, "did you mean 'delivery'"),
         ({"render_mode": "hologram"}, SetupError, "render_mode = 'hologram': should be"),
-        ({"faults": Fault("FM1")}, SetupError, "faults = .*: should be a list of faults"),
-        ({"scenario": 25}, SetupError, "scenario = 25: should be a Scenario"),
         ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
         ({"reward": {}}, ScenarioError, "unexpected .* argument 'reward'; did you mean 'rewards'"),
         ({"num_agents": 3}, TypeError, "keyword argument 'num_agents'; did you mean 'n_robots'"),
-        ({"width": 3.0}, TypeError, "argument 'width'; did you mean 'warehouse_width'"),
         ({"frameskip": 4}, ArgumentError, "got an unexpected keyword argument 'frameskip'"),
-        (
-            {"max_robots": 24},
-            SetupError,
-            "max_robots = 24: should be a whole number of at least 25",
-        ),
+        ({"max_robots": 24}, SetupError, "max_robots = 24: should be .* of at least 25"),
         ({"max_robots": "40"}, SetupError, "max_robots = '40': should be a whole number"),
         ({"max_robots": 9000}, ScenarioError, "n_robots = 9000 of radius .* do not fit"),
         ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be a whole number"),
-        ({"max_cycles": "9"}, SetupError, "max_cycles = '9': should be"),
         ({"max_cycles": 9.5}, SetupError, "max_cycles = 9.5: should be"),
         ({"rewards": ["delivery"]}, SetupError, r"rewards = \[.*\]: should be None or a dict"),
     ],
@@ -134,9 +116,6 @@ def test_wrong_arguments_are_refused(
         parallel_env(**arguments)
 
 
-# -- reset --------------------------------------------------------------------------------------
-
-
 def episode_digest(env: SwarmLogisticsEnv, seed: int | None) -> str:
     digest = hashlib.sha256(env.reset_arrays(seed).tobytes())
     rng = np.random.default_rng(0)
@@ -145,23 +124,14 @@ def episode_digest(env: SwarmLogisticsEnv, seed: int | None) -> str:
     return digest.hexdigest()
 
 
-def test_seed_zero_is_the_same_twice_and_no_seed_differs_twice() -> None:
-    env, other = parallel_env(n_robots=3), parallel_env(n_robots=3)
-    zero = episode_digest(env, 0)
-    assert episode_digest(env, 0) == zero
-    assert episode_digest(other, 0) == zero
-    unseeded = [episode_digest(each, None) for each in (env, env, parallel_env(n_robots=3))]
-    fresh = [episode_digest(parallel_env(n_robots=3), None) for _ in range(2)]
-    assert len({zero, *unseeded, *fresh}) == 6
-
-
-def test_the_episodes_after_a_seed_follow_from_it() -> None:
-    runs = []
-    for _ in range(2):
-        env = parallel_env(n_robots=3)
-        runs.append([episode_digest(env, seed) for seed in (5, None, None)])
-    assert runs[0] == runs[1]
-    assert len(set(runs[0])) == 3
+def test_episodes_follow_from_the_last_seed_that_was_given_and_differ() -> None:
+    env, other, unseeded = (parallel_env(n_robots=3) for _ in range(3))
+    digests = [episode_digest(env, seed) for seed in (0, None, None)]
+    assert [episode_digest(other, seed) for seed in (0, None, None)] == digests
+    assert episode_digest(env, 0) == digests[0]
+    digests += [episode_digest(unseeded, None) for _ in range(2)]
+    digests += [episode_digest(parallel_env(n_robots=3), None)]
+    assert len(set(digests)) == 6
 
 
 def test_options_change_one_episode() -> None:
@@ -245,24 +215,18 @@ def test_a_step_after_the_end_is_refused_and_moves_nothing(end: str) -> None:
     env.step(east(env))
 
 
-def test_unknown_options_are_ignored_with_a_warning() -> None:
+def test_unknown_options_are_ignored_with_a_warning_unless_a_known_one_is_nearly_meant() -> None:
     env = parallel_env(n_robots=2)
     for name in ("options", "default"):
         with pytest.warns(UserWarning, match=f"reset option '{name}' is ignored; "):
             observations, _ = env.reset(seed=0, options={name: [Fault("removed", 1)]})
         assert len(observations) == 2
-
-
-@pytest.mark.parametrize(
-    ("name", "meant"), [("fault", "faults"), ("FAULTS", "faults"), ("senario", "scenario")]
-)
-def test_an_option_that_is_nearly_a_known_one_is_refused(name: str, meant: str) -> None:
-    for env in (parallel_env(n_robots=2), FaultInjection(parallel_env(n_robots=2), "FM1")):
-        with pytest.raises(SetupError, match=f"no reset option '{name}'; did you mean '{meant}'"):
-            env.reset(seed=0, options={name: ()})
-
-
-# -- who leaves, and how it ends ----------------------------------------------------------------
+    for name, meant in (("fault", "faults"), ("FAULTS", "faults"), ("senario", "scenario")):
+        for each in (env, FaultInjection(env, "FM1")):
+            with pytest.raises(
+                SetupError, match=f"no reset option '{name}'; did you mean '{meant}"
+            ):
+                each.reset(seed=0, options={name: ()})
 
 
 def test_a_removed_robot_terminates_once_and_leaves() -> None:
@@ -274,17 +238,16 @@ def test_a_removed_robot_terminates_once_and_leaves() -> None:
     assert env.possible_agents == [*observations, "robot_3"]
     _, _, terminated, truncated, _ = env.step(still(env))
     assert not any(terminated.values())
-    assert env.agents == ["robot_0", "robot_1", "robot_2"]
     observations, rewards, terminated, truncated, infos = env.step(still(env))
     assert terminated == {"robot_0": False, "robot_1": True, "robot_2": False}
     assert not any(truncated.values())
     for part in (observations, rewards, infos):
         assert list(part) == ["robot_0", "robot_1", "robot_2"]
     assert env.agents == ["robot_0", "robot_2"]
-    observations, *_ = env.step(still(env))
-    assert list(observations) == ["robot_0", "robot_2"]
-    observations, *_ = env.step({**still(env), "robot_1": np.zeros(4)})
-    assert list(observations) == ["robot_0", "robot_2"]
+    others: dict[str, Any]
+    for others in ({}, {"robot_1": np.zeros(4)}):
+        observations, *_ = env.step({**still(env), **others})
+        assert list(observations) == ["robot_0", "robot_2"]
 
 
 @pytest.mark.parametrize("restock", [False, True])
@@ -337,18 +300,15 @@ def test_infos_tell_failures_while_they_hold_and_observations_do_not() -> None:
 
 
 def test_an_absent_robot_earns_nothing() -> None:
-    env = parallel_env(REACHABLE, faults=[Fault("removed", (1,))], rewards={"delivery": 1.0})
+    env = parallel_env(REACHABLE, faults=[Fault("removed", (1,))])
     env.reset(seed=0)
-    commands = np.zeros((2, 4))
-    for _ in range(200):
-        commands[0] = east(env)["robot_0"]
-        _, paid, terminated, truncated = env.step_arrays(commands)
-        assert paid[1] == 0.0
+    ended, total = np.zeros(2, np.bool_), np.zeros(2)
+    while not ended.any():
+        _, paid, ended, truncated = env.step_arrays([east(env)["robot_0"], np.zeros(4)])
         assert not truncated.any()
-        if terminated.any():
-            break
-    assert paid[0] == 1.0
-    assert terminated.tolist() == [True, False]
+        total += paid
+    assert total.tolist() == [1.0, 0.0]
+    assert ended.tolist() == [True, False]
 
 
 def test_the_state_of_a_robot_that_is_shoved_lies_in_its_space() -> None:

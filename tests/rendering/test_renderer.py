@@ -74,7 +74,8 @@ def test_frame_is_an_rgb_array_as_large_as_asked_for(
     world = Warehouse(scenario)
     world.reset(0)
     picture = frame(world.state, scenario, 800)
-    assert (picture.dtype, picture.shape[1:]) == (np.uint8, (expected, 3))
+    assert picture.dtype == np.uint8
+    assert picture.shape[1:] == (expected, 3)
     assert picture.shape[0] > 760 * min(1.0, height / width)
     assert picture.shape[0] % 2 == 0
     assert picture.flags.c_contiguous
