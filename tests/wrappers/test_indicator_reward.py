@@ -94,21 +94,20 @@ def test_the_return_is_the_indicator(name: str) -> None:
     assert set(paying) == times | {0}
 
 
-def test_the_constant_can_be_left_out_and_weights_add_up() -> None:
+def test_weights_add_up_and_the_constant_can_be_left_out() -> None:
     references = {OWN: 33.0, REMOVED: 21.0}
-    env = IndicatorReward(busy(), {"R": 2.0, "FT": 1.0, "P": 0.5}, references=references)
-    rewards, infos = play(env, 0, SLOW)
-    p = delivered(env)
-    r, ft = p / 33 - 1 + 2 / N, (p - 21) / 33
-    assert rewards.sum(axis=0) == pytest.approx(2 * r + ft + 0.5 * p, **CLOSE)
-    info = infos["robot_0"]
-    assert [info["R"], info["FT"]] == pytest.approx([r, ft])
-    assert (info["n_robots"], info["n_failed"], info["n_removed"]) == (N, 2, 0)
-    assert "P" not in info
-    env = IndicatorReward(busy(), "R", references=33, constant=False)
-    rewards, infos = play(env, 0, SLOW)
-    assert rewards.sum(axis=0) == pytest.approx(p / 33, **CLOSE)
-    assert infos["robot_0"]["R"] == pytest.approx(r)
+    weights = {"R": 2.0, "FT": 1.0, "P": 0.5}
+    for constant in (True, False):
+        env = IndicatorReward(busy(), weights, references=references, constant=constant)
+        rewards, infos = play(env, 0, SLOW)
+        p = delivered(env)
+        r, ft = p / 33 - 1 + 2 / N, (p - 21) / 33
+        left_out = 0.0 if constant else 2 * (-1 + 2 / N) - 21 / 33
+        assert rewards.sum(axis=0) == pytest.approx(2 * r + ft + 0.5 * p - left_out, **CLOSE)
+        info = infos["robot_0"]
+        assert [info["R"], info["FT"]] == pytest.approx([r, ft])
+        assert (info["n_robots"], info["n_failed"], info["n_removed"]) == (N, 2, 0)
+        assert "P" not in info
 
 
 def test_without_what_an_indicator_is_about_numbers_pay_nothing() -> None:
@@ -147,7 +146,7 @@ def in_one_order() -> list[tuple[np.ndarray, Any]]:
     return [play(env, seed) for seed in range(3)]
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(STACKS)), ids="(".join)
+@pytest.mark.parametrize("order", list(itertools.permutations(STACKS))[::3], ids="(".join)
 def test_the_order_of_wrappers_does_not_matter(order: tuple[str, ...]) -> None:
     env: Any = busy(duration=2.0)
     for name in order:
@@ -258,18 +257,12 @@ def test_means_that_are_not_there_yet_or_too_small() -> None:
 
 
 @pytest.mark.parametrize("credit", ["deliverer", "carriers"])
-def test_credit_goes_to_the_robots_involved(credit: Any) -> None:
+def test_where_credit_is_shared_out_all_returns_sum_up_to_the_indicator(credit: Any) -> None:
     env = IndicatorReward(busy(), "R", references=33.0, credit=credit)
     rewards, _ = play(env, 0, SLOW)
-    state = env.unwrapped.warehouse.state
-    value = spi.robustness([33], [state.delivered], n=N, m=2).value
+    value = spi.robustness([33], [delivered(env)], n=N, m=2).value
     assert rewards.sum() == pytest.approx(value, **CLOSE)
-    constant = (-1 + 2 / N) / N
-    by_robot = rewards.sum(axis=0) - constant
-    counts = np.bincount(state.delivered_by, minlength=N)
-    assert by_robot.sum() == pytest.approx(counts.sum() / 33, **CLOSE)
-    if credit == "deliverer":
-        assert by_robot == pytest.approx(counts / 33, **CLOSE)
+    assert rewards[0] == pytest.approx([(-1 + 2 / N) / N] * N)
 
 
 def test_who_carried_the_item_before_shares_the_credit() -> None:
@@ -277,23 +270,18 @@ def test_who_carried_the_item_before_shares_the_credit() -> None:
     env = IndicatorReward(world, "P", references=33.0, credit="carriers")
     env.reset(seed=0)
     state = env.unwrapped.warehouse.state
-    hold, stay = np.array([0, 0, 0, 1.0]), np.zeros(4)
-    seen = set()
-    total = np.zeros(2)
-    command = {0: [hold, stay], 1: [np.array([0, 0, 0, -1.0]), stay], 2: [stay, hold]}
-    for step in range(3):
-        if step == 0:
-            state.item_position[:] = 0.05
-            state.item_position[state.requested] = state.robot_position[0]
-        _, rewards, _, _ = env.step_arrays(np.array(command[step]))
-        total += rewards
-        seen.add(int(state.item_carrier[state.requested]))
-    assert seen == {0, 1, -1}
+    hold, stay, drop = np.array([0, 0, 0, 1.0]), np.zeros(4), np.array([0, 0, 0, -1.0])
+    state.item_position[:] = 0.05
+    state.item_position[state.requested] = state.robot_position[0]
+    total, seen = np.zeros(2), []
+    for commands in ([hold, stay], [drop, stay], [stay, hold]):
+        total += env.step_arrays(np.array(commands))[1]
+        seen.append(int(state.item_carrier[state.requested]))
+    assert seen == [0, -1, 1]
     while not state.delivered:
         heading = float(state.robot_heading[1])
         drive = np.array([np.cos(heading), -np.sin(heading), 0.0, 0.0])
-        _, rewards, _, _ = env.step_arrays(np.array([stay, drive]))
-        total += rewards
+        total += env.step_arrays(np.array([stay, drive]))[1]
     assert state.delivered == 1
     assert total.tolist() == [0.5, 0.5]
 
@@ -343,14 +331,11 @@ def test_the_environments_own_reward_can_be_kept_for_shaping() -> None:
 
 
 def test_absent_robots_get_nothing() -> None:
-    env = IndicatorReward(busy(), {"R": 1.0, "P": 1.0}, references=33.0)
-    with pytest.raises(SetupError, match=r"performance of .*n_removed=1"):
-        env.reset_arrays(0, {"faults": [Fault("removed", (1,)), Fault("FM2", (0,))]})
+    faults = {"faults": [Fault("removed", (1,)), Fault("FM2", (0,))]}
     env = IndicatorReward(busy(), {"R": 1.0, "P": 1.0}, references=RunningMeans())
-    env.reset_arrays(0, {"faults": [Fault("removed", (1,)), Fault("FM2", (0,))]})
+    env.reset_arrays(0, faults)
     for _ in range(20):
-        rewards = env.step_arrays(np.tile([0.5, 0, 0, 1.0], (N, 1)))[1]
-        assert rewards[1] == 0
+        assert env.step_arrays(np.tile([0.5, 0, 0, 1.0], (N, 1)))[1][1] == 0
     assert env.condition == Condition(N, ("FM2",), n_failed=1, n_removed=1)
 
 
@@ -389,8 +374,6 @@ def test_what_cannot_be_judged_is_refused_at_the_reset() -> None:
     env = IndicatorReward(busy(), "FT", references=33.0)
     with pytest.raises(SetupError, match="n_removed=2"):
         env.reset_arrays(0, SLOW)
-    with pytest.raises(SetupError, match="4 of 4 robots faulty"):
-        env.reset_arrays(0, {"faults": [Fault("FM1", 4)]})
     with pytest.raises(SetupError, match="4 of 4 robots faulty"):
         env.payments_of(Condition(4, ("FM1",), n_failed=4))
     wrong: Any
