@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import doctest
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,9 @@ from swarm_logistics_env import Fault
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.streams import key
-from swarm_logistics_env.wrappers import (
-    IndicatorReward,
-    ParameterChange,
-    SwarmSize,
-)
+from swarm_logistics_env.wrappers import IndicatorReward, ParameterChange, SwarmSize
+from tests.adapters.conftest import played, small, worlds, wrapped
+from tests.wrappers.conftest import eastward
 
 pytest.importorskip("stable_baselines3")
 
@@ -26,43 +23,36 @@ import torch
 from swarm_logistics_env.adapters import sb3
 from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
-Played = Callable[[SwarmVecEnv, int], list[Any]]
-Small = dict[str, Any]
 
-
-def test_rows_are_the_worlds_own_over_several_episodes(small: Small) -> None:
-    sizes = [3, 5]
-    env = SwarmVecEnv(n_worlds=3, n_robots=sizes, seed=7, **small)
+def test_rows_are_the_worlds_own_over_several_episodes() -> None:
+    env = worlds(3, [3, 5], seed=7)
     assert env.num_envs == 3 + 5 + 3
-    worlds = [SwarmLogisticsEnv(**small, n_robots=size) for size in (3, 5, 3)]
+    own = [small(n_robots=size) for size in (3, 5, 3)]
     rng = np.random.default_rng(0)
-    first = [world.reset_arrays(key(7, "world", w) >> 1) for w, world in enumerate(worlds)]
+    first = [world.reset_arrays(key(7, "world", w) >> 1) for w, world in enumerate(own)]
     np.testing.assert_array_equal(env.reset(), np.concatenate(first))
     shown = np.zeros(0)
     for step in range(1, 48):
         kept = shown.copy()
         actions = rng.uniform(-1, 1, (11, 4)).astype(np.float32)
         observations, rewards, dones, infos = env.step(actions)
-        outcomes = [
-            world.step_arrays(part)
-            for world, part in zip(worlds, np.split(actions, np.cumsum([3, 5])))
-        ]
+        parts = np.split(actions, [3, 8])
+        outcomes = [world.step_arrays(part) for world, part in zip(own, parts)]
         last = np.concatenate([outcome[0] for outcome in outcomes])
         np.testing.assert_array_equal(rewards, np.concatenate([o[1] for o in outcomes]))
-        assert dones.all() == dones.any() == (step % 20 == 0)
-        if step % 20 == 0:
-            for row, info in enumerate(infos):
-                np.testing.assert_array_equal(info["terminal_observation"], last[row])
-                assert info["TimeLimit.truncated"] is True
-                assert info["padding"] is False
-                assert info["n_robots"] == sizes[info["world"] % 2]
-            last = np.concatenate([world.reset_arrays() for world in worlds])
-        else:
-            for info, world in zip(infos, env._worlds.world_of.tolist()):
-                assert info == {
-                    "TimeLimit.truncated": False, "padding": False, "failed": 0, "world": world,
-                    "n_robots": sizes[world % 2], "delivered": info["delivered"],
-                }  # fmt: skip
+        is_end = step % 20 == 0
+        assert dones.all() == dones.any() == is_end
+        for row, (info, world) in enumerate(zip(infos, [0] * 3 + [1] * 5 + [2] * 3, strict=True)):
+            about = {
+                "TimeLimit.truncated": is_end, "padding": False, "failed": 0, "world": world,
+                "n_robots": 5 if world == 1 else 3, "delivered": info["delivered"],
+            }  # fmt: skip
+            if is_end:
+                np.testing.assert_array_equal(info.pop("terminal_observation"), last[row])
+                assert info.pop("episode")["l"] == 20
+            assert info == about
+        if is_end:
+            last = np.concatenate([world.reset_arrays() for world in own])
         np.testing.assert_array_equal(observations, last)
         np.testing.assert_array_equal(shown, kept)  # what was returned stays as it was
         shown = observations
@@ -70,22 +60,21 @@ def test_rows_are_the_worlds_own_over_several_episodes(small: Small) -> None:
         assert env.observation_space.contains(observations[0])
 
 
-def test_a_seed_fixes_all_episodes_and_no_seed_none(small: Small, played: Played) -> None:
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, seed=0, **small)
+def test_a_seed_fixes_all_episodes_and_no_seed_none() -> None:
+    env = worlds(2)
     trace = played(env, 45)
     assert not np.array_equal(trace[0], env.reset())  # goes on with the next episodes
     seeds = env.seed(0)
     assert seeds[0] == seeds[2] != seeds[3]
     np.testing.assert_equal(played(env, 45), trace)
-    other = SwarmVecEnv(n_worlds=2, n_robots=3, **small)
+    other = worlds(2, seed=None)
     assert not np.array_equal(other.reset(), trace[0])
     other.seed(1)
     assert not np.array_equal(other.reset(), trace[0])
 
 
-def test_a_removed_robot_is_done_once_and_then_padding(small: Small) -> None:
-    faults = [Fault("removed", (1,), onset=0.5)]
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, faults=faults, seed=0, **small)
+def test_a_removed_robot_is_done_once_and_then_padding() -> None:
+    env = worlds(2, faults=[Fault("removed", (1,), onset=0.5)])
     env.reset()
     for step in range(1, 41):
         observations, rewards, dones, infos = env.step(np.ones((6, 4)))
@@ -109,11 +98,8 @@ def test_a_removed_robot_is_done_once_and_then_padding(small: Small) -> None:
             assert not rewards[[1, 4]].any()
 
 
-def test_a_smaller_swarm_leaves_padding(small: Small) -> None:
-    def make_env(world: int) -> Any:
-        return SwarmSize(SwarmLogisticsEnv(**small), [2, 5])
-
-    env = SwarmVecEnv(make_env=make_env, n_worlds=1, seed=0)
+def test_a_smaller_swarm_leaves_padding() -> None:
+    env = SwarmVecEnv(make_env=lambda _: SwarmSize(small(), [2, 5]), n_worlds=1, seed=0)
     sizes = set()
     observations = env.reset()
     for _ in range(8 * 20):
@@ -129,30 +115,26 @@ def test_a_smaller_swarm_leaves_padding(small: Small) -> None:
     assert sizes == {2, 5}
 
 
-def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world(small: Small) -> None:
-    env = SwarmVecEnv(n_worlds=1, n_robots=3, n_items=2, pickup_range=14.0, duration=60.0, seed=0)
+def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world() -> None:
+    env = worlds(1, n_items=2, pickup_range=14.0, duration=60.0)
     env.reset()
     total, dones, infos = 0.0, np.zeros(3, np.bool_), []
     while not dones.any():
-        heading = env.worlds[0].warehouse.state.robot_heading
-        east = np.stack([np.cos(heading), -np.sin(heading), 0 * heading, 1 + 0 * heading], axis=1)
-        _, rewards, dones, infos = env.step(east)
+        _, rewards, dones, infos = env.step(eastward(env.worlds[0]))
         total += rewards[0]
     assert dones.all()
     assert total == 2.0
     assert all(info["delivered"] == 2 for info in infos)
     assert not any(info["TimeLimit.truncated"] for info in infos)
-
     for onset, length in ((0.2, 2), (0.1, 1)):
-        faults = [Fault("removed", 3, onset=onset)]
-        env = SwarmVecEnv(n_worlds=1, n_robots=3, faults=faults, seed=0, **small)
+        env = worlds(1, faults=[Fault("removed", 3, onset=onset)])
         env.reset()
         ends = [env.step(np.zeros((3, 4)))[2].all() for _ in range(4)]
         assert ends == [(step % length) == 0 for step in range(1, 5)]
 
 
-def test_infos_that_are_written_into_share_nothing(small: Small) -> None:
-    first, second = (SwarmVecEnv(n_worlds=2, n_robots=2, seed=0, **small) for _ in range(2))
+def test_infos_that_are_written_into_share_nothing() -> None:
+    first, second = (worlds(2, 2) for _ in range(2))
     for env in (first, second):
         env.reset()
     for _ in range(21):
@@ -165,14 +147,7 @@ def test_infos_that_are_written_into_share_nothing(small: Small) -> None:
         assert not any("mine" in info for info in second.step(np.zeros((4, 4)))[-1])
 
 
-def test_actions_that_cannot_be_read_are_refused(small: Small) -> None:
-    env = SwarmVecEnv(n_worlds=1, n_robots=2, seed=0, **small)
-    env.reset()
-    with pytest.raises(CommandError, match=r"actions \(type Tensor, dtype torch.bfloat16"):
-        env.step_async(torch.zeros((2, 4), dtype=torch.bfloat16))
-
-
-def test_attributes_and_methods_are_reached_by_row(wrapped: Callable[[int], Any]) -> None:
+def test_attributes_and_methods_are_reached_by_row() -> None:
     env = SwarmVecEnv(make_env=wrapped, n_worlds=2, seed=0)
     env.reset()
     assert env.get_attr("render_mode") == [None] * 12
@@ -192,16 +167,15 @@ def test_attributes_and_methods_are_reached_by_row(wrapped: Callable[[int], Any]
         env.get_attr("value", 12)
 
 
-def test_options_are_for_the_next_reset_only(small: Small) -> None:
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, seed=0, **small)
-    env.set_options({"faults": [Fault("FM1", (0,))]})
-    env.reset()
-    assert [len(world.warehouse.faults) for world in env.worlds] == [1, 1]
-    env.set_options([{}, {"faults": [Fault("FM1", (0,))]}])
-    env.reset()
-    assert [len(world.warehouse.faults) for world in env.worlds] == [0, 1]
-    env.reset()
-    assert [len(world.warehouse.faults) for world in env.worlds] == [0, 0]
+def test_options_are_for_the_next_reset_only() -> None:
+    env = worlds(2)
+    faulty = {"faults": [Fault("FM1", (0,))]}
+    options: Any
+    for options, n_faults in ((faulty, [1, 1]), ([{}, faulty], [0, 1]), (None, [0, 0])):
+        if options:
+            env.set_options(options)
+        env.reset()
+        assert [len(world.warehouse.faults) for world in env.worlds] == n_faults
     with pytest.raises(SetupError, match="3 options"):
         env.set_options([{}, {}, {}])
     env.set_options({"scenario": {"n_robots": 4}})
@@ -209,13 +183,12 @@ def test_options_are_for_the_next_reset_only(small: Small) -> None:
         env.reset()
 
 
-def test_pictures_are_tiles_of_the_worlds(small: Small) -> None:
+def test_pictures_are_tiles_of_the_worlds() -> None:
     pytest.importorskip("pygame")
-    env = SwarmVecEnv(n_worlds=2, n_robots=2, render_mode="rgb_array", seed=0, **small)
+    env = worlds(2, 2, render_mode="rgb_array")
     env.reset()
-    picture, single = env.render(), env.worlds[0].render()
-    assert picture is not None
-    assert single is not None
+    picture: Any = env.render()
+    single: Any = env.worlds[0].render()
     assert picture.shape == (2 * single.shape[0], single.shape[1], 3)
     np.testing.assert_array_equal(picture[: single.shape[0]], single)
     env.close()
@@ -246,26 +219,29 @@ def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) ->
 
 
 @pytest.mark.parametrize(
-    "actions", [np.zeros(4), np.zeros((5, 4)), np.full((6, 4), np.nan), [["a"] * 4] * 6]
+    ("actions", "message"),
+    [
+        (np.zeros((5, 4)), r"actions of shape \(5, 4\)"),
+        (np.full((6, 4), np.nan), r"actions\[0\] .* \(world 0, robot_0\): should be finite"),
+        ([["a"] * 4] * 6, "numbers"),
+        (torch.zeros((6, 4), dtype=torch.bfloat16), r"actions \(type Tensor, dtype torch.bfloat16"),
+    ],
 )
-def test_wrong_actions_are_refused_before_anything_happens(small: Small, actions: Any) -> None:
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, seed=0, **small)
+def test_wrong_actions_are_refused_before_anything_happens(actions: Any, message: str) -> None:
+    env = worlds(2)
     with pytest.raises(SetupError, match="step before reset"):
         env.step(np.zeros((6, 4)))
     env.reset()
-    with pytest.raises(CommandError):
+    with pytest.raises(CommandError, match=message):
         env.step(actions)
     assert [world.warehouse.state.step for world in env.worlds] == [0, 0]
 
 
-def test_the_end_of_an_episode_tells_indicators_and_references(small: Small) -> None:
-    env = SwarmVecEnv(
-        make_env=lambda world: IndicatorReward(
-            SwarmLogisticsEnv(**small, n_robots=3), "R", references=20.0
-        ),
-        n_worlds=2,
-        seed=0,
-    )
+def test_the_end_of_an_episode_tells_indicators_and_references() -> None:
+    def make_env(world: int) -> Any:
+        return IndicatorReward(small(n_robots=3), "R", references=20.0)
+
+    env = SwarmVecEnv(make_env=make_env, n_worlds=2, seed=0)
     env.set_options([{}, {"faults": [Fault("FM1", 2)]}])
     env.reset()
     returns = np.zeros(6)
@@ -273,10 +249,8 @@ def test_the_end_of_an_episode_tells_indicators_and_references(small: Small) -> 
         _, rewards, _, infos = env.step(np.zeros((6, 4)))
         returns += rewards
     assert infos[0]["R_tested"] == infos[0]["R"] == 0
-    assert infos[3]["R_tested"] == 1
+    assert (infos[3]["R_tested"], infos[3]["R_P_o"], infos[3]["n_failed"]) == (1, 20.0, 2)
     assert infos[3]["R"] == pytest.approx(-1 + 2 / 3)
-    assert infos[3]["R_P_o"] == 20.0
-    assert infos[3]["n_failed"] == 2
     assert returns == pytest.approx([0.0] * 3 + [-1 + 2 / 3] * 3)
 
 

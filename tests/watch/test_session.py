@@ -1,36 +1,31 @@
 from __future__ import annotations
 
+import base64
+import json
+import re
+import zlib
+
 import numpy as np
 import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
 from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
-from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.messages import observation_parts
+from swarm_logistics_env.watch.messages import Recording, frame, observation_parts
 
 SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
-
-
-def swarm_dt() -> Policy:
-    return policies.load("swarm-dt")
-
-
-def finish(session: Session) -> None:
-    session.play(1e6)
-    assert session.is_over
 
 
 def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
     scenario = SMALL.replace(duration=60.0)
     faults = [Fault("FM4", 3, onset=5.0)]
     session = Session(scenario, seed=2, faults=faults)
-    finish(session)
-    with_faults = run_episode(scenario, swarm_dt(), 2, faults)
-    without = run_episode(scenario, swarm_dt(), 2)
+    session.play(1e6)
+    assert session.is_over
     run, twin = (play.world.state.delivery_times for play in (session.run, session.beside))
-    assert run == with_faults.delivery_times.tolist()
-    assert twin == without.delivery_times.tolist()
+    for times, these in ((run, faults), (twin, [])):
+        episode = run_episode(scenario, policies.load("swarm-dt"), 2, these)
+        assert times == episode.delivery_times.tolist()
     assert run != twin
 
 
@@ -104,27 +99,21 @@ def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
 
 def test_breaking_twice_in_a_mode_is_once() -> None:
     session = Session(SMALL)
-
-    def modes() -> list[str]:
-        return list(session.run.world.state.failure_modes[1])
-
-    session.break_robot(1)
-    session.break_robot(1)
-    assert modes() == ["FM4"]
-    assert "already" in session.note
-    session.choose_mode("FM1")
-    session.break_robot(1)
-    assert modes() == ["FM4", "FM1"]
-    session.repair_robot(1)
-    assert modes() == []
-    session.repair_robot(1)
-    assert "sound" in session.note
     session.break_robot()
     assert session.note == "click a robot first"
-    finish(session)
-    session.break_robot(2)
-    assert "over" in session.note
-    assert not session.run.world.state.failed.any()
+    for act, modes, said in (
+        (lambda: session.break_robot(1), ("FM4",), "fails"),
+        (lambda: session.break_robot(1), ("FM4",), "already"),
+        (lambda: session.choose_mode("FM1"), ("FM4",), ""),
+        (lambda: session.break_robot(1), ("FM4", "FM1"), "FM1"),
+        (lambda: session.repair_robot(1), (), "repaired"),
+        (lambda: session.repair_robot(1), (), "sound"),
+        (lambda: session.play(1e6), (), ""),
+        (lambda: session.break_robot(1), (), "over"),
+    ):
+        act()
+        assert session.run.world.state.failure_modes[1] == modes
+        assert said in session.note
 
 
 def test_swarm_size_begins_again_and_says_so() -> None:
@@ -132,8 +121,8 @@ def test_swarm_size_begins_again_and_says_so() -> None:
     session.play(2.0)
     session.select(7)
     session.resize(5)
-    assert session.run.world.state.time == 0.0
-    assert session.run.world.state.n_robots == session.beside.world.state.n_robots == 5
+    for play in (session.run, session.beside):
+        assert (play.world.state.time, play.world.state.n_robots) == (0.0, 5)
     assert session.seed == 3
     assert session.selected is None
     assert "began again" in session.note
@@ -149,17 +138,15 @@ def test_delivery_width_changes_at_once_in_both() -> None:
     session = Session(SMALL)
     session.play(2.0)
     session.set_delivery_width(3.0)
+    session.set_delivery_width(5.0)
+    assert "leaves no storage" in session.note
     for play in (session.run, session.beside):
         assert play.world.scenario.delivery_width == 3.0
         assert play.world.state.time == pytest.approx(2.0)
-    session.set_delivery_width(5.0)
-    assert "leaves no storage" in session.note
-    assert session.scenario.delivery_width == session.beside.world.scenario.delivery_width == 3.0
 
 
 def test_next_seed_and_again() -> None:
     session = Session(SMALL)
-    assert session.choices[0] == "swarm-dt"
     start = session.run.world.state.robot_position.copy()
     session.play(1.0)
     session.break_robot(0)
@@ -167,22 +154,10 @@ def test_next_seed_and_again() -> None:
     assert session.seed == 1
     assert session.events == []
     assert not np.array_equal(session.run.world.state.robot_position, start)
+    session.play(1.0)
     session.restart()
     assert session.seed == 1
     assert session.run.world.state.time == 0.0
-
-
-def test_wrong_arguments() -> None:
-    with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
-        Session(SMALL, speed=3.0)
-    with pytest.raises(FaultError, match="at most n_robots = 8"):
-        Session(SMALL, seed=0, faults=[Fault("FM1", 9)])
-    session = Session(SMALL)
-    with pytest.raises(FaultError, match="did you mean 'FM4'"):
-        session.choose_mode("FM44")
-    for robot in (-1, 8):
-        with pytest.raises(SetupError, match=f"robot = {robot}"):
-            session.select(robot)
 
 
 class Wrong:
@@ -193,13 +168,24 @@ class Wrong:
         return np.zeros((1, 1))
 
 
-def test_policy_that_cannot_be_is_named() -> None:
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
+        Session(SMALL, speed=3.0)
+    with pytest.raises(FaultError, match="at most n_robots = 8"):
+        Session(SMALL, seed=0, faults=[Fault("FM1", 9)])
     with pytest.raises(PolicyError, match="Wrong at 0 s"):
         Session(SMALL, load=lambda _: Wrong()).step()
+    session = Session(SMALL)
+    with pytest.raises(FaultError, match="did you mean 'FM4'"):
+        session.choose_mode("FM44")
+    for robot in (-1, 8):
+        with pytest.raises(SetupError, match=f"robot = {robot}"):
+            session.select(robot)
 
 
 def test_policies_are_compared_with_the_same_faults() -> None:
     session = Session(SMALL, against="homing", seed=3)
+    assert session.choices[:2] == ("swarm-dt", "homing")
     session.break_robot(2)
     assert session.beside.world.state.failure_modes[2] == ("FM4",)
     session.compare("homing")
@@ -222,3 +208,23 @@ def test_observation_has_all_parts_and_only_what_is_present() -> None:
         assert found["range_walls"] == pytest.approx(parts["range_walls"].tolist(), abs=0.0051)
         assert len(found["item_x"]) == int(parts["item_present"].sum())
         assert found["carrying"] == parts["carrying"].tolist()
+        session.select(robot)
+        beams = [parts[f"range_{what}"] for what in ("robots", "walls", "items")]
+        nearest = np.min(beams, axis=0).tolist()
+        assert frame(session)["selected"]["beams"] == pytest.approx(nearest, abs=0.00051)
+
+
+def test_a_recording_begins_anew_with_each_episode() -> None:
+    session = Session(SMALL)
+    recording = Recording(session)
+    for _ in range(2):
+        recording.note()
+        for _ in range(20):
+            session.advance()
+            recording.note()
+        session.next_seed()
+    recording.note()
+    (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())
+    first, *others = json.loads(zlib.decompress(base64.b64decode(packed)))["frames"]
+    assert (first["seed"], first["time"]) == (2, 0.0)
+    assert others == []
