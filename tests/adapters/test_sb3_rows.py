@@ -24,40 +24,62 @@ from swarm_logistics_env.adapters import sb3
 from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
 
-def test_rows_are_the_worlds_own_over_several_episodes() -> None:
-    env = worlds(3, [3, 5], seed=7)
-    assert env.num_envs == 3 + 5 + 3
-    own = [small(n_robots=size) for size in (3, 5, 3)]
-    rng = np.random.default_rng(0)
+def unlike(world: int) -> Any:
+    """Return one of several worlds: whole, smaller than its largest, or one that robots leave."""
+    if world == 1:
+        return SwarmSize(small(n_robots=5), [2, 5])
+    return small(n_robots=3, faults=[Fault("removed", (1,), onset=0.5)] if world else [])
+
+
+def test_rows_are_the_worlds_own_over_several_episodes_and_padding_is_zeros() -> None:
+    env = SwarmVecEnv(make_env=unlike, n_worlds=3, seed=7)
+    own, rng = [unlike(world) for world in range(3)], np.random.default_rng(0)
     first = [world.reset_arrays(key(7, "world", w) >> 1) for w, world in enumerate(own)]
-    np.testing.assert_array_equal(env.reset(), np.concatenate(first))
-    shown = np.zeros(0)
-    for step in range(1, 48):
+    shown, kept = env.reset(), np.zeros(0)
+    assert shown.shape == (3 + 5 + 3, 140)
+    assert env.rows_of_worlds == [slice(0, 3), slice(3, 8), slice(8, 11)]
+    for world, rows in zip(env.rows_of_worlds, first):
+        np.testing.assert_array_equal(shown[world][: len(rows)], rows)
+    sizes = set()
+    for _ in range(125):
         kept = shown.copy()
         actions = rng.uniform(-1, 1, (11, 4)).astype(np.float32)
+        there = env.present
         observations, rewards, dones, infos = env.step(actions)
-        parts = np.split(actions, [3, 8])
-        outcomes = [world.step_arrays(part) for world, part in zip(own, parts)]
-        last = np.concatenate([outcome[0] for outcome in outcomes])
-        np.testing.assert_array_equal(rewards, np.concatenate([o[1] for o in outcomes]))
-        is_end = step % 20 == 0
-        assert dones.all() == dones.any() == is_end
-        for row, (info, world) in enumerate(zip(infos, [0] * 3 + [1] * 5 + [2] * 3, strict=True)):
-            about = {
-                "TimeLimit.truncated": is_end, "padding": False, "failed": 0, "world": world,
-                "n_robots": 5 if world == 1 else 3, "delivered": info["delivered"],
-            }  # fmt: skip
-            if is_end:
-                np.testing.assert_array_equal(info.pop("terminal_observation"), last[row])
-                assert info.pop("episode")["l"] == 20
-            assert info == about
-        if is_end:
-            last = np.concatenate([world.reset_arrays() for world in own])
-        np.testing.assert_array_equal(observations, last)
         np.testing.assert_array_equal(shown, kept)  # what was returned stays as it was
         shown = observations
         assert observations.dtype == rewards.dtype == np.float32
-        assert env.observation_space.contains(observations[0])
+        assert not observations[~env.present].any()
+        for number, (world, place) in enumerate(zip(own, env.rows_of_worlds)):
+            n = world.warehouse.state.n_robots
+            sizes.add((number, n))
+            rows, paid, ended, cut = world.step_arrays(actions[place][:n])
+            is_over = not world.agents
+            failed, told = world.warehouse.state.failed.tolist(), world.episode_info
+            assert rewards[place].tolist() == [*paid.tolist(), *[0.0] * (len(there[place]) - n)]
+            for robot, info in enumerate(infos[place]):
+                is_robot = robot < n
+                done = is_over or (is_robot and bool(ended[robot]))
+                assert dones[place][robot] == done
+                if done:
+                    last = rows[robot] if is_robot else np.zeros(140)
+                    np.testing.assert_array_equal(info.pop("terminal_observation"), last)
+                    assert ("episode" in info) == bool(there[place][robot])
+                    info.pop("episode", None)
+                assert info == {
+                    "TimeLimit.truncated": is_robot and done and bool(cut[robot]),
+                    "padding": not there[place][robot], "world": number, "n_robots": n,
+                    "failed": int(is_robot and failed[robot]), **told,
+                }  # fmt: skip
+            if is_over:
+                rows = world.reset_arrays()
+            present = world.warehouse.state.robot_present
+            assert env.present[place].tolist() == [
+                *present,
+                *[False] * (len(there[place]) - len(present)),
+            ]
+            np.testing.assert_array_equal(observations[place][: len(rows)], rows)
+    assert sizes == {(0, 3), (1, 2), (1, 5), (2, 3)}
 
 
 def test_a_seed_fixes_all_episodes_and_no_seed_none() -> None:
@@ -71,48 +93,6 @@ def test_a_seed_fixes_all_episodes_and_no_seed_none() -> None:
     assert not np.array_equal(other.reset(), trace[0])
     other.seed(1)
     assert not np.array_equal(other.reset(), trace[0])
-
-
-def test_a_removed_robot_is_done_once_and_then_padding() -> None:
-    env = worlds(2, faults=[Fault("removed", (1,), onset=0.5)])
-    env.reset()
-    for step in range(1, 41):
-        observations, rewards, dones, infos = env.step(np.ones((6, 4)))
-        in_episode = (step - 1) % 20 + 1
-        if in_episode == 5:
-            assert dones.tolist() == [False, True, False] * 2
-            assert infos[1]["TimeLimit.truncated"] is infos[1]["padding"] is False
-            assert [info["failed"] for info in infos] == [0, 1, 0] * 2
-            assert infos[1]["terminal_observation"].shape == env.observation_space.shape
-            assert env.present.tolist() == [True, False, True] * 2
-        elif in_episode == 20:
-            assert dones.all()
-            assert [info["TimeLimit.truncated"] for info in infos] == [True, False, True] * 2
-            assert [info["padding"] for info in infos] == [False, True, False] * 2
-            assert observations.any(axis=1).all()
-            assert env.present.all()
-        else:
-            assert not dones.any()
-        if 5 <= in_episode < 20:
-            assert not observations[[1, 4]].any()
-            assert not rewards[[1, 4]].any()
-
-
-def test_a_smaller_swarm_leaves_padding() -> None:
-    env = SwarmVecEnv(make_env=lambda _: SwarmSize(small(), [2, 5]), n_worlds=1, seed=0)
-    sizes = set()
-    observations = env.reset()
-    for _ in range(8 * 20):
-        n_robots = env.worlds[0].warehouse.state.n_robots
-        sizes.add(n_robots)
-        assert env.present.sum() == n_robots
-        assert not observations[n_robots:].any()
-        observations, _, dones, infos = env.step(np.zeros((5, 4)))
-        if dones.any():
-            assert dones.all()
-            assert [info["padding"] for info in infos] == [row >= n_robots for row in range(5)]
-            assert infos[0]["n_robots"] == n_robots
-    assert sizes == {2, 5}
 
 
 def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world() -> None:
