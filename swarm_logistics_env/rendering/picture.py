@@ -204,7 +204,6 @@ def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float)
 
 # The widest texts there may be, so that a picture's size does not change with what happens.
 _WIDEST = ("time 0000.0 s", "N = 000", "P = 000 of 000", "requested: item 000")
-_MOST_LEGEND_LINES = 2
 
 
 class Caption:
@@ -225,13 +224,7 @@ class Caption:
         self._legend_places = self._flow(self._legend)
         self._failures_line = self._places[-1][1] + 1
         self._legend_line = self._failures_line + 1
-        lines = self._legend_line
-        legend_lines = self._legend_places[-1][1] + 1
-        if legend_lines <= _MOST_LEGEND_LINES:
-            lines += legend_lines
-        else:
-            self._legend = ()
-        self.height = lines * self._line
+        self.height = (self._legend_line + self._legend_places[-1][1] + 1) * self._line
 
     @staticmethod
     def least_width(text_height: int) -> int:
@@ -239,7 +232,7 @@ class Caption:
         return max(words(text, text_height, palette.INK).get_width() for text in _WIDEST)
 
     def draw_legend(self, canvas: pygame.Surface) -> None:
-        """Draw what the colours mean, which never changes, where there is room for it."""
+        """Draw what the colours mean, which never changes."""
         for entry, (x, line) in zip(self._legend, self._legend_places):
             self._put(canvas, entry, x, self._legend_line + line)
 

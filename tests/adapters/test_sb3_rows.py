@@ -35,7 +35,7 @@ def test_rows_are_the_worlds_own_over_several_episodes_and_padding_is_zeros() ->
     env = SwarmVecEnv(make_env=unlike, n_worlds=3, seed=7)
     own, rng = [unlike(world) for world in range(3)], np.random.default_rng(0)
     first = [world.reset_arrays(key(7, "world", w) >> 1) for w, world in enumerate(own)]
-    shown, kept = env.reset(), np.zeros(0)
+    shown = env.reset()
     assert shown.shape == (3 + 5 + 3, 140)
     assert env.rows_of_worlds == [slice(0, 3), slice(3, 8), slice(8, 11)]
     for world, rows in zip(env.rows_of_worlds, first):

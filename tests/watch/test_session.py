@@ -4,12 +4,19 @@ import base64
 import json
 import re
 import zlib
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
-from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
+from swarm_logistics_env.errors import (
+    FaultError,
+    PolicyError,
+    ScenarioError,
+    SetupError,
+    SwarmLogisticsError,
+)
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.messages import Recording, frame, observation_parts
 
@@ -99,47 +106,48 @@ def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
 
 def test_breaking_twice_in_a_mode_is_once() -> None:
     session = Session(SMALL)
-    session.break_robot()
-    assert session.note == "click a robot first"
-    for act, modes, said in (
+    with pytest.raises(SetupError, match="none is selected"):
+        session.break_robot()
+    acts: list[tuple[Callable[[], object], tuple[str, ...], str]] = [
         (lambda: session.break_robot(1), ("FM4",), "fails"),
         (lambda: session.break_robot(1), ("FM4",), "already"),
         (lambda: session.choose_mode("FM1"), ("FM4",), ""),
         (lambda: session.break_robot(1), ("FM4", "FM1"), "FM1"),
         (lambda: session.repair_robot(1), (), "repaired"),
         (lambda: session.repair_robot(1), (), "sound"),
-        (lambda: session.play(1e6), (), ""),
-        (lambda: session.break_robot(1), (), "over"),
-    ):
+    ]
+    for act, modes, said in acts:
         act()
         assert session.run.world.state.failure_modes[1] == modes
         assert said in session.note
+    session.play(1e6)
+    with pytest.raises(SetupError, match="the run is over"):
+        session.break_robot(1)
 
 
 def test_swarm_size_begins_again_and_says_so() -> None:
-    session = Session(SMALL, seed=3, faults=[Fault("FM2", 6), Fault("FM1", 1)])
+    session = Session(SMALL, seed=3, faults=[Fault("FM2", 5), Fault("FM1", 1)])
     session.play(2.0)
     session.select(7)
+    for n_robots, complaint in ((0, "n_robots = 0"), (4, "Fault.robots = 5: should be at most")):
+        with pytest.raises(SwarmLogisticsError, match=complaint):
+            session.resize(n_robots)
+        assert session.scenario.n_robots == 8
     session.resize(5)
     for play in (session.run, session.beside):
         assert (play.world.state.time, play.world.state.n_robots) == (0.0, 5)
     assert session.seed == 3
     assert session.selected is None
     assert "began again" in session.note
-    assert "1 fault" in session.note
-    session.resize(0)
-    assert "n_robots = 0" in session.note
-    assert session.scenario.n_robots == 5
-    session.resize(6)
-    assert session.run.world.state.failed.sum() == 6
+    assert session.run.world.state.failed.sum() == 5
 
 
 def test_delivery_width_changes_at_once_in_both() -> None:
     session = Session(SMALL)
     session.play(2.0)
     session.set_delivery_width(3.0)
-    session.set_delivery_width(5.0)
-    assert "leaves no storage" in session.note
+    with pytest.raises(ScenarioError, match="leaves no storage"):
+        session.set_delivery_width(5.0)
     for play in (session.run, session.beside):
         assert play.world.scenario.delivery_width == 3.0
         assert play.world.state.time == pytest.approx(2.0)
