@@ -155,27 +155,24 @@ def test_any_command_is_taken_or_refused(data: st.DataObject) -> None:
 
 
 @given(
-    st.sampled_from(["faults", "size", "change"]),
+    st.sampled_from(["faults", "own faults", "size", "change"]),
     st.sampled_from([*sorted(Scenario.model_fields), *FAILURE_MODES, "abc"]) | junk,
     st.lists(junk, max_size=3) | junk,
     junk,
+    junk,
 )
-def test_any_wrapper_runs_or_is_refused(kind: str, name: Any, values: Any, time: Any) -> None:
+def test_any_fault_and_wrapper_runs_or_is_refused(
+    kind: str, name: Any, values: Any, time: Any, length: Any
+) -> None:
     env = SwarmLogisticsEnv(SMALL)
     make: dict[str, Callable[[], Any]] = {
         "faults": lambda: FaultInjection(env, name, values, onset=time),
+        "own faults": lambda: SwarmLogisticsEnv(SMALL, faults=[Fault(name, values, time, length)]),
         "size": lambda: SwarmSize(env, values, leave=[(1, time)]),
         "change": lambda: ParameterChange(env, name, values, at=time),
     }
     with refused_in_a_sentence_or_not():
         play(make[kind](), seed=0)
-
-
-@FEWER
-@given(st.lists(st.tuples(st.sampled_from([*FAILURE_MODES, "FM9"]), junk, junk, junk, junk)))
-def test_any_fault_runs_or_is_refused(drawn: list[tuple[Any, ...]]) -> None:
-    with refused_in_a_sentence_or_not():
-        play(SwarmLogisticsEnv(SMALL, faults=[Fault(*fault) for fault in drawn]), seed=0)
 
 
 def possible(drawn: list[Fault]) -> bool:

@@ -186,33 +186,46 @@ def test_a_reset_that_leaves_nobody_is_refused(n_robots: int) -> None:
     assert len(env.reset(seed=0)[0]) == 1
 
 
-ENDS: dict[str, dict[str, Any]] = {
-    "time": {"n_robots": 2, "max_cycles": 2},
-    "everything delivered": {"scenario": REACHABLE},
-    "nobody left": {"n_robots": 2, "faults": [Fault("removed", (0, 1), onset=0.1)]},
-}
+@pytest.mark.parametrize(
+    ("arguments", "is_cut", "steps"),
+    [
+        ({"duration": 1.0}, True, 10),
+        ({"max_cycles": 7}, True, 7),
+        ({"duration": 0.5, "max_cycles": 7}, True, 5),
+        ({"scenario": REACHABLE}, False, None),
+        ({"scenario": REACHABLE, "restock": True, "duration": 20.0}, True, 200),
+        ({"faults": [Fault("removed", (0, 1), onset=0.1)]}, False, 1),
+    ],
+)
+def test_all_end_together_and_a_step_after_that_is_refused_and_moves_nothing(
+    arguments: dict[str, Any], is_cut: bool, steps: int | None
+) -> None:
+    env = parallel_env(**{"n_robots": 2, **arguments})
 
+    def refused(when: str) -> None:
+        for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
+            with pytest.raises(SetupError, match=rf"step {when}: call reset"):
+                step()
 
-@pytest.mark.parametrize("end", ENDS)
-def test_a_step_after_the_end_is_refused_and_moves_nothing(end: str) -> None:
-    env = parallel_env(**ENDS[end])
-    for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
-        with pytest.raises(SetupError, match="step before reset: call reset"):
-            step()
-    env.reset(seed=0)
-    while env.agents:
-        _, _, terminated, truncated, _ = env.step(east(env))
-    assert set(terminated.values()) == {end != "time"}
-    assert set(truncated.values()) == {end == "time"}
-    before, time = env.state(), env.warehouse.state.time
-    for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
-        with pytest.raises(SetupError, match=r"step after the end of the episode: call reset"):
-            step()
-    assert env.warehouse.state.time == time
-    np.testing.assert_array_equal(env.state(), before)
-    assert env.state_space.contains(env.state())
-    assert len(env.reset(seed=1)[0]) == 2
-    env.step(east(env))
+    refused("before reset")
+    for _ in range(2):
+        env.reset(seed=0)
+        total, step = 0.0, 0
+        while env.agents:
+            _, rewards, terminated, truncated, infos = env.step(east(env))
+            step += 1
+            total += rewards["robot_0"]
+            assert env.warehouse.state.time == pytest.approx(0.1 * step)
+            assert set(terminated.values()) == {not env.agents and not is_cut}
+            assert set(truncated.values()) == {not env.agents and is_cut}
+        assert steps in (None, step)
+        assert total == infos["robot_1"]["delivered"]
+        assert (total > 0.0) == ("scenario" in arguments)
+        before = env.state()
+        refused("after the end of the episode")
+        assert env.warehouse.state.step == step
+        np.testing.assert_array_equal(env.state(), before)
+        assert env.state_space.contains(env.state())
 
 
 def test_unknown_options_are_ignored_with_a_warning_unless_a_known_one_is_nearly_meant() -> None:
@@ -248,39 +261,6 @@ def test_a_removed_robot_terminates_once_and_leaves() -> None:
     for others in ({}, {"robot_1": np.zeros(4)}):
         observations, *_ = env.step({**still(env), **others})
         assert list(observations) == ["robot_0", "robot_2"]
-
-
-@pytest.mark.parametrize("restock", [False, True])
-def test_everybody_terminates_when_everything_is_delivered(restock: bool) -> None:
-    env = parallel_env(REACHABLE, restock=restock, duration=20.0)
-    env.reset(seed=0)
-    total = 0.0
-    while True:
-        _, rewards, terminated, truncated, infos = env.step(east(env))
-        total += rewards["robot_0"]
-        if not env.agents:
-            break
-        assert not any(terminated.values())
-    assert set(terminated.values()) == {not restock}
-    assert set(truncated.values()) == {restock}
-    assert total == infos["robot_1"]["delivered"]
-    assert total > 1.0 if restock else total == 1.0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "steps"),
-    [({"duration": 1.0}, 10), ({"max_cycles": 7}, 7), ({"duration": 0.5, "max_cycles": 7}, 5)],
-)
-def test_everybody_is_truncated_when_the_time_is_up(arguments: dict[str, Any], steps: int) -> None:
-    env = parallel_env(n_robots=2, **arguments)
-    for _ in range(2):  # a second episode is as long
-        env.reset(seed=0)
-        for step in range(1, steps + 1):
-            _, _, terminated, truncated, _ = env.step(still(env))
-            assert env.warehouse.state.time == pytest.approx(0.1 * step)
-            assert not any(terminated.values())
-            assert set(truncated.values()) == {step == steps}
-        assert env.agents == []
 
 
 def test_infos_tell_failures_while_they_hold_and_observations_do_not() -> None:

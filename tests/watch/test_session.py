@@ -36,18 +36,6 @@ def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
     assert run != twin
 
 
-def test_without_faults_run_and_twin_are_the_same() -> None:
-    session = Session(SMALL)
-    session.play(15.0)
-    run, twin = session.run.world.state, session.beside.world.state
-    assert np.array_equal(run.robot_position, twin.robot_position)
-    session.select(0)
-    session.break_robot()
-    session.play(3.0)
-    assert run.failed.tolist() == [True] + [False] * 7
-    assert not twin.failed.any()
-
-
 def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -> None:
     session = Session(SMALL, speed=4.0)
     for _ in range(10):
@@ -75,10 +63,13 @@ def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -
 def test_robot_breaks_and_is_repaired(mode: str) -> None:
     session = Session(SMALL)
     session.play(2.0)
+    run, twin = session.run.world.state, session.beside.world.state
+    assert np.array_equal(run.robot_position, twin.robot_position)
     session.choose_mode(mode)
     session.toggle_robot(3)
     world = session.run.world
     assert world.state.failure_modes[3] == (mode,)
+    assert not session.beside.world.state.failed.any()
     assert mode in session.note
     assert [(event.robot, event.mode) for event in session.events] == [(3, mode)]
     assert session.events[0].time == world.state.time

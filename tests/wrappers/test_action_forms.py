@@ -98,23 +98,19 @@ def test_numbers_of_numbers_and_central_control_by_numbers_are_refused() -> None
 
 def test_it_reads_and_commands_as_the_frame_of_the_shipped_networks_does() -> None:
     fields = {"n_robots": 4, "faults": [Fault("removed", 2, onset=0.5)], "duration": 1.0}
-    env, dicts, inner = MotionFrame(small(**fields)), MotionFrame(small(**fields)), small(**fields)
+    env, inner = MotionFrame(small(**fields)), small(**fields)
     frame = motion.MotionFrame(Scenario())
     rng = np.random.default_rng(0)
     for seed in (3, 4):
         read, rows = env.reset_arrays(seed), inner.reset_arrays(seed)
-        observations, _ = dicts.reset(seed=seed)
         frame.begin(row_keys(seed, "motion frame", 4))
         while env.agents:
             there = inner.warehouse.state.robot_present
             np.testing.assert_array_equal(read[there], frame.read(rows)[there])
             assert not read[~there].any()
-            for agent in env.agents:
-                np.testing.assert_array_equal(observations[agent], read[int(agent[6:])])
             outputs = rng.uniform(-1.0, 1.0, (4, 3))
             rows, *others = inner.step_arrays(frame.command(outputs))
             read, *rest = env.step_arrays(outputs)
-            observations, *_ = dicts.step({name: outputs[int(name[6:])] for name in dicts.agents})
             np.testing.assert_equal(rest, others)
         assert there.sum() == 2
 

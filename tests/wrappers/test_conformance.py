@@ -118,7 +118,7 @@ def test_a_copy_made_halfway_is_an_exact_twin(stack: str, copied: Callable[[Any]
         np.testing.assert_equal(env.reset(), twin.reset())
 
 
-@pytest.mark.parametrize("stack", PLAIN)
+@pytest.mark.parametrize("stack", [*PLAIN, "motion(sizes(faults))"])
 def test_arrays_and_dicts_are_one_environment(stack: str) -> None:
     dicts, arrays = stacked(stack, 6), stacked(stack, 6)
     rng = np.random.default_rng(0)
@@ -133,7 +133,7 @@ def test_arrays_and_dicts_are_one_environment(stack: str) -> None:
             assert arrays.agents == dicts.agents
             if not dicts.agents:
                 break
-            commands = rng.uniform(-1, 1, (len(rows[0]), 4))
+            commands = rng.uniform(-1, 1, (len(rows[0]), *dicts.action_space("robot_0").shape))
             *parts, _ = dicts.step({name: commands[int(name[6:])] for name in dicts.agents})
             rows = list(arrays.step_arrays(commands))
 
