@@ -21,6 +21,7 @@ from swarm_logistics_env.errors import (
 )
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
 from swarm_logistics_env.wrappers import FaultInjection
+from tests.wrappers.conftest import eastward
 
 # Everything is in reach of everybody, so that whoever drives east delivers.
 REACHABLE = Scenario(n_robots=2, n_items=1, pickup_range=14.0, duration=60.0)
@@ -32,12 +33,8 @@ def still(env: SwarmLogisticsEnv) -> dict[str, NDArray[np.float32]]:
 
 def east(env: SwarmLogisticsEnv) -> dict[str, NDArray[np.float64]]:
     """Return commands that hold on and drive to the delivery area."""
-    heading = env.warehouse.state.robot_heading
-    return {
-        agent: np.array([np.cos(heading[row]), -np.sin(heading[row]), 0.0, 1.0])
-        for row, agent in enumerate(env.possible_agents)
-        if agent in env.agents
-    }
+    commands = eastward(env)
+    return {agent: commands[int(agent[6:])] for agent in env.agents}
 
 
 def test_the_three_constructors_give_what_their_names_say() -> None:
@@ -236,9 +233,7 @@ def test_unknown_options_are_ignored_with_a_warning_unless_a_known_one_is_nearly
         assert len(observations) == 2
     for name, meant in (("fault", "faults"), ("FAULTS", "faults"), ("senario", "scenario")):
         for each in (env, FaultInjection(env, "FM1")):
-            with pytest.raises(
-                SetupError, match=f"no reset option '{name}'; did you mean '{meant}"
-            ):
+            with pytest.raises(SetupError, match=f"no reset option '{name}'; .* mean '{meant}'"):
                 each.reset(seed=0, options={name: ()})
 
 
@@ -284,8 +279,7 @@ def test_an_absent_robot_earns_nothing() -> None:
     env.reset(seed=0)
     ended, total = np.zeros(2, np.bool_), np.zeros(2)
     while not ended.any():
-        _, paid, ended, truncated = env.step_arrays([east(env)["robot_0"], np.zeros(4)])
-        assert not truncated.any()
+        _, paid, ended, _ = env.step_arrays([east(env)["robot_0"], np.zeros(4)])
         total += paid
     assert total.tolist() == [1.0, 0.0]
     assert ended.tolist() == [True, False]
