@@ -300,14 +300,6 @@ def test_the_environments_own_reward_can_be_kept_for_shaping() -> None:
     np.testing.assert_allclose(kept, 0.1 * rewards)
 
 
-def test_absent_robots_get_nothing() -> None:
-    env = rewarded({"R": 1.0, "P": 1.0}, RunningMeans())
-    env.reset_arrays(0, {"faults": [Fault("removed", (1,)), Fault("FM2", (0,))]})
-    for _ in range(20):
-        assert env.step_arrays(np.tile([0.5, 0, 0, 1.0], (N, 1)))[1][1] == 0
-    assert env.condition == Condition(N, ("FM2",), n_failed=1, n_removed=1)
-
-
 def changed(name: str, value: Any, env: Any = None) -> ParameterChange:
     return ParameterChange(env or busy(), name, value)
 
