@@ -18,7 +18,6 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import columns, unflatten
 from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.readings import activity, followed
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
@@ -163,7 +162,9 @@ def _arena(play: Play) -> dict[str, Any]:
         poses += [*positions[robot], round(1000 * float(state.robot_heading[robot]))]
         age = int(_TIMER_STEPS * ages[robot]) if ages[robot] < 1.0 else None
         mark = palette.mark(state.failure_modes[robot])
-        robots.append([activity(state, robot), age, mark, followed(state, scenario, robot)])
+        robots.append(
+            [palette.activity(state, robot), age, mark, palette.followed(state, scenario, robot)]
+        )
     requested = None
     if state.requested != NOBODY:
         place = _millimetres(state.item_position[state.requested][np.newaxis])[0]
@@ -189,7 +190,7 @@ def _selected(session: Session) -> dict[str, Any] | None:
     beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
     return {
         "robot": robot,
-        "activity": activity(state, robot),
+        "activity": palette.activity(state, robot),
         "modes": list(state.failure_modes[robot]),
         "beams": [round(float(reach), 3) for reach in beams],
         "reach": round(float(state.ranger_range[robot]), 3),

@@ -10,7 +10,7 @@ from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import FaultError, SetupError, suggest
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.rendering.readings import Event
+from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults

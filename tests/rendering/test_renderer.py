@@ -24,7 +24,6 @@ from swarm_logistics_env.rendering.palette import (
     SEARCHING,
     SHUFFLING,
 )
-from swarm_logistics_env.rendering.readings import Projection
 from swarm_logistics_env.warehouse import FAILURE_MODES, WarehouseState
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY
 from tests.rendering.conftest import Situation, situation
@@ -47,6 +46,8 @@ def frame(state: WarehouseState, scenario: Scenario, size: int = 400) -> Frame:
 
 def arena(state: WarehouseState, scenario: Scenario, size: int = 400) -> Frame:
     """The part of a picture that shows the warehouse: no caption, no margin."""
+    from swarm_logistics_env.rendering.picture import Projection  # loads pygame
+
     place = Projection.fitting(scenario, size, 0)
     return frame(state, scenario, size)[place.top : place.bottom, place.left : place.right]
 
@@ -172,6 +173,8 @@ def test_state_of_a_robot_has_its_colour() -> None:
 
 
 def test_heading_shows() -> None:
+    from swarm_logistics_env.rendering.picture import Projection
+
     state, scenario = situation([[2, 2]])
     east = frame(state, scenario)
     state.robot_heading[:] = np.pi

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
-from swarm_logistics_env.rendering.readings import followed
+from swarm_logistics_env.rendering.palette import followed
 from swarm_logistics_env.warehouse.state import NOBODY
 from tests.rendering.conftest import situation
 
