@@ -73,11 +73,17 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
     assert mode in session.note
     assert [(event.robot, event.mode) for event in session.events] == [(3, mode)]
     assert session.events[0].time == world.state.time
+    shown = frame(session)
+    assert shown["robots1"][3][2] == ""
     if mode == "removed":
         assert session.selected is None
+        assert shown["robots0"][3] is None
+        assert shown["poses0"][9:12] == [None] * 3
         with pytest.raises(SetupError, match="robot = 3"):
             session.repair_robot(3)
         return
+    assert shown["robots0"][3][2] == FAILURE_MODES[mode].mark
+    assert shown["poses0"][9:11] == np.rint(1000 * world.state.robot_position[3]).tolist()
     session.play(1.0)
     session.toggle_robot(3)
     assert not world.state.failed.any()
@@ -184,7 +190,7 @@ def test_what_cannot_be_is_refused() -> None:
 
 def test_policies_are_compared_with_the_same_faults() -> None:
     session = Session(SMALL, against="homing", seed=3)
-    assert session.choices[:2] == ("swarm-dt", "homing")
+    assert session.choices[:2] == session.names == ("swarm-dt", "homing")
     session.break_robot(2)
     assert session.beside.world.state.failure_modes[2] == ("FM4",)
     session.compare("homing")
