@@ -66,8 +66,6 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 f"env = {env} and {', '.join(arguments)}: should be an environment or the "
                 "arguments of one, not both"
             )
-        if env is not None and not hasattr(env, "reset_arrays"):
-            raise SetupError(f"env = {env!r}: should be a SwarmLogisticsEnv or a wrapper of one")
         self.env = SwarmLogisticsEnv(**arguments) if env is None else env
         self._rows = self.env if isinstance(self.env, FixedAgents) else FixedAgents(self.env)
         self.metadata = self.env.metadata

@@ -273,8 +273,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     def _of_rows(
         self, answer: Callable[[World], Any], indices: int | Iterable[int] | None
     ) -> list[Any]:
-        chosen = range(self.num_envs) if indices is None else indices
-        worlds = self._worlds.world_of[np.atleast_1d(np.fromiter(_each(chosen), np.int64))].tolist()
+        worlds = self._worlds.world_of[list(self._get_indices(indices))].tolist()
         answers = {world: answer(self.worlds[world]) for world in dict.fromkeys(worlds)}
         return [answers[world] for world in worlds]
 
@@ -319,10 +318,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         else:
             self._worlds.note_present(world)
         self._note(world)
-
-
-def _each(indices: int | Iterable[int]) -> Iterable[int]:
-    return indices if isinstance(indices, Iterable) else (indices,)
 
 
 class LogDeliveries(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
@@ -17,48 +16,6 @@ from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers import Wrapper
-
-_MOST_KEPT = 4
-
-
-def _references(arrays: Sequence[NDArray[np.float32]], place: int) -> int:
-    return sys.getrefcount(arrays[place])
-
-
-# The number of references to an array that only a list holds. It is counted here, because a call
-# adds another number of references in each version of Python.
-_HELD_BY_NOBODY = _references([np.empty(0, np.float32)], 0)
-
-
-class Buffers:
-    """Returns arrays; an old array is returned again once nothing refers to it or to a part of it.
-
-    The system would give new memory of this size page by page, and would take it back at once. With
-    two threads this costs as much as stepping a world.
-
-    Args:
-        shape: the shape of every array; the dtype is float32.
-    """
-
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self._shape = shape
-        self._kept: list[NDArray[np.float32]] = []
-
-    def zeros(self) -> NDArray[np.float32]:
-        """Return an array of zeros, which belongs to the caller."""
-        array = self.used()
-        array.fill(0.0)
-        return array
-
-    def used(self) -> NDArray[np.float32]:
-        """Return an array with its old contents, which belongs to the caller."""
-        for place in range(len(self._kept)):
-            if _references(self._kept, place) == _HELD_BY_NOBODY:
-                return self._kept[place]
-        new = np.zeros(self._shape, np.float32)
-        self._kept = [*self._kept[1 - _MOST_KEPT :], new]
-        return new
-
 
 World: TypeAlias = SwarmLogisticsEnv | Wrapper
 
@@ -120,7 +77,6 @@ class Worlds:
         self._begin_work()
 
     def _begin_work(self) -> None:
-        self._buffers = Buffers((self.n_rows, *self.observation_space.shape))
         self._pool = WorldThreadPool(
             [self._layers[world][-1].warehouse for world in self._shared_out],
             [self.rows[world].start for world in self._shared_out],
@@ -129,7 +85,7 @@ class Worlds:
 
     def blank(self) -> NDArray[np.float32]:
         """Return zeros for the observations of all rows, (R, D)."""
-        return self._buffers.zeros()
+        return np.zeros((self.n_rows, *self.observation_space.shape), np.float32)
 
     def begin(
         self,
@@ -175,7 +131,7 @@ class Worlds:
         """Take one control period in every world, with the commands that were given."""
         # New arrays, because the caller may still hold those of the step before.
         outcome = RowsStep(
-            self.blank() if self._has_padding() else self._buffers.used(),
+            self.blank(),
             np.zeros(self.n_rows, np.float32),
             np.zeros(self.n_rows, np.bool_),
             np.zeros(self.n_rows, np.bool_),
@@ -231,16 +187,12 @@ class Worlds:
         self.is_over[world] = not self.envs[world].agents
         self.told.append(world)
 
-    def _has_padding(self) -> bool:
-        """Return whether there are rows that no world fills in a step."""
-        return bool(self._alone) or sum(self._n_robots) < self.n_rows
-
     def _robots(self, world: int) -> slice:
         first = self.rows[world].start
         return slice(first, first + self._n_robots[world])
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_pool": None, "_buffers": None}
+        return {**self.__dict__, "_pool": None}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self.__dict__.update(saved)

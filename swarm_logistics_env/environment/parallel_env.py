@@ -111,13 +111,8 @@ class SwarmLogisticsEnv(DictView):
         self.next_seed = int(np.random.default_rng().integers(2**63))
         self.max_robots = max_robots
         if max_robots is not None:
-            is_number = isinstance(max_robots, int | np.integer)
-            if not is_number or max_robots < self.scenario.n_robots:
-                raise SetupError(
-                    f"max_robots = {max_robots!r}: should be None or a whole number of at least "
-                    f"n_robots = {self.scenario.n_robots}"
-                )
-            self.declare_spaces(self.scenario.replace(n_robots=int(max_robots)))
+            most = checked_count("max_robots", max_robots, self.scenario.n_robots)
+            self.declare_spaces(self.scenario.replace(n_robots=most))
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""

@@ -145,8 +145,8 @@ def checked_seed(seed: int) -> int:
         raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
 
 
-def checked_count(name: str, value: int) -> int:
-    """Return the value as an int of at least 1.
+def checked_count(name: str, value: int, least: int = 1) -> int:
+    """Return the value as an int of at least `least`.
 
     Raises:
         SetupError: it is none.
@@ -154,9 +154,9 @@ def checked_count(name: str, value: int) -> int:
     try:
         number = operator.index(value)
     except TypeError:
-        number = 0
-    if number < 1:
-        raise SetupError(f"{name} = {value!r}: should be a whole number of at least 1")
+        number = least - 1
+    if number < least:
+        raise SetupError(f"{name} = {value!r}: should be a whole number of at least {least}")
     return number
 
 

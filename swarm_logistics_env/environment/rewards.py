@@ -41,13 +41,11 @@ class RewardTerms:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
             finite_number(f"rewards[{name!r}]", weight)
         self._terms = [(REWARD_TERMS[name], weight) for name, weight in self.weights.items()]
-        self._follows_carrier = not _OF_CARRIER.isdisjoint(self.weights)
         self.pays_steadily = not _AT_DELIVERIES.issuperset(self.weights)
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""
-        self._before = Before(self._discount)
-        self._note(world)
+        self._before = Before(world, self._discount)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
         """Return what the step just taken earns each robot, (N,)."""
@@ -56,33 +54,24 @@ class RewardTerms:
             earned = term(world, self._before)
             if earned is not None:
                 total += weight * earned
-        self._note(world)
+        self._before = Before(world, self._discount)
         return total
-
-    def _note(self, world: Warehouse) -> None:
-        self._before.note(world, self._follows_carrier, not _OF_ITEMS.isdisjoint(self.weights))
 
 
 class Before:
-    """The state before a step, with which the terms compare the state after it."""
+    """The state before a step, with which the terms compare the state after it.
 
-    __slots__ = ("carrier", "carrier_x", "carriers", "delivered", "discount", "item_x", "requested")
+    Args:
+        world: the world in that state.
+        discount: the learner's, for terms that pay the change of a potential.
+    """
 
-    def __init__(self, discount: float) -> None:
-        self.discount = discount
-
-    def note(self, world: Warehouse, follows_carrier: bool, follows_items: bool) -> None:
-        """Store the state; of the requested item's carrier and of the items if a term reads it."""
-        self.delivered = len(world.state.delivery_times)
-        self.requested = world.state.requested
-        self.carrier, self.carrier_x = NOBODY, 0.0
-        if follows_carrier:
-            self.carrier = world.state.carrier
-            if self.carrier != NOBODY:
-                self.carrier_x = float(world.state.robot_position[self.carrier, 0])
-        if follows_items:
-            self.carriers = world.state.item_carrier.copy()
-            self.item_x = world.state.item_position[:, 0].copy()
+    def __init__(self, world: Warehouse, discount: float) -> None:
+        state, self.discount = world.state, discount
+        self.delivered, self.requested = len(state.delivery_times), state.requested
+        self.carrier = carrier = state.carrier
+        self.carrier_x = 0.0 if carrier == NOBODY else float(state.robot_position[carrier, 0])
+        self.carriers, self.item_x = state.item_carrier.copy(), state.item_position[:, 0].copy()
 
 
 Earned = NDArray[np.float64] | float | None  # per robot, the same for all, or nothing
@@ -229,8 +218,6 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
 }
 POTENTIALS = frozenset({"carrying", "carried_way"})
 _AT_DELIVERIES = {"delivery", "own_delivery"}
-_OF_CARRIER = {"lift_requested", "approach"} | POTENTIALS
-_OF_ITEMS = {"stocking"}
 
 
 def _discount_of(weights: dict[str, float]) -> float:

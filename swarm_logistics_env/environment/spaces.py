@@ -54,19 +54,6 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
     return np.concatenate([robots.ravel(), items.ravel(), [np.float32(state.time)]])
 
 
-def global_state_bounds(
-    scenario: Scenario, n_robots: int, n_items: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the lowest and highest vector that `global_state` gives in `scenario`."""
-    width, height, speed = scenario.warehouse_width, scenario.warehouse_height, scenario.max_speed
-    robot_low = [0, 0, 0, -1, -1, -speed, -speed, 0, 0, 0]
-    robot_high = [1, width, height, 1, 1, speed, speed, 1, 1, scenario.timer_limit]
-    item_high = [1, 1, width, height, 1]
-    low = [*(robot_low * n_robots), *([0] * len(item_high) * n_items), 0]
-    high = [*(robot_high * n_robots), *(item_high * n_items), scenario.duration + 1.0]
-    return np.array(low, np.float32), np.array(high, np.float32)
-
-
 # These fields bound the state: an episode may have at most the largest value declared.
 _BOUND_THE_STATE = (
     "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
@@ -82,15 +69,20 @@ class Spaces:
     Attributes:
         observation: the space of an observation row (D,).
         action: the space of a command (4 + message_size,).
-        n_items: the largest number of items in a declared scenario.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         low, high = bounds(scenario)
         self.observation = Box(low, high, dtype=np.float32)
         self.action = Box(-1.0, 1.0, (4 + scenario.message_size,), dtype=np.float32)
-        self.n_items = scenario.n_items
-        self._declared = [scenario]
+        self._own, self._declared = scenario, {scenario}
+        self._most = {name: getattr(scenario, name) for name in _BOUND_THE_STATE}
+
+    @property
+    def n_items(self) -> int:
+        """The largest number of items in a declared scenario."""
+        n_items: int = self._most["n_items"]
+        return n_items
 
     def widen(self, scenario: Scenario) -> None:
         """Widen the spaces for `scenario`.
@@ -102,21 +94,23 @@ class Spaces:
         if low.shape != self.observation.shape:
             raise SetupError(
                 f"message_size = {scenario.message_size}: should be the environment's own, "
-                f"{self._declared[0].message_size}, which its spaces are made for"
+                f"{self._own.message_size}, which its spaces are made for"
             )
         low = np.minimum(low, self.observation.low)
         high = np.maximum(high, self.observation.high)
         self.observation = Box(low, high, dtype=np.float32)
-        self.n_items = max(self.n_items, scenario.n_items)
-        self._declared.append(scenario)
+        for name, most in self._most.items():
+            self._most[name] = max(most, getattr(scenario, name))
+        self._declared.add(scenario)
 
     def state(self, n_robots: int) -> Box:
         """Return the space of the state with rows for `n_robots` and the most items."""
-        lows, highs = zip(
-            *(global_state_bounds(known, n_robots, self.n_items) for known in self._declared),
-            strict=True,
-        )
-        return Box(np.min(lows, axis=0), np.max(highs, axis=0), dtype=np.float32)
+        n_items, width, height, speed, limit, duration = self._most.values()
+        robot_low = [0, 0, 0, -1, -1, -speed, -speed, 0, 0, 0]
+        robot_high = [1, width, height, 1, 1, speed, speed, 1, 1, limit]
+        low = [*(robot_low * n_robots), *([0] * len(ITEM_FEATURES) * n_items), 0]
+        high = [*(robot_high * n_robots), *([1, 1, width, height, 1] * n_items), duration + 1.0]
+        return Box(np.array(low, np.float32), np.array(high, np.float32))
 
     def check(self, scenario: Scenario, n_possible: int) -> None:
         """Check that an episode in `scenario` stays within the spaces.
@@ -142,16 +136,13 @@ class Spaces:
         is_seen_within = low.shape == seen.shape and bool(
             (low >= seen.low).all() and (high <= seen.high).all()
         )
-        is_state_within = all(
-            getattr(scenario, name) <= max(getattr(known, name) for known in self._declared)
-            for name in _BOUND_THE_STATE
-        )
+        is_state_within = all(getattr(scenario, name) <= most for name, most in self._most.items())
         if is_seen_within and is_state_within:
             return
         changed = [
             f"{name} = {value}"
             for name, value in scenario.model_dump().items()
-            if value != getattr(self._declared[0], name)
+            if value != getattr(self._own, name)
         ]
         raise SetupError(
             f"{', '.join(changed)}: observations or states could leave their spaces; should be "

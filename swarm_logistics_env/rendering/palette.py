@@ -1,4 +1,6 @@
-"""Colours and marks: told apart by every kind of colour vision, and by lightness in print.
+"""Colours and marks, and what of a robot they show; pictures and the page in the browser use them.
+
+Colours are told apart by every kind of colour vision, and by lightness in print.
 
 Hues are Okabe and Ito's ("Color Universal Design", 2008). What has to be told apart at a glance
 differs in lightness or shape as well: grey levels of the three robot states are 213, 158 and 87.
@@ -6,7 +8,13 @@ differs in lightness or shape as well: grey levels of the three robot states are
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
+from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
 RGB = tuple[int, int, int]
 
@@ -63,9 +71,11 @@ _EDGES = (
 def film_colours() -> list[RGB]:
     """Return the colours of pictures that may have only a few: under 128, each once."""
     smooth = [
-        _mixed(one, other, (step + 1) / (steps + 1))
+        (red, green, blue)
         for one, other, steps in _EDGES
-        for step in range(steps)
+        for red, green, blue in np.rint(np.linspace(one, other, steps + 2)[1:-1])
+        .astype(int)
+        .tolist()
     ]
     return list(dict.fromkeys([*COLOURS.values(), *smooth]))
 
@@ -75,7 +85,42 @@ def mark(modes: tuple[str, ...]) -> str:
     return "+".join(MARKS.get(mode, mode) for mode in modes)
 
 
-def _mixed(colour: RGB, other: RGB, share: float) -> RGB:
-    """Return `colour` with a `share` in [0, 1] of `other`."""
-    red, green, blue = (round(a + (b - a) * share) for a, b in zip(colour, other, strict=True))
-    return red, green, blue
+def activity(state: WarehouseState, robot: int) -> str:
+    """Return what a robot does, a key of `ACTIVITIES`."""
+    item = int(state.robot_item[robot])
+    if item == NOBODY:
+        return "searching"
+    return "delivering" if item == state.requested else "shuffling"
+
+
+def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
+    """Return the neighbour whose timer is the lowest that `robot` hears, or NOBODY.
+
+    If several tell the same, it is the nearest of them.
+    """
+    if not (state.robot_present[robot] and state.hears[robot]):
+        return NOBODY
+    offset = state.robot_position - state.robot_position[robot]
+    square = (offset * offset).sum(axis=1)
+    heard = state.robot_present & state.sends & (square <= scenario.radio_range**2)
+    heard &= ~np.isnan(state.robot_told)
+    heard[robot] = False
+    candidates = np.flatnonzero(heard)
+    if not candidates.size:
+        return NOBODY
+    order = np.lexsort((square[candidates], state.robot_told[candidates]))
+    return int(candidates[order[0]])
+
+
+@dataclass(frozen=True)
+class Event:
+    """A robot that failed, or was repaired: a mark on the time axis."""
+
+    time: float  # [s]
+    robot: int
+    mode: str | None  # None if it was repaired
+
+    @property
+    def label(self) -> str:
+        """The text of the mark."""
+        return "ok" if self.mode is None else MARKS.get(self.mode, self.mode)

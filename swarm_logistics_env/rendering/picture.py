@@ -5,18 +5,69 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from operator import attrgetter
 
 import numpy as np
 import pygame
+from numpy.typing import NDArray
 
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
-from .readings import Projection, activity, followed
 from .sprites import Point, badge, blank, draw_line, new_canvas, stamp, words
+
+_MARGIN = 0.025  # a part of the picture's size, on each side
+
+
+@dataclass(frozen=True)
+class Projection:
+    """The warehouse's place on a picture, x to the right and y up, as on paper.
+
+    Attributes:
+        scale: [px/m].
+        left, top: the warehouse's upper left corner [px].
+        right, bottom: its lower right corner [px].
+        margin: between warehouse, caption and the picture's edges [px].
+    """
+
+    scale: float
+    left: int
+    top: int
+    right: int
+    bottom: int
+    margin: int
+
+    @classmethod
+    def fitting(cls, scenario: Scenario, size: int, least_width: int) -> Projection:
+        """Return the projection whose longer side is `size` [px], margins included.
+
+        A warehouse narrower than `least_width` [px], margins included, stands in the middle of it.
+        """
+        margin = max(6, round(_MARGIN * size))
+        width, height = scenario.warehouse_width, scenario.warehouse_height
+        scale = (size - 2 * margin) / max(width, height)
+        across, down = round(scale * width), round(scale * height)
+        left = max(margin, (least_width - across) // 2)
+        return cls(scale, left, margin, left + across, margin + down, margin)
+
+    @property
+    def width(self) -> int:
+        """Width of the picture [px]; even, which films want."""
+        width = self.right + self.left
+        return width + width % 2
+
+    def length(self, metres: float) -> float:
+        """Return a length in pixels."""
+        return metres * self.scale
+
+    def points(self, positions: NDArray[np.float64]) -> list[tuple[float, float]]:
+        """Return positions (K, 2) [m] as K pixels, not rounded."""
+        pixels = positions * (self.scale, -self.scale) + (self.left, self.bottom)
+        return [(x, y) for x, y in pixels.tolist()]
+
 
 # What decides the picture's layout.
 _shape = attrgetter(
@@ -63,7 +114,7 @@ class Picture:
         stored = np.flatnonzero(state.item_status == STORED).tolist()
         stamp(canvas, ((item, items[number]) for number in stored))
         carrier = state.carrier
-        if carrier != NOBODY and (leader := followed(state, scenario, carrier)) != NOBODY:
+        if carrier != NOBODY and (leader := palette.followed(state, scenario, carrier)) != NOBODY:
             _draw_arrow(canvas, robots[carrier], robots[leader], self._robot_radius)
         canvas.set_clip(None)
         self._draw_robots(state, robots)
@@ -111,7 +162,7 @@ class Picture:
         faulty, headings = state.failed.tolist(), state.robot_heading.tolist()
         carried = state.robot_item.tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            colour = palette.ACTIVITIES[activity(state, robot)]
+            colour = palette.ACTIVITIES[palette.activity(state, robot)]
             step = sprites.heading_step(headings[robot])
             body = sprites.robot(radius, colour, step, faulty[robot])
             stamps.append((body, robots[robot]))
@@ -174,9 +225,7 @@ def background(
     return surface
 
 
-def _hatched(
-    height: int, width: int, period: float
-) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+def _hatched(height: int, width: int, period: float) -> NDArray[np.uint8]:
     x, y = np.arange(width)[np.newaxis, :], np.arange(height)[:, np.newaxis]
     across = np.abs((x + y) / math.sqrt(2.0) % period - period / 2) - 0.06 * period
     cover = np.clip(0.5 - across, 0.0, 1.0)[..., np.newaxis]
@@ -204,7 +253,6 @@ def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float)
 
 # The widest texts there may be, so that a picture's size does not change with what happens.
 _WIDEST = ("time 0000.0 s", "N = 000", "P = 000 of 000", "requested: item 000")
-_MOST_LEGEND_LINES = 2
 
 
 class Caption:
@@ -225,13 +273,7 @@ class Caption:
         self._legend_places = self._flow(self._legend)
         self._failures_line = self._places[-1][1] + 1
         self._legend_line = self._failures_line + 1
-        lines = self._legend_line
-        legend_lines = self._legend_places[-1][1] + 1
-        if legend_lines <= _MOST_LEGEND_LINES:
-            lines += legend_lines
-        else:
-            self._legend = ()
-        self.height = lines * self._line
+        self.height = (self._legend_line + self._legend_places[-1][1] + 1) * self._line
 
     @staticmethod
     def least_width(text_height: int) -> int:
@@ -239,7 +281,7 @@ class Caption:
         return max(words(text, text_height, palette.INK).get_width() for text in _WIDEST)
 
     def draw_legend(self, canvas: pygame.Surface) -> None:
-        """Draw what the colours mean, which never changes, where there is room for it."""
+        """Draw what the colours mean, which never changes."""
         for entry, (x, line) in zip(self._legend, self._legend_places):
             self._put(canvas, entry, x, self._legend_line + line)
 

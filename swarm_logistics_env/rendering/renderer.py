@@ -73,7 +73,7 @@ class Renderer:
         self.mode = mode
         self._arguments = scenario, mode, size
         self._picture = Picture(scenario, size)
-        self._window: _Window | None = None
+        self._clock: pygame.time.Clock | None = None  # of the window, while it is open
         self._was_closed_by_user = False
 
     def frame(self, state: WarehouseState, scenario: Scenario) -> NDArray[np.uint8]:
@@ -94,17 +94,29 @@ class Renderer:
             raise SetupError(f"show with mode = {self.mode!r}: should be 'human'")
         if self._was_closed_by_user:
             return
-        self._window = self._window or _Window()
+        import pygame
+
+        if self._clock is None:
+            _open_display()
+            self._clock = pygame.time.Clock()
         picture = self._picture.draw(state, scenario)
-        if not self._window.show(picture, 1.0 / scenario.control_period):
+        screen = pygame.display.get_surface()
+        if screen is None or screen.get_size() != picture.get_size():
+            screen = pygame.display.set_mode(picture.get_size())
+        screen.blit(picture, (0, 0))
+        pygame.display.flip()
+        self._clock.tick(1.0 / scenario.control_period)
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self._was_closed_by_user = True
             self.close()
 
     def close(self) -> None:
         """Close the window, if any; harmless when called twice. A later `show` opens it anew."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
+        if self._clock is not None:
+            import pygame
+
+            pygame.display.quit()
+            self._clock = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Renderer, self._arguments
@@ -129,44 +141,23 @@ def load_pygame() -> None:
         ) from error
 
 
-class _Window:
-    """Shows pictures at a steady rate. There is one window per process: SDL's display.
+def _open_display() -> None:
+    """Begin to use the display: SDL has one in each process.
 
     Raises:
-        SetupError: there is no display.
+        SetupError: there is none.
     """
+    import pygame
 
-    def __init__(self) -> None:
-        import pygame
-
-        try:
-            pygame.display.init()
-        except pygame.error as error:
-            raise _no_display(str(error)) from error
-        # SDL falls back to a driver that shows nothing.
-        if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
-            pygame.display.quit()
-            raise _no_display("SDL found none")
-        pygame.display.set_caption("swarm-logistics")
-        self._clock = pygame.time.Clock()
-
-    def show(self, picture: pygame.Surface, rate: float) -> bool:
-        """Show a picture, wait until it is due at `rate` [1/s]; False once the user has closed."""
-        import pygame
-
-        screen = pygame.display.get_surface()
-        if screen is None or screen.get_size() != picture.get_size():
-            screen = pygame.display.set_mode(picture.get_size())
-        screen.blit(picture, (0, 0))
-        pygame.display.flip()
-        self._clock.tick(rate)
-        return not any(event.type == pygame.QUIT for event in pygame.event.get())
-
-    def close(self) -> None:
-        """Close the window; harmless when called twice."""
-        import pygame
-
+    try:
+        pygame.display.init()
+    except pygame.error as error:
+        raise _no_display(str(error)) from error
+    # SDL falls back to a driver that shows nothing.
+    if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
         pygame.display.quit()
+        raise _no_display("SDL found none")
+    pygame.display.set_caption("swarm-logistics")
 
 
 def _no_display(reason: str) -> SetupError:

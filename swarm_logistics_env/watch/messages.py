@@ -16,9 +16,8 @@ from pydantic import ConfigDict, ValidationError, validate_call
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.observations import columns
+from swarm_logistics_env.observations import columns, unflatten
 from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.rendering.readings import activity, followed, ranges
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
@@ -136,7 +135,7 @@ def observation_parts(
 
     Items and neighbours are listed only if present, the nearest first.
     """
-    parts = {column.name: row[column.columns] for column in columns(scenario)}
+    parts = unflatten(row, scenario)
     found = []
     for column in columns(scenario):
         values = parts[column.name]
@@ -163,7 +162,9 @@ def _arena(play: Play) -> dict[str, Any]:
         poses += [*positions[robot], round(1000 * float(state.robot_heading[robot]))]
         age = int(_TIMER_STEPS * ages[robot]) if ages[robot] < 1.0 else None
         mark = palette.mark(state.failure_modes[robot])
-        robots.append([activity(state, robot), age, mark, followed(state, scenario, robot)])
+        robots.append(
+            [palette.activity(state, robot), age, mark, palette.followed(state, scenario, robot)]
+        )
     requested = None
     if state.requested != NOBODY:
         place = _millimetres(state.item_position[state.requested][np.newaxis])[0]
@@ -184,15 +185,17 @@ def _selected(session: Session) -> dict[str, Any] | None:
     robot = session.selected
     if robot is None:
         return None
-    state, scenario = session.run.world.state, session.scenario
+    state, row = session.run.world.state, session.run.sensed(robot)
+    seen = unflatten(row, session.scenario)
+    beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
     return {
         "robot": robot,
-        "activity": activity(state, robot),
+        "activity": palette.activity(state, robot),
         "modes": list(state.failure_modes[robot]),
-        "beams": [round(float(r), 3) for r in np.min(ranges(state, scenario, robot), axis=0)],
+        "beams": [round(float(reach), 3) for reach in beams],
         "reach": round(float(state.ranger_range[robot]), 3),
         "view": round(float(state.view_range[robot]), 3),
-        "row": observation_parts(session.run.sensed(robot), scenario),
+        "row": observation_parts(row, session.scenario),
     }
 
 

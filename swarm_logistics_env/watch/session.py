@@ -8,15 +8,9 @@ from collections.abc import Callable, Sequence
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.errors import (
-    FaultError,
-    ScenarioError,
-    SetupError,
-    SwarmLogisticsError,
-    suggest,
-)
+from swarm_logistics_env.errors import FaultError, SetupError, suggest
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.rendering.readings import Event
+from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
@@ -66,9 +60,6 @@ class Session:
         load: Callable[[str], Policy] = policies.load,
     ) -> None:
         self.load, self._planned = load, checked_faults("faults", faults)
-        for fault in self._planned:
-            failed_robots(fault, seed, scenario.n_robots)
-        self.policy, self.against = policy, against
         named = [name for name in (policy, against) if name is not None]
         self.choices = tuple(dict.fromkeys([*named, *policies.NAMES]))
         self.paused, self.mode = False, "FM4"
@@ -76,7 +67,7 @@ class Session:
         self.selected: int | None = None
         self.note = ""
         self._due = 0.0  # control periods
-        self._begin(scenario, seed)
+        self._begin(scenario, seed, policy, against)
 
     @property
     def scenario(self) -> Scenario:
@@ -145,23 +136,17 @@ class Session:
         for name in filter(None, (policy, against)):
             if name not in self.choices:
                 raise SetupError(f"no policy {name!r} to choose{suggest(name, self.choices)}")
-        before = self.policy, self.against
-        self.policy, self.against = policy, against
-        try:
-            self.restart()
-        except SwarmLogisticsError:
-            self.policy, self.against = before
-            raise
+        self._begin(self.scenario, self.seed, policy, against)
+        self.note = f"seed {self.seed} again"
 
     def next_seed(self) -> None:
         """Begin an episode with the next seed."""
-        self._begin(self.scenario, self.seed + 1)
+        self._begin(self.scenario, self.seed + 1, self.policy, self.against)
         self.note = f"seed {self.seed}"
 
     def restart(self) -> None:
         """Begin the episode again, with the same seed, all robots as they were."""
-        self._begin(self.scenario, self.seed)
-        self.note = f"seed {self.seed} again"
+        self.compare(self.policy, self.against)
 
     # Robots
 
@@ -180,8 +165,6 @@ class Session:
     def break_robot(self, robot: int | None = None) -> None:
         """Let `robot` fail from now on in the chosen mode; None means the selected robot."""
         robot = self._meant(robot)
-        if robot is None:
-            return
         if self.mode in self.run.world.state.failure_modes[robot]:
             self.note = f"robot {robot} already fails in mode {self.mode}"
             return
@@ -195,8 +178,6 @@ class Session:
     def repair_robot(self, robot: int | None = None) -> None:
         """End all failures of `robot`; None means the selected robot."""
         robot = self._meant(robot)
-        if robot is None:
-            return
         world = self.run.world
         if not world.state.failed[robot]:
             self.note = f"robot {robot} is sound"
@@ -224,47 +205,30 @@ class Session:
 
     def resize(self, n_robots: int) -> None:
         """Begin the episode again with a swarm of that size."""
-        try:
-            scenario = self.scenario.replace(n_robots=n_robots)
-        except ScenarioError as error:
-            self.note = str(error)
-            return
-        self._begin(scenario, self.seed)
+        scenario = self.scenario.replace(n_robots=n_robots)
+        self._begin(scenario, self.seed, self.policy, self.against)
         self.note = f"swarm size {n_robots}: a swarm cannot grow in a run, so it began again"
-        left_out = len(self._planned) - len(self.run.world.faults)
-        if left_out:
-            self.note += f"; {left_out} faults affect more robots than there are: left out"
 
     def set_delivery_width(self, width: float) -> None:
         """Make the delivery area that wide [m], in both runs, at once."""
         width = round(width, 6)
-        try:
-            for play in (self.run, self.beside):
-                play.world.change(delivery_width=width)
-        except ScenarioError as error:
-            self.note = str(error)
-            return
+        for play in (self.run, self.beside):
+            play.world.change(delivery_width=width)
         self.note = f"delivery area {width:g} m wide"
 
-    def _begin(self, scenario: Scenario, seed: int) -> None:
+    def _begin(self, scenario: Scenario, seed: int, policy: str, against: str | None) -> None:
         # The faults name their robots, so that each robot can be repaired by itself.
-        faults = []
-        for fault in self._planned:
-            try:
-                robots = failed_robots(fault, seed, scenario.n_robots)
-            except FaultError:
-                continue
-            faults.append(fault.replace(robots=tuple(robots.tolist())))
-        run = Play(scenario, self.load(self.policy), seed, faults)
-        other = self.policy if self.against is None else self.against
-        others_faults = faults if self.against is not None else []
+        robots = [failed_robots(fault, seed, scenario.n_robots).tolist() for fault in self._planned]
+        faults = [fault.replace(robots=tuple(r)) for fault, r in zip(self._planned, robots)]
+        run = Play(scenario, self.load(policy), seed, faults)
+        other, others_faults = (policy, []) if against is None else (against, faults)
         self.beside = Play(scenario, self.load(other), seed, others_faults)
         self.run, self.seed, self._due = run, seed, 0.0
+        self.policy, self.against = policy, against
         self.events: list[Event] = [
             Event(fault.onset, robot, fault.mode)
-            for fault in faults
-            if isinstance(fault.robots, tuple)
-            for robot in fault.robots
+            for fault, those in zip(faults, robots)
+            for robot in those
         ]
         self._look_after_selection()
 
@@ -280,25 +244,21 @@ class Session:
             self.beside.world.set_faults(faults)
 
     def _look_after_selection(self) -> None:
-        present = self.run.world.state.robot_present
-        if self.selected is not None and not (
-            self.selected < len(present) and present[self.selected]
-        ):
+        robot, present = self.selected, self.run.world.state.robot_present
+        if robot is not None and not (robot < len(present) and present[robot]):
             self.selected = None
 
     def _log(self, robot: int, mode: str | None) -> None:
         self.events.append(Event(self.run.world.state.time, robot, mode))
 
-    def _meant(self, robot: int | None) -> int | None:
+    def _meant(self, robot: int | None) -> int:
         if robot is None:
             robot = self.selected
         if robot is None:
-            self.note = "click a robot first"
-            return None
+            raise SetupError("robot: none is selected, click one first")
         self._check_there(robot)
         if self.run.is_over:
-            self.note = "the run is over: begin the next seed, or this one again"
-            return None
+            raise SetupError("the run is over: begin the next seed, or this one again")
         return robot
 
     def _check_there(self, robot: int) -> None:

@@ -225,12 +225,9 @@ class ParameterChange(Wrapper):
         self.value: Any = None
         self.time: float | None = None
         self._is_due = False
-        before = self.env.scenarios
-        after = [known.replace(**{name: value}) for known in before for value in self._values.ends]
-        for scenario in after:
-            self.declare_spaces(scenario)
-        known = after if at is None else [*before, *after]
-        self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys(known))
+        before = () if at is None else self.env.scenarios
+        after = self._declared(name, self._values.ends)
+        self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys((*before, *after)))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with the parameter among them, if it holds throughout."""

@@ -151,15 +151,7 @@ class SwarmSize(Wrapper):
         self._departures = tuple(
             Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)
         )
-        self.scenarios: tuple[Scenario, ...] = tuple(
-            dict.fromkeys(
-                known.replace(n_robots=size)
-                for known in self.env.scenarios
-                for size in self._size.ends
-            )
-        )
-        for scenario in self.scenarios:
-            self.declare_spaces(scenario)
+        self.scenarios: tuple[Scenario, ...] = self._declared("n_robots", self._size.ends)
         sizes_announced = (scenario.n_robots for scenario in self.scenarios)
         largest = max(self.unwrapped.max_robots or 0, *sizes_announced)
         self.unwrapped.possible_agents = agent_names(range(largest))

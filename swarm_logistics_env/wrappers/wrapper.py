@@ -4,7 +4,7 @@ and quantities of an episode that are fixed, one of a list, or drawn from a dist
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -239,6 +239,14 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     @max_cycles.setter
     def max_cycles(self, cycles: int | None) -> None:
         self.unwrapped.max_cycles = cycles
+
+    def _declared(self, name: str, values: Iterable[Any]) -> tuple[Scenario, ...]:
+        """Declare the spaces of all scenarios with one of these values of a field; return them."""
+        known = self.env.scenarios
+        changed = dict.fromkeys(each.replace(**{name: value}) for each in known for value in values)
+        for scenario in changed:
+            self.declare_spaces(scenario)
+        return tuple(changed)
 
     def _place(self) -> int:
         """Return the number of wrappers of the same class inside; it gives each its own draws."""

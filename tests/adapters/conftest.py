@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmS
 if TYPE_CHECKING:
     from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
+# A world that is quickly played: 20 steps an episode.
 SMALL: dict[str, Any] = {
     "warehouse_width": 6.0,
     "warehouse_height": 5.0,
@@ -35,40 +36,28 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-@pytest.fixture
-def small() -> dict[str, Any]:
-    """Fields of a world that is quickly played: 20 steps an episode."""
-    return dict(SMALL)
+def small(**fields: Any) -> SwarmLogisticsEnv:
+    return SwarmLogisticsEnv(**{**SMALL, **fields})
 
 
-@pytest.fixture
-def wrapped() -> Callable[[int], Any]:
-    """Makes one of several worlds, each with faults and another swarm size."""
+def worlds(n_worlds: int, n_robots: Any = 3, **arguments: Any) -> SwarmVecEnv:
+    from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
-    def make_env(world: int) -> Any:
-        env: Any = SwarmLogisticsEnv(**SMALL, n_robots=4)
-        env = FaultInjection(env, "FM1", onset=[0.0, 0.5])
-        env = SwarmSize(env, [3, 6], leave=[(1, 0.7)])
-        return ParameterChange(env, "max_speed", [1.0, 2.0], at=0.3) if world % 2 else env
-
-    return make_env
+    return SwarmVecEnv(n_worlds=n_worlds, n_robots=n_robots, **{"seed": 0, **SMALL, **arguments})
 
 
-@pytest.fixture
-def played() -> Callable[[SwarmVecEnv, int], list[Any]]:
-    """Plays random steps after a reset, and returns all that they returned."""
+def wrapped(world: int) -> Any:
+    """Return one of several worlds, each with faults and another swarm size."""
+    env: Any = FaultInjection(small(n_robots=4), "FM1", onset=[0.0, 0.5])
+    env = SwarmSize(env, [3, 6], leave=[(1, 0.7)])
+    return ParameterChange(env, "max_speed", [1.0, 2.0], at=0.3) if world % 2 else env
 
-    def play(env: SwarmVecEnv, steps: int) -> list[Any]:
-        rng = np.random.default_rng(0)
-        trace: list[Any] = [env.reset()]
-        for _ in range(steps):
-            observations, rewards, dones, infos = env.step(rng.uniform(-1, 1, (env.num_envs, 4)))
-            trace += [observations, rewards, dones]
-            trace += [
-                info.get("terminal_observation", np.zeros(0))
-                for info, done in zip(infos, dones)
-                if done
-            ]
-        return trace
 
-    return play
+def played(env: SwarmVecEnv, steps: int) -> list[Any]:
+    """Play random steps after a reset, and return all that they returned."""
+    rng = np.random.default_rng(0)
+    trace: list[Any] = [env.reset()]
+    for _ in range(steps):
+        *arrays, infos = env.step(rng.uniform(-1, 1, (env.num_envs, 4)))
+        trace += [*arrays, [info.get("terminal_observation") for info in infos]]
+    return trace

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import doctest
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,9 @@ from swarm_logistics_env import Fault
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
 from swarm_logistics_env.streams import key
-from swarm_logistics_env.wrappers import (
-    IndicatorReward,
-    ParameterChange,
-    SwarmSize,
-)
+from swarm_logistics_env.wrappers import FaultInjection, IndicatorReward, ParameterChange, SwarmSize
+from tests.adapters.conftest import played, small, worlds, wrapped
+from tests.wrappers.conftest import eastward
 
 pytest.importorskip("stable_baselines3")
 
@@ -26,133 +23,102 @@ import torch
 from swarm_logistics_env.adapters import sb3
 from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 
-Played = Callable[[SwarmVecEnv, int], list[Any]]
-Small = dict[str, Any]
+
+def unlike(world: int) -> Any:
+    """Return a world with indicators, one smaller than its largest, or one that a robot leaves."""
+    if world == 0:
+        faulty = FaultInjection(small(n_robots=3), "FM1", 2)
+        return IndicatorReward(faulty, "R", references=20.0)
+    if world == 1:
+        return SwarmSize(small(n_robots=5), [2, 5])
+    return small(n_robots=3, faults=[Fault("removed", (1,), onset=0.5)])
 
 
-def test_rows_are_the_worlds_own_over_several_episodes(small: Small) -> None:
-    sizes = [3, 5]
-    env = SwarmVecEnv(n_worlds=3, n_robots=sizes, seed=7, **small)
-    assert env.num_envs == 3 + 5 + 3
-    worlds = [SwarmLogisticsEnv(**small, n_robots=size) for size in (3, 5, 3)]
-    rng = np.random.default_rng(0)
-    first = [world.reset_arrays(key(7, "world", w) >> 1) for w, world in enumerate(worlds)]
-    np.testing.assert_array_equal(env.reset(), np.concatenate(first))
-    shown = np.zeros(0)
-    for step in range(1, 48):
+def test_rows_are_the_worlds_own_over_several_episodes_and_padding_is_zeros() -> None:
+    env = SwarmVecEnv(make_env=unlike, n_worlds=3, seed=7)
+    own, rng = [unlike(world) for world in range(3)], np.random.default_rng(0)
+    first = [world.reset_arrays(key(7, "world", w) >> 1) for w, world in enumerate(own)]
+    shown = env.reset()
+    assert shown.shape == (3 + 5 + 3, 140)
+    assert env.rows_of_worlds == [slice(0, 3), slice(3, 8), slice(8, 11)]
+    for world, rows in zip(env.rows_of_worlds, first):
+        np.testing.assert_array_equal(shown[world][: len(rows)], rows)
+    sizes = set()
+    for _ in range(125):
         kept = shown.copy()
         actions = rng.uniform(-1, 1, (11, 4)).astype(np.float32)
+        there = env.present
         observations, rewards, dones, infos = env.step(actions)
-        outcomes = [
-            world.step_arrays(part)
-            for world, part in zip(worlds, np.split(actions, np.cumsum([3, 5])))
-        ]
-        last = np.concatenate([outcome[0] for outcome in outcomes])
-        np.testing.assert_array_equal(rewards, np.concatenate([o[1] for o in outcomes]))
-        assert dones.all() == dones.any() == (step % 20 == 0)
-        if step % 20 == 0:
-            for row, info in enumerate(infos):
-                np.testing.assert_array_equal(info["terminal_observation"], last[row])
-                assert info["TimeLimit.truncated"] is True
-                assert info["padding"] is False
-                assert info["n_robots"] == sizes[info["world"] % 2]
-            last = np.concatenate([world.reset_arrays() for world in worlds])
-        else:
-            for info, world in zip(infos, env._worlds.world_of.tolist()):
-                assert info == {
-                    "TimeLimit.truncated": False, "padding": False, "failed": 0, "world": world,
-                    "n_robots": sizes[world % 2], "delivered": info["delivered"],
-                }  # fmt: skip
-        np.testing.assert_array_equal(observations, last)
         np.testing.assert_array_equal(shown, kept)  # what was returned stays as it was
         shown = observations
         assert observations.dtype == rewards.dtype == np.float32
-        assert env.observation_space.contains(observations[0])
+        assert not observations[~env.present].any()
+        for number, (world, place) in enumerate(zip(own, env.rows_of_worlds)):
+            n = world.warehouse.state.n_robots
+            sizes.add((number, n))
+            rows, paid, ended, cut = world.step_arrays(actions[place][:n])
+            is_over = not world.agents
+            failed, told = world.warehouse.state.failed.tolist(), world.episode_info
+            own_rewards = [*paid.astype(np.float32).tolist(), *[0.0] * (len(there[place]) - n)]
+            assert rewards[place].tolist() == own_rewards
+            for robot, info in enumerate(infos[place]):
+                is_robot = robot < n
+                done = is_over or (is_robot and bool(ended[robot]))
+                assert dones[place][robot] == done
+                if done:
+                    last = rows[robot] if is_robot else np.zeros(140)
+                    np.testing.assert_array_equal(info.pop("terminal_observation"), last)
+                    assert ("episode" in info) == bool(there[place][robot])
+                    info.pop("episode", None)
+                assert info == {
+                    "TimeLimit.truncated": is_robot and done and bool(cut[robot]),
+                    "padding": not there[place][robot], "world": number, "n_robots": n,
+                    "failed": int(is_robot and failed[robot]), **told,
+                }  # fmt: skip
+            if is_over:
+                rows = world.reset_arrays()
+            present = world.warehouse.state.robot_present
+            assert env.present[place].tolist() == [
+                *present,
+                *[False] * (len(there[place]) - len(present)),
+            ]
+            np.testing.assert_array_equal(observations[place][: len(rows)], rows)
+    assert sizes == {(0, 3), (1, 2), (1, 5), (2, 3)}
 
 
-def test_a_seed_fixes_all_episodes_and_no_seed_none(small: Small, played: Played) -> None:
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, seed=0, **small)
+def test_a_seed_fixes_all_episodes_and_no_seed_none() -> None:
+    env = worlds(2)
     trace = played(env, 45)
     assert not np.array_equal(trace[0], env.reset())  # goes on with the next episodes
     seeds = env.seed(0)
     assert seeds[0] == seeds[2] != seeds[3]
     np.testing.assert_equal(played(env, 45), trace)
-    other = SwarmVecEnv(n_worlds=2, n_robots=3, **small)
+    other = worlds(2, seed=None)
     assert not np.array_equal(other.reset(), trace[0])
     other.seed(1)
     assert not np.array_equal(other.reset(), trace[0])
 
 
-def test_a_removed_robot_is_done_once_and_then_padding(small: Small) -> None:
-    faults = [Fault("removed", (1,), onset=0.5)]
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, faults=faults, seed=0, **small)
-    env.reset()
-    for step in range(1, 41):
-        observations, rewards, dones, infos = env.step(np.ones((6, 4)))
-        in_episode = (step - 1) % 20 + 1
-        if in_episode == 5:
-            assert dones.tolist() == [False, True, False] * 2
-            assert infos[1]["TimeLimit.truncated"] is infos[1]["padding"] is False
-            assert [info["failed"] for info in infos] == [0, 1, 0] * 2
-            assert infos[1]["terminal_observation"].shape == env.observation_space.shape
-            assert env.present.tolist() == [True, False, True] * 2
-        elif in_episode == 20:
-            assert dones.all()
-            assert [info["TimeLimit.truncated"] for info in infos] == [True, False, True] * 2
-            assert [info["padding"] for info in infos] == [False, True, False] * 2
-            assert observations.any(axis=1).all()
-            assert env.present.all()
-        else:
-            assert not dones.any()
-        if 5 <= in_episode < 20:
-            assert not observations[[1, 4]].any()
-            assert not rewards[[1, 4]].any()
-
-
-def test_a_smaller_swarm_leaves_padding(small: Small) -> None:
-    def make_env(world: int) -> Any:
-        return SwarmSize(SwarmLogisticsEnv(**small), [2, 5])
-
-    env = SwarmVecEnv(make_env=make_env, n_worlds=1, seed=0)
-    sizes = set()
-    observations = env.reset()
-    for _ in range(8 * 20):
-        n_robots = env.worlds[0].warehouse.state.n_robots
-        sizes.add(n_robots)
-        assert env.present.sum() == n_robots
-        assert not observations[n_robots:].any()
-        observations, _, dones, infos = env.step(np.zeros((5, 4)))
-        if dones.any():
-            assert dones.all()
-            assert [info["padding"] for info in infos] == [row >= n_robots for row in range(5)]
-            assert infos[0]["n_robots"] == n_robots
-    assert sizes == {2, 5}
-
-
-def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world(small: Small) -> None:
-    env = SwarmVecEnv(n_worlds=1, n_robots=3, n_items=2, pickup_range=14.0, duration=60.0, seed=0)
+def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world() -> None:
+    env = worlds(1, n_items=2, pickup_range=14.0, duration=60.0)
     env.reset()
     total, dones, infos = 0.0, np.zeros(3, np.bool_), []
     while not dones.any():
-        heading = env.worlds[0].warehouse.state.robot_heading
-        east = np.stack([np.cos(heading), -np.sin(heading), 0 * heading, 1 + 0 * heading], axis=1)
-        _, rewards, dones, infos = env.step(east)
+        _, rewards, dones, infos = env.step(eastward(env.worlds[0]))
         total += rewards[0]
     assert dones.all()
     assert total == 2.0
     assert all(info["delivered"] == 2 for info in infos)
     assert not any(info["TimeLimit.truncated"] for info in infos)
-
     for onset, length in ((0.2, 2), (0.1, 1)):
-        faults = [Fault("removed", 3, onset=onset)]
-        env = SwarmVecEnv(n_worlds=1, n_robots=3, faults=faults, seed=0, **small)
+        env = worlds(1, faults=[Fault("removed", 3, onset=onset)])
         env.reset()
         ends = [env.step(np.zeros((3, 4)))[2].all() for _ in range(4)]
         assert ends == [(step % length) == 0 for step in range(1, 5)]
 
 
-def test_infos_that_are_written_into_share_nothing(small: Small) -> None:
-    first, second = (SwarmVecEnv(n_worlds=2, n_robots=2, seed=0, **small) for _ in range(2))
+def test_infos_that_are_written_into_share_nothing() -> None:
+    first, second = (worlds(2, 2) for _ in range(2))
     for env in (first, second):
         env.reset()
     for _ in range(21):
@@ -165,14 +131,7 @@ def test_infos_that_are_written_into_share_nothing(small: Small) -> None:
         assert not any("mine" in info for info in second.step(np.zeros((4, 4)))[-1])
 
 
-def test_actions_that_cannot_be_read_are_refused(small: Small) -> None:
-    env = SwarmVecEnv(n_worlds=1, n_robots=2, seed=0, **small)
-    env.reset()
-    with pytest.raises(CommandError, match=r"actions \(type Tensor, dtype torch.bfloat16"):
-        env.step_async(torch.zeros((2, 4), dtype=torch.bfloat16))
-
-
-def test_attributes_and_methods_are_reached_by_row(wrapped: Callable[[int], Any]) -> None:
+def test_attributes_and_methods_are_reached_by_row() -> None:
     env = SwarmVecEnv(make_env=wrapped, n_worlds=2, seed=0)
     env.reset()
     assert env.get_attr("render_mode") == [None] * 12
@@ -192,16 +151,15 @@ def test_attributes_and_methods_are_reached_by_row(wrapped: Callable[[int], Any]
         env.get_attr("value", 12)
 
 
-def test_options_are_for_the_next_reset_only(small: Small) -> None:
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, seed=0, **small)
-    env.set_options({"faults": [Fault("FM1", (0,))]})
-    env.reset()
-    assert [len(world.warehouse.faults) for world in env.worlds] == [1, 1]
-    env.set_options([{}, {"faults": [Fault("FM1", (0,))]}])
-    env.reset()
-    assert [len(world.warehouse.faults) for world in env.worlds] == [0, 1]
-    env.reset()
-    assert [len(world.warehouse.faults) for world in env.worlds] == [0, 0]
+def test_options_are_for_the_next_reset_only() -> None:
+    env = worlds(2)
+    faulty = {"faults": [Fault("FM1", (0,))]}
+    options: Any
+    for options, n_faults in ((faulty, [1, 1]), ([{}, faulty], [0, 1]), (None, [0, 0])):
+        if options:
+            env.set_options(options)
+        env.reset()
+        assert [len(world.warehouse.faults) for world in env.worlds] == n_faults
     with pytest.raises(SetupError, match="3 options"):
         env.set_options([{}, {}, {}])
     env.set_options({"scenario": {"n_robots": 4}})
@@ -209,13 +167,12 @@ def test_options_are_for_the_next_reset_only(small: Small) -> None:
         env.reset()
 
 
-def test_pictures_are_tiles_of_the_worlds(small: Small) -> None:
+def test_pictures_are_tiles_of_the_worlds() -> None:
     pytest.importorskip("pygame")
-    env = SwarmVecEnv(n_worlds=2, n_robots=2, render_mode="rgb_array", seed=0, **small)
+    env = worlds(2, 2, render_mode="rgb_array")
     env.reset()
-    picture, single = env.render(), env.worlds[0].render()
-    assert picture is not None
-    assert single is not None
+    picture: Any = env.render()
+    single: Any = env.worlds[0].render()
     assert picture.shape == (2 * single.shape[0], single.shape[1], 3)
     np.testing.assert_array_equal(picture[: single.shape[0]], single)
     env.close()
@@ -246,38 +203,22 @@ def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) ->
 
 
 @pytest.mark.parametrize(
-    "actions", [np.zeros(4), np.zeros((5, 4)), np.full((6, 4), np.nan), [["a"] * 4] * 6]
+    ("actions", "message"),
+    [
+        (np.zeros((5, 4)), r"actions of shape \(5, 4\)"),
+        (np.full((6, 4), np.nan), r"actions\[0\] .* \(world 0, robot_0\): should be finite"),
+        ([["a"] * 4] * 6, "numbers"),
+        (torch.zeros((6, 4), dtype=torch.bfloat16), r"actions \(type Tensor, dtype torch.bfloat16"),
+    ],
 )
-def test_wrong_actions_are_refused_before_anything_happens(small: Small, actions: Any) -> None:
-    env = SwarmVecEnv(n_worlds=2, n_robots=3, seed=0, **small)
+def test_wrong_actions_are_refused_before_anything_happens(actions: Any, message: str) -> None:
+    env = worlds(2)
     with pytest.raises(SetupError, match="step before reset"):
         env.step(np.zeros((6, 4)))
     env.reset()
-    with pytest.raises(CommandError):
+    with pytest.raises(CommandError, match=message):
         env.step(actions)
     assert [world.warehouse.state.step for world in env.worlds] == [0, 0]
-
-
-def test_the_end_of_an_episode_tells_indicators_and_references(small: Small) -> None:
-    env = SwarmVecEnv(
-        make_env=lambda world: IndicatorReward(
-            SwarmLogisticsEnv(**small, n_robots=3), "R", references=20.0
-        ),
-        n_worlds=2,
-        seed=0,
-    )
-    env.set_options([{}, {"faults": [Fault("FM1", 2)]}])
-    env.reset()
-    returns = np.zeros(6)
-    for _ in range(20):
-        _, rewards, _, infos = env.step(np.zeros((6, 4)))
-        returns += rewards
-    assert infos[0]["R_tested"] == infos[0]["R"] == 0
-    assert infos[3]["R_tested"] == 1
-    assert infos[3]["R"] == pytest.approx(-1 + 2 / 3)
-    assert infos[3]["R_P_o"] == 20.0
-    assert infos[3]["n_failed"] == 2
-    assert returns == pytest.approx([0.0] * 3 + [-1 + 2 / 3] * 3)
 
 
 def test_the_example_runs() -> None:

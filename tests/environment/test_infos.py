@@ -31,51 +31,34 @@ def judged(env: Any) -> IndicatorReward:
 
 ENVIRONMENTS: dict[str, Callable[[], Any]] = {
     "plain": small,
-    "faults from 0 s": lambda: FaultInjection(small(), "FM1", 2),
     "faults later": lambda: FaultInjection(small(), "FM4", 2, onset=0.5, duration=0.2),
-    "sizes": lambda: SwarmSize(small(), [3, 6], leave=[(1, 0.3)]),
     "changes": lambda: ParameterChange(small(), "max_speed", [1.0, 2.0], at=0.5),
     "rewards": lambda: judged(FaultInjection(SwarmSize(small(), [4, 6]), "FM1")),
     "fixed": lambda: FixedAgents(judged(SwarmSize(small(), [4, 6], leave=[(1, 0.3)]))),
 }
-each_environment = pytest.mark.parametrize("make", ENVIRONMENTS.values(), ids=ENVIRONMENTS)
 
 
-@each_environment
-def test_they_are_numbers_with_the_same_keys_at_every_step(make: Callable[[], Any]) -> None:
-    env = make()
-    keys = None
+@pytest.mark.parametrize("make", ENVIRONMENTS.values(), ids=ENVIRONMENTS)
+def test_they_are_numbers_with_the_same_keys_at_every_step_and_share_nothing(
+    make: Callable[[], Any],
+) -> None:
+    env, other = make(), make()
+    keys = list(next(iter(env.reset(seed=0)[1].values())))
+    assert {"failed", "delivered"} <= set(keys)
     for seed in range(4):
-        _, infos = env.reset(seed=seed)
+        (observations, infos), (_, others) = env.reset(seed=seed), other.reset(seed=seed)
         while True:
-            for info in infos.values():
-                keys = keys or list(info)
+            assert infos.keys() == observations.keys()
+            assert others == infos
+            for number, info in enumerate(infos.values()):
                 assert list(info) == keys
                 assert all(isinstance(value, numbers.Real) for value in info.values())
                 assert all(np.isfinite(value) for value in info.values())
+                info["mine"] = number
+            assert [info["mine"] for info in infos.values()] == list(range(len(infos)))
+            assert not any("mine" in info for info in others.values())
             if not env.agents:
                 break
             actions = {agent: np.zeros(4) for agent in env.agents}
             observations, *_, infos = env.step(actions)
-            assert infos.keys() == observations.keys()
-    assert keys is not None
-    assert {"failed", "delivered"} <= set(keys)
-
-
-@each_environment
-def test_those_that_are_written_into_share_nothing(make: Callable[[], Any]) -> None:
-    first, second = make(), make()
-    answers = [env.reset(seed=0)[1] for env in (first, second)]
-    for _ in range(10):
-        told, other = answers
-        assert other == told
-        for number, agent in enumerate(told):
-            told[agent]["mine"] = number
-        assert not any("mine" in info for info in other.values())
-        for number, agent in enumerate(told):
-            assert told[agent]["mine"] == number
-        if not first.agents:
-            break
-        actions = {agent: np.zeros(4) for agent in first.agents}
-        answers = [env.step(actions)[-1] for env in (first, second)]
-        assert not any("mine" in info for infos in answers for info in infos.values())
+            *_, others = other.step(actions)

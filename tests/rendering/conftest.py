@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import ArrayLike
 
 from swarm_logistics_env import Scenario
@@ -15,20 +13,13 @@ from swarm_logistics_env.warehouse import WarehouseState
 Situation = tuple[WarehouseState, Scenario]
 
 
-@pytest.fixture
-def situation() -> Callable[..., Situation]:
-    """Return a maker of states: all robots present and sound, silent, looking along +x."""
-
-    def make(robots: ArrayLike, items: ArrayLike, **fields: Any) -> Situation:
-        places, item_places = (
-            np.array(rows, dtype=np.float64).reshape(-1, 2) for rows in (robots, items)
-        )
-        scenario = Scenario(n_robots=len(places), n_items=len(item_places), **fields)
-        state = WarehouseState(scenario)
-        state.robot_position, state.item_position = places, item_places
-        state.ranger_range[:] = scenario.ranger_range
-        state.view_range[:] = scenario.view_range
-        state.sends[:], state.hears[:] = True, True
-        return state, scenario
-
-    return make
+def situation(robots: ArrayLike, items: ArrayLike = ((5, 5),), **fields: Any) -> Situation:
+    """Return a state: all robots present and sound, silent, looking along +x."""
+    places, item_places = (
+        np.array(rows, dtype=np.float64).reshape(-1, 2) for rows in (robots, items)
+    )
+    scenario = Scenario(n_robots=len(places), n_items=len(item_places), **fields)
+    state = WarehouseState(scenario)
+    state.robot_position, state.item_position = places, item_places
+    state.sends[:], state.hears[:] = True, True
+    return state, scenario

@@ -58,3 +58,11 @@ def served() -> Iterator[Served]:
     one = Served()
     yield one
     one.stop()
+
+
+@pytest.fixture(scope="module")
+def asked() -> Iterator[Served]:
+    """One server for all tests that change nothing of its session."""
+    one = Served()
+    yield one
+    one.stop()

@@ -56,17 +56,20 @@ def messages(served: Served, orders: list[str], enough: int) -> list[dict[str, A
     return asyncio.run(talk())
 
 
-def test_page_and_scripts_come_with_a_content_policy(served: Served) -> None:
+def test_page_and_scripts_come_with_a_content_policy(asked: Served) -> None:
     for name in ("", "page.css", "draw.js", "panel.js", "page.js"):
-        status, body, headers = ask(served, f"/{served.server.token}/{name}")
+        status, body, headers = ask(asked, f"/{asked.server.token}/{name}")
         assert status == 200
         assert body
-        assert "default-src 'none'; script-src 'self'" in headers["Content-Security-Policy"]
-        assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
-        assert headers["Cache-Control"] == "no-store"
-        assert headers["Referrer-Policy"] == "no-referrer"
-        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
-        assert headers["X-Content-Type-Options"] == "nosniff"
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'; script-src 'self'" in policy
+        assert "frame-ancestors 'none'" in policy
+        assert headers.items() >= {
+            ("Cache-Control", "no-store"),
+            ("Referrer-Policy", "no-referrer"),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+            ("X-Content-Type-Options", "nosniff"),
+        }
 
 
 @pytest.mark.parametrize(
@@ -82,18 +85,16 @@ def test_page_and_scripts_come_with_a_content_policy(served: Served) -> None:
         {"Origin": "https://127.0.0.1"},
     ],
 )
-@pytest.mark.parametrize("name", ["", "live", "recording.html"])
-def test_other_hosts_and_origins_are_refused(
-    served: Served, headers: dict[str, str], name: str
-) -> None:
-    assert ask(served, f"/{served.server.token}/{name}", **headers)[0] == 403
+def test_other_hosts_and_origins_are_refused(asked: Served, headers: dict[str, str]) -> None:
+    for name in ("", "live", "recording.html"):
+        assert ask(asked, f"/{asked.server.token}/{name}", **headers)[0] == 403
 
 
-def test_without_the_token_nothing_is_served(served: Served) -> None:
-    token = served.server.token
+def test_without_the_token_nothing_is_served(asked: Served) -> None:
+    token = asked.server.token
     wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
     for path in ("/", "/page.js", f"/{wrong}/", f"/{wrong}/live", "//", "/%ff/"):
-        status, body, _ = ask(served, path)
+        status, body, _ = ask(asked, path)
         assert status == 403, path
         assert token.encode() not in body
 
@@ -101,19 +102,18 @@ def test_without_the_token_nothing_is_served(served: Served) -> None:
 @pytest.mark.parametrize(
     "name", ["server.py", "../server.py", "..%2fserver.py", "%2e%2e/session.py", "/etc/passwd"]
 )
-def test_serves_no_other_file(served: Served, name: str) -> None:
-    status, body, _ = ask(served, f"/{served.server.token}/{name}")
+def test_serves_no_other_file(asked: Served, name: str) -> None:
+    status, body, _ = ask(asked, f"/{asked.server.token}/{name}")
     assert status in (403, 404)
     assert b"import" not in body
 
 
-def test_listens_on_loopback_only(served: Served) -> None:
-    listening = {site[0] for site in served.server._runner.addresses}
-    assert listening == {"127.0.0.1"}
+def test_listens_on_loopback_only(asked: Served) -> None:
+    assert {site[0] for site in asked.server._runner.addresses} == {"127.0.0.1"}
 
 
 @pytest.mark.parametrize(
-    ("host", "asked", "is_own"),
+    ("host", "given", "is_own"),
     [
         ("0.0.0.0", "192.168.0.7:8765", True),
         ("0.0.0.0", "[fe80::7]:8765", True),
@@ -126,9 +126,9 @@ def test_listens_on_loopback_only(served: Served) -> None:
     ],
 )
 def test_names_that_nobody_gave_are_refused_on_any_host(
-    host: str, asked: str, is_own: bool
+    host: str, given: str, is_own: bool
 ) -> None:
-    assert WatchServer(Session(SMALL), 0, host=host)._is_own(asked) is is_own
+    assert WatchServer(Session(SMALL), 0, host=host)._is_own(given) is is_own
 
 
 @pytest.mark.parametrize(
@@ -145,11 +145,6 @@ def test_serves_on_the_host_that_was_asked_for(host: str, shown: str) -> None:
         assert ask(served, f"/{served.server.token}/live", **origin)[0] == 403
     finally:
         served.stop()
-
-
-def test_a_host_of_another_machine_is_refused() -> None:
-    with pytest.raises(SetupError, match=r"host = 192\.0\.2\.7, port = 0: "):
-        asyncio.run(WatchServer(Session(SMALL), 0, host="192.0.2.7").start())
 
 
 def test_the_page_is_shown_once_it_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,9 +165,7 @@ def test_the_page_is_shown_once_it_is_served(monkeypatch: pytest.MonkeyPatch) ->
         signal.signal(signal.SIGINT, before)
     (page,) = told
     title = page.partition('id="indicators" title="')[2].partition('"')[0]
-    assert {"R, robustness", "FT, fault tolerance"} <= {
-        line.partition(":")[0] for line in title.splitlines()
-    }
+    assert "R, robustness: " in title
 
 
 def test_frames_hold_what_changed(served: Served) -> None:
@@ -215,9 +208,9 @@ def test_orders_are_obeyed(served: Served) -> None:
     ],
 )
 def test_order_that_cannot_be_is_refused_in_a_sentence(
-    served: Served, order: str, words: str
+    asked: Served, order: str, words: str
 ) -> None:
-    assert words in messages(served, [order], 10)[-1]["problem"]
+    assert words in messages(asked, [order], 10)[-1]["problem"]
 
 
 def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
@@ -240,16 +233,17 @@ def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
 
 def test_more_pages_than_there_may_be_are_refused(served: Served) -> None:
     async def talk() -> list[int]:
+        statuses = []
         async with aiohttp.ClientSession() as client, contextlib.AsyncExitStack() as pages:
-            statuses = []
             for _ in range(20):
-                asked = client.ws_connect(f"{served.server.address}live")
                 try:
-                    await pages.enter_async_context(asked)
+                    await pages.enter_async_context(
+                        client.ws_connect(f"{served.server.address}live")
+                    )
                     statuses.append(101)
                 except aiohttp.WSServerHandshakeError as error:
                     statuses.append(error.status)
-            return statuses
+        return statuses
 
     assert asyncio.run(talk()) == [101] * 16 + [503] * 4
 
@@ -266,14 +260,12 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
              b"\0", rng.randbytes(20), b"GET /" + b"a" * 70000 + b" HTTP/1.1"]
         )  # fmt: skip
         header = rng.choice([b"Host: evil", b"no colon", b"Content-Length: x", rng.randbytes(30)])
-        with socket.create_connection(("127.0.0.1", served.server.port), timeout=5) as one:
-            answer = b""
-            try:
-                one.sendall(line + b"\r\n" + header + b"\r\nConnection: close\r\n\r\n")
-                while part := one.recv(1 << 16):
-                    answer += part
-            except OSError:
-                pass  # closed on a request that was too long
+        answer = b""
+        address = ("127.0.0.1", served.server.port)
+        with contextlib.suppress(OSError), socket.create_connection(address, timeout=5) as one:
+            one.sendall(line + b"\r\n" + header + b"\r\nConnection: close\r\n\r\n")
+            while part := one.recv(1 << 16):  # it is closed on a request that was too long
+                answer += part
         answered += bool(answer)
         assert not any(secret in answer for secret in (b"/usr/", b".py", b"Traceback"))
     assert answered > 50
@@ -298,10 +290,11 @@ def test_a_page_that_closes_in_mid_send_is_no_error(
     assert [record.getMessage() for record in caplog.records if record.exc_info] == []
 
 
-def test_port_in_use_is_one_sentence(served: Served) -> None:
-    second = WatchServer(Session(SMALL), served.server.port)
+def test_where_it_cannot_listen_is_told_in_a_sentence(asked: Served) -> None:
     with pytest.raises(SetupError, match="is in use, should be another one"):
-        asyncio.run(second.start())
+        asyncio.run(WatchServer(Session(SMALL), asked.server.port).start())
+    with pytest.raises(SetupError, match=r"host = 192\.0\.2\.7, port = 0: "):
+        asyncio.run(WatchServer(Session(SMALL), 0, host="192.0.2.7").start())
 
 
 def test_token_is_kept_for_this_user_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

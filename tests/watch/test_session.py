@@ -1,49 +1,39 @@
 from __future__ import annotations
 
+import base64
+import json
+import re
+import zlib
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
-from swarm_logistics_env.errors import FaultError, PolicyError, SetupError
-from swarm_logistics_env.policies import Policy
+from swarm_logistics_env.errors import (
+    FaultError,
+    PolicyError,
+    ScenarioError,
+    SetupError,
+    SwarmLogisticsError,
+)
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.messages import observation_parts
+from swarm_logistics_env.watch.messages import Recording, frame, observation_parts
 
 SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
-
-
-def swarm_dt() -> Policy:
-    return policies.load("swarm-dt")
-
-
-def finish(session: Session) -> None:
-    session.play(1e6)
-    assert session.is_over
 
 
 def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
     scenario = SMALL.replace(duration=60.0)
     faults = [Fault("FM4", 3, onset=5.0)]
     session = Session(scenario, seed=2, faults=faults)
-    finish(session)
-    with_faults = run_episode(scenario, swarm_dt(), 2, faults)
-    without = run_episode(scenario, swarm_dt(), 2)
+    session.play(1e6)
+    assert session.is_over
     run, twin = (play.world.state.delivery_times for play in (session.run, session.beside))
-    assert run == with_faults.delivery_times.tolist()
-    assert twin == without.delivery_times.tolist()
+    for times, these in ((run, faults), (twin, [])):
+        episode = run_episode(scenario, policies.load("swarm-dt"), 2, these)
+        assert times == episode.delivery_times.tolist()
     assert run != twin
-
-
-def test_without_faults_run_and_twin_are_the_same() -> None:
-    session = Session(SMALL)
-    session.play(15.0)
-    run, twin = session.run.world.state, session.beside.world.state
-    assert np.array_equal(run.robot_position, twin.robot_position)
-    session.select(0)
-    session.break_robot()
-    session.play(3.0)
-    assert run.failed.tolist() == [True] + [False] * 7
-    assert not twin.failed.any()
 
 
 def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -> None:
@@ -73,18 +63,27 @@ def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -
 def test_robot_breaks_and_is_repaired(mode: str) -> None:
     session = Session(SMALL)
     session.play(2.0)
+    run, twin = session.run.world.state, session.beside.world.state
+    assert np.array_equal(run.robot_position, twin.robot_position)
     session.choose_mode(mode)
     session.toggle_robot(3)
     world = session.run.world
     assert world.state.failure_modes[3] == (mode,)
+    assert not session.beside.world.state.failed.any()
     assert mode in session.note
     assert [(event.robot, event.mode) for event in session.events] == [(3, mode)]
     assert session.events[0].time == world.state.time
+    shown = frame(session)
+    assert shown["robots1"][3][2] == ""
     if mode == "removed":
         assert session.selected is None
+        assert shown["robots0"][3] is None
+        assert shown["poses0"][9:12] == [None] * 3
         with pytest.raises(SetupError, match="robot = 3"):
             session.repair_robot(3)
         return
+    assert shown["robots0"][3][2] == FAILURE_MODES[mode].mark
+    assert shown["poses0"][9:11] == np.rint(1000 * world.state.robot_position[3]).tolist()
     session.play(1.0)
     session.toggle_robot(3)
     assert not world.state.failed.any()
@@ -104,62 +103,55 @@ def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
 
 def test_breaking_twice_in_a_mode_is_once() -> None:
     session = Session(SMALL)
-
-    def modes() -> list[str]:
-        return list(session.run.world.state.failure_modes[1])
-
-    session.break_robot(1)
-    session.break_robot(1)
-    assert modes() == ["FM4"]
-    assert "already" in session.note
-    session.choose_mode("FM1")
-    session.break_robot(1)
-    assert modes() == ["FM4", "FM1"]
-    session.repair_robot(1)
-    assert modes() == []
-    session.repair_robot(1)
-    assert "sound" in session.note
-    session.break_robot()
-    assert session.note == "click a robot first"
-    finish(session)
-    session.break_robot(2)
-    assert "over" in session.note
-    assert not session.run.world.state.failed.any()
+    with pytest.raises(SetupError, match="none is selected"):
+        session.break_robot()
+    acts: list[tuple[Callable[[], object], tuple[str, ...], str]] = [
+        (lambda: session.break_robot(1), ("FM4",), "fails"),
+        (lambda: session.break_robot(1), ("FM4",), "already"),
+        (lambda: session.choose_mode("FM1"), ("FM4",), ""),
+        (lambda: session.break_robot(1), ("FM4", "FM1"), "FM1"),
+        (lambda: session.repair_robot(1), (), "repaired"),
+        (lambda: session.repair_robot(1), (), "sound"),
+    ]
+    for act, modes, said in acts:
+        act()
+        assert session.run.world.state.failure_modes[1] == modes
+        assert said in session.note
+    session.play(1e6)
+    with pytest.raises(SetupError, match="the run is over"):
+        session.break_robot(1)
 
 
 def test_swarm_size_begins_again_and_says_so() -> None:
-    session = Session(SMALL, seed=3, faults=[Fault("FM2", 6), Fault("FM1", 1)])
+    session = Session(SMALL, seed=3, faults=[Fault("FM2", 5), Fault("FM1", 1)])
     session.play(2.0)
     session.select(7)
+    for n_robots, complaint in ((0, "n_robots = 0"), (4, "Fault.robots = 5: should be at most")):
+        with pytest.raises(SwarmLogisticsError, match=complaint):
+            session.resize(n_robots)
+        assert session.scenario.n_robots == 8
     session.resize(5)
-    assert session.run.world.state.time == 0.0
-    assert session.run.world.state.n_robots == session.beside.world.state.n_robots == 5
+    for play in (session.run, session.beside):
+        assert (play.world.state.time, play.world.state.n_robots) == (0.0, 5)
     assert session.seed == 3
     assert session.selected is None
     assert "began again" in session.note
-    assert "1 fault" in session.note
-    session.resize(0)
-    assert "n_robots = 0" in session.note
-    assert session.scenario.n_robots == 5
-    session.resize(6)
-    assert session.run.world.state.failed.sum() == 6
+    assert session.run.world.state.failed.sum() == 5
 
 
 def test_delivery_width_changes_at_once_in_both() -> None:
     session = Session(SMALL)
     session.play(2.0)
     session.set_delivery_width(3.0)
+    with pytest.raises(ScenarioError, match="leaves no storage"):
+        session.set_delivery_width(5.0)
     for play in (session.run, session.beside):
         assert play.world.scenario.delivery_width == 3.0
         assert play.world.state.time == pytest.approx(2.0)
-    session.set_delivery_width(5.0)
-    assert "leaves no storage" in session.note
-    assert session.scenario.delivery_width == session.beside.world.scenario.delivery_width == 3.0
 
 
 def test_next_seed_and_again() -> None:
     session = Session(SMALL)
-    assert session.choices[0] == "swarm-dt"
     start = session.run.world.state.robot_position.copy()
     session.play(1.0)
     session.break_robot(0)
@@ -167,22 +159,10 @@ def test_next_seed_and_again() -> None:
     assert session.seed == 1
     assert session.events == []
     assert not np.array_equal(session.run.world.state.robot_position, start)
+    session.play(1.0)
     session.restart()
     assert session.seed == 1
     assert session.run.world.state.time == 0.0
-
-
-def test_wrong_arguments() -> None:
-    with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
-        Session(SMALL, speed=3.0)
-    with pytest.raises(FaultError, match="at most n_robots = 8"):
-        Session(SMALL, seed=0, faults=[Fault("FM1", 9)])
-    session = Session(SMALL)
-    with pytest.raises(FaultError, match="did you mean 'FM4'"):
-        session.choose_mode("FM44")
-    for robot in (-1, 8):
-        with pytest.raises(SetupError, match=f"robot = {robot}"):
-            session.select(robot)
 
 
 class Wrong:
@@ -193,13 +173,24 @@ class Wrong:
         return np.zeros((1, 1))
 
 
-def test_policy_that_cannot_be_is_named() -> None:
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
+        Session(SMALL, speed=3.0)
+    with pytest.raises(FaultError, match="at most n_robots = 8"):
+        Session(SMALL, seed=0, faults=[Fault("FM1", 9)])
     with pytest.raises(PolicyError, match="Wrong at 0 s"):
         Session(SMALL, load=lambda _: Wrong()).step()
+    session = Session(SMALL)
+    with pytest.raises(FaultError, match="did you mean 'FM4'"):
+        session.choose_mode("FM44")
+    for robot in (-1, 8):
+        with pytest.raises(SetupError, match=f"robot = {robot}"):
+            session.select(robot)
 
 
 def test_policies_are_compared_with_the_same_faults() -> None:
     session = Session(SMALL, against="homing", seed=3)
+    assert session.choices[:2] == session.names == ("swarm-dt", "homing")
     session.break_robot(2)
     assert session.beside.world.state.failure_modes[2] == ("FM4",)
     session.compare("homing")
@@ -222,3 +213,23 @@ def test_observation_has_all_parts_and_only_what_is_present() -> None:
         assert found["range_walls"] == pytest.approx(parts["range_walls"].tolist(), abs=0.0051)
         assert len(found["item_x"]) == int(parts["item_present"].sum())
         assert found["carrying"] == parts["carrying"].tolist()
+        session.select(robot)
+        beams = [parts[f"range_{what}"] for what in ("robots", "walls", "items")]
+        nearest = np.min(beams, axis=0).tolist()
+        assert frame(session)["selected"]["beams"] == pytest.approx(nearest, abs=0.00051)
+
+
+def test_a_recording_begins_anew_with_each_episode() -> None:
+    session = Session(SMALL)
+    recording = Recording(session)
+    for _ in range(2):
+        recording.note()
+        for _ in range(20):
+            session.advance()
+            recording.note()
+        session.next_seed()
+    recording.note()
+    (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())
+    first, *others = json.loads(zlib.decompress(base64.b64decode(packed)))["frames"]
+    assert (first["seed"], first["time"]) == (2, 0.0)
+    assert others == []

@@ -1,34 +1,12 @@
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
-from swarm_logistics_env.rendering.readings import N_BEAMS, followed, ranges
-from swarm_logistics_env.warehouse import WarehouseState
+from swarm_logistics_env.rendering.palette import followed
 from swarm_logistics_env.warehouse.state import NOBODY
-
-
-def test_beams_end_where_the_robot_itself_sees_them_end() -> None:
-    assert N_BEAMS == observations.N_BEAMS
-    scenario = Scenario(n_robots=20, n_obstacles=4)
-    world = Warehouse(scenario)
-    rows = world.reset(2, [Fault("removed", [3], onset=0.5)])
-    for _ in range(20):
-        rows = world.step(np.tile([1.0, 0.0, 0.2, 1.0], (20, 1)))
-    seen = observations.unflatten(rows, scenario)
-    for robot in np.flatnonzero(world.state.robot_present):
-        scans = ranges(world.state, scenario, int(robot))
-        for scan, name in zip(scans, ("range_robots", "range_walls", "range_items"), strict=True):
-            np.testing.assert_allclose(scan, seen[name][robot], atol=1e-5)
-
-
-def test_blind_robot_has_no_beams() -> None:
-    world = Warehouse(Scenario(n_robots=2))
-    world.reset(0, [Fault("rangers_blind", [1])])
-    assert (ranges(world.state, world.scenario, 1) == 0.0).all()
+from tests.rendering.conftest import situation
 
 
 @pytest.mark.parametrize("relay", ["none", "gossip"])
@@ -54,10 +32,8 @@ def test_follows_whom_the_robot_itself_hears(relay: str) -> None:
     assert compared > 100
 
 
-def test_nearest_of_those_that_tell_the_same(
-    situation: Callable[..., tuple[WarehouseState, Scenario]],
-) -> None:
-    state, scenario = situation([[2, 2], [5, 2], [4, 2]], [[7, 7]])
+def test_nearest_of_those_that_tell_the_same() -> None:
+    state, scenario = situation([[2, 2], [5, 2], [4, 2]])
     state.robot_told[:] = [0.0, 1.0, 1.0]
     assert followed(state, scenario, 0) == 2
     state.robot_told[2] = 1.1
