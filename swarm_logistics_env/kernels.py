@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import importlib
 import math
 import multiprocessing
 import os
@@ -89,8 +90,24 @@ def _compile(compiled: Any, signature: Any) -> Any:
             del compiled.overloads[signature]  # Python cannot call what is only a part
         if signature in compiled.overloads:
             return compile_it()
+        _import_without_blas()
         with _kept_on_disk(compiled), _Report():
             return compile_it()
+
+
+@functools.cache
+def _import_without_blas() -> None:
+    """Import numba's functions of arrays, which else import scipy's BLAS first, for .15 s.
+
+    They only ask whether it is there. A kernel of somebody else that needs it imports it then.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas not in sys.modules:
+        sys.modules[blas] = ModuleType(blas)
+        try:
+            importlib.import_module("numba.np.arraymath")
+        finally:
+            del sys.modules[blas]
 
 
 def _part(compiled: Any, compile_it: Callable[[], Any]) -> Any:

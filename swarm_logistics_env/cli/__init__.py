@@ -1,5 +1,10 @@
 """The command line, `swarm-logistics`. Commands import what they use when they run."""
 
-from .app import app
+import gc
+
+gc.disable()  # nothing that an import makes is garbage
+from .app import app  # noqa: E402 - see above
+
+gc.enable()
 
 __all__ = ["app"]

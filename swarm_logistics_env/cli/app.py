@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import json
 import os
 import shlex
@@ -50,6 +51,7 @@ class Application:
             sys.stdout.flush()
         except OSError:  # what is left in the buffer would be tried again
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        gc.freeze()  # the process ends: nobody needs to look for garbage
         sys.exit(code)
 
     def run(self, arguments: list[str] | None = None) -> int:
