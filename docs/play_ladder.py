@@ -40,16 +40,22 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     rungs = cleared.policies
     rows = [
         (f"`{rung}`", *(of(rung, before) for _, of in columns))
-        for rung, before in zip(rungs, ("", *rungs))
+        for rung, before in zip(rungs, _before(rungs))
     ]
     seeds = cleared.plan.seeds
     text = (
         f'{len(seeds)} seeds from {seeds[0]:,} on. Times are medians with 95 % intervals; "x of '
         'y": so many runs were not done after '
         f"{cleared.plan.specification.scenario.duration:g} s. P is the items delivered in 500 s, "
-        "and in brackets what is more than the rung before, seed by seed."
+        "and in brackets what is more than the rung before, seed by seed; `central`, which has no "
+        "stock, stands beside `homing`."
     )
     return "\n".join([table(("", *(name for name, _ in columns)), rows), "", text])
+
+
+def _before(rungs: Sequence[str]) -> list[str]:
+    """Return the rung that each is compared with."""
+    return ["homing" if rung == "central" else before for rung, before in zip(rungs, ("", *rungs))]
 
 
 def leans_block(found: StudyResults) -> str:
@@ -66,7 +72,22 @@ def leans_block(found: StudyResults) -> str:
         f"{seeds[0]:,} on. {section.SATURATED}: in some run every item was delivered."
     )
     head = ("", *(f"`{one}`" for one in (least, *policies)))
-    return "\n".join([table(head, rows), "", text])
+    return "\n".join([table(head, rows), "", text, _shares(_cells(found, _tables(found)[0]))])
+
+
+def _shares(cells: dict[str, Cell]) -> str:
+    """Return in a sentence how much of the networks' gains a script reaches."""
+    p = {one: cell.mean.value for one, cell in cells.items()}
+
+    def share(script: str, least: str, network: str) -> str:
+        return f"{(p[script] - p[least]) / (p[network] - p[least]):.0%}"
+
+    told = [
+        f"`homing` reaches {share('homing', 'swarm-dt', one)} and `homing-stock` "
+        f"{share('homing-stock', 'swarm-dt', one)} of what `{one}`"
+        for one in ("ppo-delivery", "ppo-robust")
+    ]
+    return f"As it is, {', and '.join(told)} delivers more than `swarm-dt`."
 
 
 def _tables(found: StudyResults) -> Sequence[str]:

@@ -48,7 +48,7 @@ MOST = {
     "files of the package": 127,
     "lines of code of studies and report": 3_980,
     "lines of tests": 18_750,
-    "lines of verification, benchmarks, interop and the scripts of docs": 5_110,
+    "lines of verification, benchmarks, interop and the scripts of docs": 5_170,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,

@@ -99,23 +99,27 @@ def _sentences(results: StudyResults) -> Iterator[Section]:
         tests = [test for test in results.verdicts if test.compared.policy == policy]
         said = sentences(reference, tests) if reference else []
         if said and reference:
-            columns = ("the text", "its claims", "contradicted")
+            columns = ("the text", "its claims", "contradicted", "open")
             yield Section(f"{policy}: what the text says", columns, tuple(said), (reference.whose,))
 
 
-def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[tuple[str, str, str]]:
-    """Return each sentence that some test asks of, how its claims fare, and which are refuted."""
+def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[tuple[str, ...]]:
+    """Return each sentence that some test asks of: how its claims fare, which are refuted, open."""
     rows = []
     for sentence, claims in reference.sentences.items():
         here = [test for test in tests if test.compared.question in claims]
         verdicts = [section.counted_as(test, test.claim_verdict_holm) for test in here]
-        refuted = [
-            f"{test.compared.label}: {test.compared.indicator} = {section.ratio(test)}"
-            for test, verdict in zip(here, verdicts)
-            if verdict == "refuted"
+        told = [
+            "; ".join(
+                f"{test.compared.label}: {test.compared.indicator} = {section.ratio(test)}"
+                for test, verdict in zip(here, verdicts)
+                if verdict == word
+            )
+            for word in ("refuted", "open")
         ]
         if here:
-            rows.append((f'"{sentence}"', section.counted(verdicts), "; ".join(refuted) or NOTHING))
+            values = (one or NOTHING for one in told)
+            rows.append((f'"{sentence}"', section.counted(verdicts), *values))
     return rows
 
 

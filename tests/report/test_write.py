@@ -152,7 +152,7 @@ def test_every_sentence_of_the_paper_stands_beside_its_claims(few: StudyResults)
     tests = few.verdicts
     rows = sentences(PAPER, tests)
     assert len(rows) == len(PAPER.sentences) == 9
-    counts = [int(n) for _, counted, _ in rows for n in re.findall(r"(\d+) \w+", counted)]
+    counts = [int(n) for _, counted, *_ in rows for n in re.findall(r"(\d+) \w+", counted)]
     assert sum(counts) == sum(1 for test in tests if test.compared.question in PAPER.claims) == 41
     (text,) = [section for section in tables(few) if section.title.endswith("what the text says")]
     assert text.rows == tuple(rows)
