@@ -72,7 +72,8 @@ def leans_block(found: StudyResults) -> str:
         f"{seeds[0]:,} on. {section.SATURATED}: in some run every item was delivered."
     )
     head = ("", *(f"`{one}`" for one in (least, *policies)))
-    return "\n".join([table(head, rows), "", text, _shares(_cells(found, _tables(found)[0]))])
+    shares = _shares(_cells(found, _tables(found)[0]))
+    return "\n".join([table(head, rows), "", text, shares])
 
 
 def _shares(cells: dict[str, Cell]) -> str:
@@ -85,8 +86,11 @@ def _shares(cells: dict[str, Cell]) -> str:
     told = [
         f"`homing` reaches {share('homing', 'swarm-dt', one)} and `homing-stock` "
         f"{share('homing-stock', 'swarm-dt', one)} of what `{one}`"
-        for one in ("ppo-delivery", "ppo-robust")
+        for one in p
+        if one.startswith("ppo-")
     ]
+    if not told:
+        return ""
     return f"As it is, {', and '.join(told)} delivers more than `swarm-dt`."
 
 
