@@ -96,9 +96,11 @@ class Runs:
         if not path.is_file():
             raise StudyError(f"no study in {directory}: there is no file {path}")
         # A log is there while somebody writes, and after they were killed: it is merged by writing.
-        # Without one, a full or locked folder is no matter.
-        is_whole = path.stat().st_size and not path.with_name(f"{path.name}-wal").exists()
-        return cls(path, read_only=bool(is_whole))
+        # Without one, a full or locked folder is no matter; a file without the mark is being made.
+        with path.open("rb") as file:
+            mark = file.read(72)[68:]
+        is_made = mark == APPLICATION_ID.to_bytes(4, "big")
+        return cls(path, read_only=is_made and not path.with_name(f"{path.name}-wal").exists())
 
     @classmethod
     @contextmanager
