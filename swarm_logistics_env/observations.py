@@ -35,7 +35,7 @@ TIMER_RUNS = CARRYING + 3
 TIMER = CARRYING + 4
 VELOCITY = CARRYING + 5
 CONTACT = CARRYING + 7
-N_COLUMNS = CONTACT + 1  # and after them, per neighbour, the message it broadcasts
+N_COLUMNS = CONTACT + 1  # = 140; after them, per neighbour, the message it broadcasts
 MESSAGES = N_COLUMNS
 
 
