@@ -273,7 +273,7 @@ class Study:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         if differing := noted.specification.differing(self.specification, self.out or Path()):
             raise StudyError(
-                f"{self.out} holds the study {noted.specification.name!r} with another "
+                f"{self.out} holds the study {noted.specification.name!r} with other "
                 f"{', '.join(differing)}: should be as it was declared (seeds may be added), or in "
                 "another directory"
             )

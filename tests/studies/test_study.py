@@ -164,9 +164,9 @@ def test_verdicts_over_others_than_the_declared_seeds_are_exploratory(
 @pytest.mark.parametrize(
     ("field", "value", "words"),
     [
-        ("name", "second", "holds the study 'small' with another name"),
-        ("policies", ["random-walk"], "with another policies: should be as it was declared"),
-        ("faults", [{"modes": ["FM4"], "robots": [1]}], "with another faults"),
+        ("name", "second", "holds the study 'small' with other name"),
+        ("policies", ["random-walk"], "with other policies: should be as it was declared"),
+        ("faults", [{"modes": ["FM4"], "robots": [1]}], "with other faults"),
         ("sizes", [{"values": [2, 5]}], "with another sizes"),
         ("scenario", {**SMALL["scenario"], "n_robots": 5}, "with another scenario"),
         ("indicators", ["S"], "with another indicators"),
