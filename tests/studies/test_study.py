@@ -167,9 +167,9 @@ def test_verdicts_over_others_than_the_declared_seeds_are_exploratory(
         ("name", "second", "holds the study 'small' with other name"),
         ("policies", ["random-walk"], "with other policies: should be as it was declared"),
         ("faults", [{"modes": ["FM4"], "robots": [1]}], "with other faults"),
-        ("sizes", [{"values": [2, 5]}], "with another sizes"),
-        ("scenario", {**SMALL["scenario"], "n_robots": 5}, "with another scenario"),
-        ("indicators", ["S"], "with another indicators"),
+        ("sizes", [{"values": [2, 5]}], "with other sizes"),
+        ("scenario", {**SMALL["scenario"], "n_robots": 5}, "with other scenario"),
+        ("indicators", ["S"], "with other indicators"),
     ],
 )
 def test_another_study_does_not_enter_the_directory_of_this_one(
