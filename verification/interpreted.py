@@ -73,32 +73,32 @@ def _store_at(address: int, value: int) -> None:
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def _word_at(address: int) -> ctypes.c_int64:
-    return ctypes.c_int64.from_address(int(address))
+def _word_at(address: int, place: int = 0) -> ctypes.c_int64:
+    return ctypes.c_int64.from_address(int(address) + 8 * int(place))
 
 
-def _load(address: int) -> int:
-    return _word_at(address).value
+def _load(address: int, place: int = 0) -> int:
+    return _word_at(address, place).value
 
 
-def _exchange(address: int, value: int) -> int:
+def _exchange(address: int, place: int, value: int) -> int:
     with _ONE_AT_A_TIME:
-        before, _word_at(address).value = _load(address), int(value)
+        before, _word_at(address, place).value = _load(address, place), int(value)
     return before
 
 
-def _add(address: int, value: int) -> int:
+def _add(address: int, place: int, value: int) -> int:
     with _ONE_AT_A_TIME:
-        before = _load(address)
-        _word_at(address).value = before + int(value)
+        before = _load(address, place)
+        _word_at(address, place).value = before + int(value)
     return before
 
 
-def _replace(address: int, old: int, new: int) -> bool:
+def _replace(address: int, place: int, old: int, new: int) -> bool:
     with _ONE_AT_A_TIME:
-        is_there = _load(address) == int(old)
+        is_there = _load(address, place) == int(old)
         if is_there:
-            _word_at(address).value = int(new)
+            _word_at(address, place).value = int(new)
     return is_there
 
 
