@@ -21,6 +21,7 @@ from .inputs import (
 )
 from .ratio import MIN_SEEDS, Term, paired_ratio, unpaired_ratio
 from .summaries import at_stake, pairing_correlation
+from .trainings import LEAST_TRAININGS, ratio_over_trainings
 
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
@@ -70,12 +71,15 @@ class Estimate:
         threshold: The value that theta is tested against.
         confidence: Of the interval, in (0, 1).
         n_seeds: Number of seeds; of the smallest sample where unpaired.
+        n_trainings: Number of trainings, each played over all seeds; None: one policy was judged,
+            and nothing is said of another training of it.
         p_value: Two-sided p of mean(D) = 0, in [0, 1]: what Holm acts on. From ten paired seeds on
             the larger of the t test's and the studentised bootstrap's.
         paired: Whether the samples share their seeds, row by row.
         pairing_correlation: Pearson correlation of the two performances compared (P_F and P_S for
             FT); None where unpaired, below three seeds, or where one of them is constant.
-        difference_sd: Standard deviation of D over seeds, in items; where unpaired se(D) sqrt(n).
+        difference_sd: Standard deviation of D over seeds, in items; where unpaired se(D) sqrt(n);
+            None over trainings, whose D has two spreads.
         difference_skewness: Skewness of D over paired seeds; None where D shows no spread.
         at_stake: What stalls of all runs would take from mean(D), and add to it, in items, where
             none was seen: that a share of them may be hidden is part of p.
@@ -88,7 +92,8 @@ class Estimate:
             not show could turn the verdict: it needs `seeds_against_stalls`), "unbounded" (the mean
             denominator is not distinguishable from 0), "assumes_normal" (below ten paired seeds, or
             unpaired: the verdict rests on normal differences), "skewed" (D is so skewed that the
-            verdict errs more often than it promises at this n).
+            verdict errs more often than it promises at this n), "few_trainings" (fewer than five:
+            p = 1).
     """
 
     indicator: str
@@ -99,6 +104,7 @@ class Estimate:
     threshold: float
     confidence: float
     n_seeds: int
+    n_trainings: int | None = None
     p_value: float | None = None
     paired: bool
     pairing_correlation: float | None = None
@@ -144,6 +150,7 @@ class Estimate:
         unit = "paired seed" if self.paired else "run"
         n = f"{self.n_seeds} {unit}{'' if self.n_seeds == 1 else 's'}"
         n += "" if self.paired else " a condition"
+        n = n if self.n_trainings is None else f"{self.n_trainings} trainings x {n}"
         p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
         return (
             f"{shown.mark} {self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
@@ -195,7 +202,7 @@ def judge(
         indicator: Its name.
         terms: Name to performances over seeds [items] and their weights in numerator and
             denominator; the first two are compared, the last is the reference that the ratio
-            divides by.
+            divides by. Of several trainings of a policy each has a row, shape (K, n).
         offset: Added to the ratio of means.
 
     Raises:
@@ -209,13 +216,17 @@ def judge(
     *_, reference = (term.sample for term in weighted.values())
     mean_den = float(reference.mean())
     mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
-    n_seeds = min(term.sample.size for term in weighted.values())
+    n_seeds = min(term.sample.shape[-1] for term in weighted.values())
+    trainings = {len(term.sample) if term.sample.ndim == 2 else None for term in weighted.values()}
+    if len(trainings) > 1:
+        raise IndicatorError(f"{', '.join(weighted)}: should be of the same trainings")
     untested = Estimate(
         indicator=indicator,
         value=mean_num / mean_den + offset,
         threshold=threshold,
         confidence=confidence,
         n_seeds=n_seeds,
+        n_trainings=trainings.pop(),
         paired=paired,
         mean_denominator=mean_den,
     )
@@ -235,7 +246,9 @@ def _tested(
     terms, null = list(weighted.values()), threshold - offset
     asking = {"offset": offset, "threshold": threshold, "confidence": asked.confidence}
     skewness, correlation, stakes = None, None, (0.0, 0.0)
-    if paired:
+    if asked.n_trainings is not None:
+        test = ratio_over_trainings(terms, paired=paired, **asking)
+    elif paired:
         correlation = pairing_correlation(terms[0].sample, terms[1].sample)
         num = np.asarray(sum(term.in_num * term.sample for term in terms))
         den = terms[-1].sample
@@ -250,8 +263,9 @@ def _tested(
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
     leaning = float(test.value) - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
-    blocked = capped or bool(test.degenerate) or n_seeds < LEAST_SEEDS
-    normal = not paired or n_seeds < MIN_SEEDS
+    few = asked.n_trainings is not None and asked.n_trainings < LEAST_TRAININGS
+    blocked = capped or bool(test.degenerate) or n_seeds < LEAST_SEEDS or few
+    normal = not paired or n_seeds < MIN_SEEDS or asked.n_trainings is not None
     hidden = bool(test.p_seen < 1.0 - asked.confidence <= test.p_value)
     flags = {
         "skewed": skewness is not None and _skewed(skewness, n_seeds),
@@ -261,6 +275,7 @@ def _tested(
         "assumes_normal": normal and not blocked,
         "hidden_stalls": hidden and not normal and not blocked,
         "unbounded": test.unbounded,
+        "few_trainings": few,
     }
     return replace(
         asked,
@@ -270,7 +285,7 @@ def _tested(
         probability=0.5 if blocked else float(test.probability),
         p_value=1.0 if blocked else float(test.p_value),
         pairing_correlation=correlation,
-        difference_sd=float(test.difference_sd),
+        difference_sd=None if asked.n_trainings is not None else float(test.difference_sd),
         difference_skewness=skewness,
         at_stake=stakes,
         degrees_of_freedom=test.degrees_of_freedom,
@@ -286,7 +301,7 @@ def _checked(
     identical: bool,
 ) -> dict[str, Term]:
     weighted = {
-        name: Term(performance(name, sample), in_num, in_den)
+        name: Term(performance(name, sample, or_trainings=True), in_num, in_den)
         for name, (sample, in_num, in_den) in terms.items()
     }
     samples = {name: term.sample for name, term in weighted.items()}

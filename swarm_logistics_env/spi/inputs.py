@@ -13,20 +13,27 @@ from numpy.typing import ArrayLike, NDArray
 Numbers: TypeAlias = NDArray[np.float64]
 
 
-def performance(name: str, values: ArrayLike) -> Numbers:
-    """Performances as a float array (n,): not empty, finite, not negative."""
+def performance(name: str, values: ArrayLike, *, or_trainings: bool = False) -> Numbers:
+    """Performances as a float array (n,): not empty, finite, not negative.
+
+    Args:
+        or_trainings: whether (K trainings, n) will do as well, with two trainings or more.
+    """
     array = numbers(name, values)
-    if array.ndim != 1:
+    if array.ndim != 1 and not (or_trainings and array.ndim == 2 and len(array) > 1):
+        more = ", or a row for each of two trainings or more" * or_trainings
         raise IndicatorError(
-            f"{name} has shape {array.shape}: should be one number per seed (or size), shape (n,)"
+            f"{name} has shape {array.shape}: should be one number per seed (or size), shape "
+            f"(n,){more}"
         )
     if array.size == 0:
         raise IndicatorError(f"{name} is empty: should hold one number per seed (or size)")
-    for seed, value in enumerate(array.tolist()):
+    for place, value in np.ndenumerate(array):
+        where = ", ".join(map(str, place))
         if not math.isfinite(value):
-            raise IndicatorError(f"{name}[{seed}] = {value}: should be finite")
+            raise IndicatorError(f"{name}[{where}] = {value}: should be finite")
         if value < 0:
-            raise IndicatorError(f"{name}[{seed}] = {value:g}: should not be negative")
+            raise IndicatorError(f"{name}[{where}] = {value:g}: should not be negative")
     return array
 
 
@@ -39,9 +46,11 @@ def numbers(name: str, values: ArrayLike) -> Numbers:
 
 
 def same_seeds(**samples: Numbers) -> None:
-    """Raise unless all samples have one performance for each of the same seeds."""
-    if len({sample.size for sample in samples.values()}) > 1:
-        lengths = ", ".join(f"{name} has {sample.size}" for name, sample in samples.items())
+    """Raise unless all samples have one performance for each of the same seeds (and trainings)."""
+    if len({sample.shape for sample in samples.values()}) > 1:
+        lengths = ", ".join(
+            f"{name} has {' x '.join(map(str, sample.shape))}" for name, sample in samples.items()
+        )
         raise IndicatorError(
             f"unequal seed sets ({lengths}): paired samples need the same seeds in the same order; "
             "pass paired=False for results that share no seeds"

@@ -148,6 +148,8 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
     finite("effect", effect)
     if estimate.identical:
         return "the runs compared are the same runs: the value is exact"
+    if estimate.n_trainings is not None:
+        return "of several trainings no number of seeds is planned: more trainings tell more"
     if estimate.difference_sd is None:
         return "one seed shows no spread between seeds"
     if estimate.difference_sd == 0.0:

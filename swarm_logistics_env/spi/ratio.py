@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -281,21 +281,42 @@ def _difference(terms: Sequence[Term], theta: float) -> tuple[float, float, floa
 def _limits(
     terms: Sequence[Term], value: float, mean_den: float, quantile: float
 ) -> tuple[float, float]:
+    # Far out only the denominator's sample is left.
+    far = _difference([Term(sample, in_den, 0.0) for sample, _, in_den in terms], 0.0)
+    return limits(lambda theta: _difference(terms, theta), far, value, mean_den, quantile)
+
+
+def limits(
+    difference: Callable[[float], tuple[float, float, float]],
+    far: tuple[float, float, float],
+    value: float,
+    mean_den: float,
+    quantile: float,
+) -> tuple[float, float]:
+    """Return the ends of the interval of all theta that a t test keeps; infinite: it has none.
+
+    Args:
+        difference: theta to mean(D), its squared standard error and the degrees of freedom.
+        far: the same of the denominator alone, which is all that is left of D far out.
+        value: the estimate, where mean(D) = 0.
+        mean_den: mean of the denominator, above 0.
+        quantile: of Student's distribution, in (0.5, 1).
+    """
     from scipy.optimize import brentq
     from scipy.special import stdtrit
 
     def outside(theta: float) -> float:
         """Positive where the test at theta rejects."""
-        mean, variance, df = _difference(terms, theta)
+        mean, variance, df = difference(theta)
         if variance == 0.0:
             return abs(mean)
         return abs(mean) - float(stdtrit(df, quantile)) * math.sqrt(variance)
 
-    # Far out only the denominator's sample is left; the interval ends if its mean is clear of 0.
-    _, far, df = _difference([Term(sample, in_den, 0.0) for sample, _, in_den in terms], 0.0)
-    if far > 0.0 and mean_den <= float(stdtrit(df, quantile)) * math.sqrt(far):
+    _, variance, df = far
+    # The interval ends if the denominator's mean is clear of 0.
+    if variance > 0.0 and mean_den <= float(stdtrit(df, quantile)) * math.sqrt(variance):
         return -math.inf, math.inf
-    spread = math.sqrt(_difference(terms, value)[1]) / mean_den
+    spread = math.sqrt(difference(value)[1]) / mean_den
     if spread == 0.0:
         return value, value
 

@@ -23,10 +23,22 @@ class Interval(NamedTuple):
 def mean_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     """Mean performance with its t-interval [items], n - 1 degrees of freedom, cut off at 0.
 
+    Args:
+        p: Performance over seeds, shape (n,); or over trainings and seeds, shape (K, n): the
+            interval then holds for further trainings as well.
+
     Raises:
         IndicatorError: p empty, negative or not finite; confidence outside (0, 1).
     """
-    return _not_negative(t_interval(performance("p", p), confidence))
+    checked = performance("p", p, or_trainings=True)
+    if checked.ndim == 1 or checked.shape[1] == 1:
+        return _not_negative(t_interval(checked.ravel(), confidence))
+    from scipy.special import stdtrit
+
+    between_0_and_1("confidence", confidence)
+    mean, variance, df = mean_over_trainings([checked], paired=True)
+    half = float(stdtrit(df, 0.5 + confidence / 2)) * math.sqrt(variance)
+    return _not_negative(Interval(mean, mean - half, mean + half))
 
 
 def prediction_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
@@ -145,6 +157,36 @@ def t_interval(sample: Numbers, confidence: float = 0.95, *, of_one_run: bool = 
     spread = float(sample.std(ddof=1)) * math.sqrt(1 / n + of_one_run)
     half = float(stdtrit(n - 1, 0.5 + confidence / 2)) * spread
     return Interval(mean, mean - half, mean + half)
+
+
+def mean_over_trainings(weighted: Sequence[Numbers], *, paired: bool) -> tuple[float, float, float]:
+    """Return the mean of the sum, its squared standard error and degrees of freedom.
+
+    Trainings and seeds are crossed factors without replication, so the variance of the mean is
+    (MS_k + MS_s - MS_e) / KS of the two-way analysis of variance (Searle, Casella and McCulloch
+    1992), its degrees of freedom after Satterthwaite (1946).
+
+    Args:
+        weighted: shape (K, S) each, K >= 2. Unless paired, the seeds of each are others.
+    """
+    parts = [np.sum(weighted, axis=0)] if paired else weighted
+    by_training = np.sum([part.mean(axis=1) for part in parts], axis=0)
+    count = by_training.size
+    of_trainings = float(by_training.var(ddof=1)) / count
+    # The residual is in both mean squares: that of the seeds counts without it.
+    of_seeds, without_residual = 0.0, 0.0
+    freedom = of_trainings**2 / (count - 1)
+    for part in parts:
+        seeds = part.shape[1]
+        residual = part - part.mean(axis=0) - part.mean(axis=1, keepdims=True) + part.mean()
+        square = float(part.mean(axis=0).var(ddof=1)) / seeds
+        error = float(np.square(residual).sum()) / ((count - 1) * (seeds - 1)) / part.size
+        of_seeds += square
+        without_residual += square - error
+        freedom += square**2 / (seeds - 1)
+    variance = max(of_trainings + without_residual, of_trainings, of_seeds)
+    df = max(variance**2 / freedom, 1.0) if freedom else math.inf
+    return float(by_training.mean()), variance, df
 
 
 def _not_negative(interval: Interval) -> Interval:
