@@ -73,8 +73,13 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
 
     Raises:
-        PolicyError: there is no such policy, or it does not take these parameters.
+        PolicyError: there is no such policy, it does not take these parameters, or the name stands
+            for several trainings.
     """
+    if several := trainings_of(name):
+        raise PolicyError(
+            f"policy {name!r} is {len(several)} trainings: should name one of {', '.join(several)}"
+        )
     make = (
         NAMES.get(name)
         or _declared(name)
@@ -172,10 +177,17 @@ class PolicySpec(Record):
         return self.label or called(self.name) + (f" ({given})" if given else "")
 
     @property
+    def trainings(self) -> tuple[Self, ...]:
+        """The trainings that its name stands for, see `trainings_of`; empty: it is one policy."""
+        return tuple(
+            type(self)(name=name, trusted=self.trusted) for name in trainings_of(self.name)
+        )
+
+    @property
     def is_text(self) -> bool:
         """Whether a command line can name it: no object, of which a store keeps its class alone."""
         is_class = self.name.isidentifier() and self.name not in NAMES
-        return self.made is None and not (self.parameters or is_class)
+        return self.made is None and not (self.parameters or is_class or self.trainings)
 
     @property
     def runs_code(self) -> bool:
@@ -210,7 +222,12 @@ class PolicySpec(Record):
         return copy.deepcopy(_loaded(self.name, canonical_json(self.parameters), self.trusted))
 
     def identity(self, makers: Makers = NO_MAKERS) -> str:
-        """Return text that changes whenever the policy's behaviour may have; `makers` as `load`."""
+        """Return text that changes whenever the policy's behaviour may have; `makers` as `load`.
+
+        Of several trainings it is a JSON object with that of each by its name.
+        """
+        if self.trainings:
+            return canonical_json({one.name: one.identity(makers) for one in self.trainings})
         found = identity(self.load(makers))
         # A class of one's own need not tell its parameters.
         return (
@@ -244,8 +261,39 @@ def known_policies() -> Iterator[tuple[str, str, str]]:
         yield point.name, "installed", point.value
 
 
+ALL = "@all"
+
+
+@functools.cache
+def trainings_of(name: str) -> tuple[str, ...]:
+    """Return the names of all trainings of one recipe: those of "ppo-robust@all", or of files.
+
+    "ppo-robust@all" stands for "ppo-robust", "ppo-robust@1" and so on; "my/robust@all.safetensors"
+    for the files my/robust@1.safetensors and so on. Empty: the name does not end in "@all".
+
+    Raises:
+        PolicyError: fewer than two trainings go by that name.
+    """
+    suffix = SUFFIX if name.endswith(SUFFIX) else ""
+    if not name.endswith(f"{ALL}{suffix}"):
+        return ()
+    stem = name.removesuffix(f"{ALL}{suffix}")
+    known = [str(path) for path in Path(stem).parent.glob(f"*{SUFFIX}")] if suffix else NAMES
+    number = re.compile(rf"{re.escape(stem)}(@(\d+))?{re.escape(suffix)}")
+    found = sorted((int(match[2] or -1), one) for one in known if (match := number.fullmatch(one)))
+    if len(found) < 2:
+        raise PolicyError(
+            f"policy {name!r}: should stand for two trainings or more, as {stem}@1{suffix} and "
+            f"{stem}@2{suffix}, found {len(found)}"
+        )
+    return tuple(one for _, one in found)
+
+
 def called(name: str) -> str:
     """Return what people call the policy `name`: a trained policy's file by its card's name."""
+    if several := trainings_of(name):
+        stem = Path(name).name.removesuffix(SUFFIX).removesuffix(ALL)
+        return f"{stem}, {len(several)} trainings"
     if not name.endswith(SUFFIX) or name in NAMES:
         return name
     try:

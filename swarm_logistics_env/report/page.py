@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -16,7 +17,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.studies.comparison import Arm, Comparison
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
-from swarm_logistics_env.tasks.task import DEFAULT
+from swarm_logistics_env.tasks.task import DEFAULT, Outcome
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.fault_text import text_of
 
@@ -58,18 +59,26 @@ def _conditions(results: StudyResults, arms: Sequence[Arm]) -> Iterator[Json]:
     share = min(1.0, _MOST_TIMES / max(1, delivered))
     shown = max(1, int(share * len(results.plan.seeds)))
     for arm in arms:
-        outcomes = [results.outcome(arm, seed) for seed in results.plan.seeds]
+        trainings = [replace(arm, case=case) for case in arm.case.trainings]
+        at_seed = [[results.outcome(one, s) for one in trainings] for s in results.plan.seeds]
         yield {
             "name": f"{arm.case.policy.title}, {arm.setting}",
             "end": float(arm.case.scenario.duration),
-            "p": [None if one is None else round(float(one.delivered), 4) for one in outcomes],
-            # Deliveries in whole seconds, each as the time since the one before.
+            "p": [_mean_p(outcomes) for outcomes in at_seed],
+            # Deliveries in whole seconds, each as the time since the one before; of the first
+            # training, where there are several.
             "curves": [
                 None if one is None or one.untimed is not None else _steps(one.delivery_times)
-                for one in outcomes[:shown]
+                for one, *_ in at_seed[:shown]
             ],
-            "command": watch_command(arm),
+            "command": watch_command(trainings[0]),
         }
+
+
+def _mean_p(outcomes: Sequence[Outcome | None]) -> float | None:
+    """Return mean P over the trainings at one seed; None: a run failed, or is missing."""
+    found = [one.delivered for one in outcomes if one is not None]
+    return round(float(np.mean(found)), 4) if len(found) == len(outcomes) else None
 
 
 def _steps(times: NDArray[np.float64]) -> list[JsonValue]:
@@ -178,7 +187,11 @@ def _seed_by_seed(results: StudyResults, compared: Comparison) -> list[JsonValue
     """Return an indicator's value from each seed alone; None where it is undefined."""
     if not results.plan.paired:
         return []
-    samples = {arm: cell.by_seed for arm, cell in results.cells_of(compared).items()}
+    # Of several trainings the mean at each seed.
+    samples = {
+        arm: np.atleast_2d(cell.by_seed).mean(axis=0)
+        for arm, cell in results.cells_of(compared).items()
+    }
     values: list[JsonValue] = []
     for place in range(len(results.plan.seeds)):
         try:

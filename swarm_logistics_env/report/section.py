@@ -45,6 +45,7 @@ FLAGS = {
     "the verdict comes from the test",
     "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
     "ten, or unpaired",
+    "few_trainings": "Fewer than five trainings give no verdict",
     "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
     "its level says",
 }
@@ -243,6 +244,8 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
         seeds = seeds_text(results)
     if results.plan.specification.until_clear:
         seeds = f"{estimate.n_seeds} paired seeds"
+    if estimate.n_trainings is not None:
+        seeds = f"{estimate.n_trainings} trainings x {seeds}"
     if estimate.identical:
         yield f"{indicator} = {estimate.value:.3f} exactly, over {seeds}: {UNAFFECTED}."
         yield "Both conditions gave the same runs, so there is nothing to test."

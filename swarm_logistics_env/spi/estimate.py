@@ -265,7 +265,7 @@ def _tested(
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
     few = asked.n_trainings is not None and asked.n_trainings < LEAST_TRAININGS
     blocked = capped or bool(test.degenerate) or n_seeds < LEAST_SEEDS or few
-    normal = not paired or n_seeds < MIN_SEEDS or asked.n_trainings is not None
+    normal = not paired or n_seeds < MIN_SEEDS
     hidden = bool(test.p_seen < 1.0 - asked.confidence <= test.p_value)
     flags = {
         "skewed": skewness is not None and _skewed(skewness, n_seeds),

@@ -71,7 +71,8 @@ class Plan:
     @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The conditions to run, each once however many comparisons share it."""
-        return tuple({arm.case.key: arm.case for _, _, arm in self.cells}.values())
+        every = (case for _, _, arm in self.cells for case in arm.case.trainings)
+        return tuple({case.key: case for case in every}.values())
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:
@@ -80,12 +81,14 @@ class Plan:
 
     def __str__(self) -> str:
         asked, run = len(self.cells), len(self.cases)
+        # Of several trainings each has its conditions.
+        shared = f" ({asked - run} shared)" if asked >= run else ""
         start = self.specification.first_seed
         first = f" from {start} on" if start else ""
         most = "at most " if self.specification.until_clear else ""
         return (
             f"{self.specification.name}: {len(self.comparisons)} comparisons of {asked} cells; "
-            f"{run} conditions ({asked - run} shared) x {most}{len(self.seeds)} seeds{first} = "
+            f"{run} conditions{shared} x {most}{len(self.seeds)} seeds{first} = "
             f"{most}{run * len(self.seeds)} runs"
         )
 
@@ -141,12 +144,19 @@ def make_plan(
 
     Raises:
         StudyError: the specification varies nothing, a step of it cannot be, two factors with one
-            heading vary the same under different conditions, or there is no such reference.
+            heading vary the same under different conditions, there is no such reference, or a
+            policy of several trainings is to be played until it is clear.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
     load_reference(specification.reference)  # a name that is wrong is told before anything is run
     known: dict[str, str] = {}
     task = specification.played
+    several = [policy.name for policy in specification.policies if policy.trainings]
+    if several and specification.until_clear:
+        raise StudyError(
+            f"policies = {several}: several trainings have a fixed number of seeds; should be "
+            "until_clear = false (--all-seeds)"
+        )
 
     def case_of(part: str, policy: PolicySpec) -> Case:
         if identities is not None and part not in identities:

@@ -43,7 +43,7 @@ class Cell:
         policy: label of the policy.
         table: heading of the report's table.
         arm: the setting and the case.
-        outcomes: of the runs that succeeded, seed by seed.
+        outcomes: of the runs that succeeded, seed by seed; of several trainings one after another.
         problem: why runs are missing; None: they are complete.
         published: P of the reference; None: it has none.
         counted: whether it is one of the cells of the reference's tables.
@@ -90,12 +90,14 @@ class Cell:
 
     @cached_property
     def by_seed(self) -> NDArray[np.float64]:
-        """P seed by seed, shape (n_seeds,)."""
-        return np.array([outcome.delivered for outcome in self.outcomes], dtype=np.float64)
+        """P seed by seed, shape (n_seeds,); of K trainings (K, n_seeds) if no run is missing."""
+        p = np.array([outcome.delivered for outcome in self.outcomes], dtype=np.float64)
+        several = len(self.arm.case.trainings)
+        return p.reshape(several, -1) if several > 1 and not self.problem else p
 
     @property
     def n_seeds(self) -> int:
-        """Number of runs that succeeded."""
+        """Number of runs that succeeded; of several trainings all together."""
         return len(self.outcomes)
 
     @property
@@ -116,12 +118,12 @@ class Cell:
     @cached_property
     def one_run(self) -> Interval:
         """Mean P with the 95 % interval of one further run."""
-        return spi.prediction_interval(self.by_seed) if self.n_seeds else _UNKNOWN
+        return spi.prediction_interval(self.by_seed.ravel()) if self.n_seeds else _UNKNOWN
 
     @property
     def stalled(self) -> float:
         """Share of runs with less than a quarter of the cell's median P."""
-        return spi.share_stalled(self.by_seed) if self.n_seeds else 0.0
+        return spi.share_stalled(self.by_seed.ravel()) if self.n_seeds else 0.0
 
     @property
     def words(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import json
 import math
 import time
 import traceback
@@ -217,6 +218,15 @@ class Case:
     def key(self) -> str:
         """Digest of the content, 64 hexadecimal digits."""
         return _digest(*self.content)
+
+    @cached_property
+    def trainings(self) -> tuple[Case, ...]:
+        """The case of each training of its policy; this one alone if that is one policy."""
+        several = self.policy.trainings
+        if not several:
+            return (self,)
+        identities = json.loads(self.identity)
+        return tuple(replace(self, policy=one, identity=identities[one.name]) for one in several)
 
     def run(self, code: str, seed: int) -> Run:
         """Return the run of this case at one seed, under one version of the code."""
