@@ -8,12 +8,17 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, called, load
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.records import read_table
+from swarm_logistics_env.report import benchmark
+from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, slug
+from swarm_logistics_env.report.write import write_report
 from swarm_logistics_env.spi import mean_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
@@ -34,7 +39,7 @@ from .study_commands import (
     study_of,
     until_cleared,
 )
-from .terminal import in_one_line, show_report, show_table
+from .terminal import in_one_line, show, show_report, show_table
 
 if TYPE_CHECKING:
     from swarm_logistics_env.attack import AttackResult
@@ -73,6 +78,13 @@ def judge_command(
         float | None, typer.Option(help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
+    plays_benchmark: Annotated[
+        bool,
+        typer.Option(
+            "--benchmark",
+            help="Play the benchmark of robustness, in which some failures are new to all.",
+        ),
+    ] = False,
     columns: Annotated[
         list[str] | None,
         typer.Option(
@@ -113,12 +125,22 @@ def judge_command(
         "--column": columns, "--ignore": ignore, "--duration": duration, "--decimal": decimal,
         "--setup": setup,
     }  # fmt: skip
-    of_policy = {"--seeds": seeds, "--minutes": minutes, "--clearing": clearing}
+    of_policy = {
+        "--seeds": seeds,
+        "--minutes": minutes,
+        "--clearing": clearing,
+        "--benchmark": plays_benchmark,
+    }
     is_policy = names_policy(asked)
     for option, given in (of_trials if is_policy else of_policy).items():
         if given:
             kind = "a policy" if is_policy else "a file of trials"
             raise StudyError(f"{option} is not for {kind}, and {asked!r} is one")
+    if plays_benchmark:
+        for option, given in {"--seeds": seeds, "--clearing": clearing}.items():
+            if given:
+                raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
+        raise typer.Exit(1 if _play_benchmark(asked, out, minutes, processes, trust_code) else 0)
     if is_policy:
         failed = _judge_policy(
             asked, out, seeds or JUDGE_SEEDS, minutes, processes, trust_code,
@@ -224,6 +246,37 @@ def _judge_policy(
             f"{shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
             f"--out {shlex.quote(f'{out}-{more}')}"
         )
+    typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}", out))
+    return tally.failed
+
+
+# Scores of the shipped policies in the benchmark; `docs/play_tables.py` writes it.
+ENTRIES = Path(__file__).parents[1] / "report" / "benchmark_entries.json"
+
+
+def _play_benchmark(
+    asked: str, out: Path | None, minutes: float | None, processes: int | None, trust_code: bool
+) -> int:
+    """Play the benchmark with a policy, or all its trainings; return how many runs failed."""
+    policy = PolicySpec.of(asked).replace(trusted=trust_code)
+    for one in policy.trainings or (policy,):
+        one.load()
+    out = out or Path("results", "benchmark", slug(policy.title))
+    study = study_of(benchmark.STUDY, out, None, [asked], trust_code)
+    typer.echo(f"{study.plan()}, kept in {out}\n")
+    count = processes or os.cpu_count() or 1
+    engine = engine_named("process" if count > 1 else "local", count, None)
+    tally = run_study(study, engine, minutes=minutes)
+    results = study.findings()
+    if tally.left or tally.failed:
+        show_report(results, out)
+        typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}", out))
+        return tally.failed
+    show(benchmark.table(results))
+    entries = {name: np.array(one) for name, one in json.loads(ENTRIES.read_text()).items()}
+    entries[policy.title] = benchmark.score(results)
+    show(benchmark.leaderboard(entries))
+    typer.echo(f"Report: {write_report(results, out, document(results))[0]}")
     typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}", out))
     return tally.failed
 

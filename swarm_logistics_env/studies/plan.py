@@ -16,7 +16,17 @@ from swarm_logistics_env.tasks.task import Case, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
 from .presets import load_reference
-from .specification import Ablation, Factor, Faults, Fields, Manner, Parameter, Sizes, Specification
+from .specification import (
+    BOTH,
+    Ablation,
+    Factor,
+    Faults,
+    Fields,
+    Manner,
+    Parameter,
+    Sizes,
+    Specification,
+)
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -273,16 +283,20 @@ def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Co
         )
 
     def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Manner) -> Arm:
-        fault = task.fault(mode, m, onset, lasts, manner)
-        return _arm(asked, base, Setting("fault", mode, m, onset), faults.scenario, fault)
+        failing = [task.fault(one, m, onset, lasts, manner) for one in mode.split(BOTH)]
+        return _arm(asked, base, Setting("fault", mode, m, onset), faults.scenario, *failing)
 
     wanted = [one for one in comparing("fault") if one.symbol in asked.indicators]
     if task.removed is None:
         wanted = [one for one in wanted if not one.needs_removed]
+    # The robots that are removed are those that would have failed.
+    whom: Manner = {} if faults.role is None else {"role": faults.role}
     for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
         failed = arm(mode, m, onset, faults.duration, faults.manner)
         for definition in wanted:
-            third = arm(str(task.removed), m, onset, None, {}) if definition.needs_removed else None
+            third = (
+                arm(str(task.removed), m, onset, None, whom) if definition.needs_removed else None
+            )
             yield Comparison(table, definition.symbol, original, failed, third)
 
 

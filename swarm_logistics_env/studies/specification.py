@@ -31,7 +31,8 @@ from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.task import DEFAULT, Task, TaskScenario, refuse_untrusted, task_of
 
 Fields = dict[str, JsonValue]
-Manner = dict[str, float | tuple[float, float]]
+Manner = dict[str, float | str | tuple[float, float]]
+BOTH = "+"  # between failure modes that the same robots have at once
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
@@ -123,7 +124,7 @@ class Faults(Factor):
 
     Args:
         modes: failure modes of the task other than "removed", which is the reference P_S: there the
-            robots are removed for good.
+            robots are removed for good. "FM1+FM4": the same robots fail in both ways.
         robots: numbers m of faulty robots, each below the swarm size.
         onsets: the times at which robots fail [s].
         duration: how long a failure lasts [s]; without it, until the end of the episode.
@@ -131,6 +132,8 @@ class Faults(Factor):
             in [0, 1); without it, the mode's own.
         intermittent: for how long [s] a failure holds, and for how long not, both on average, in
             turn: random failure and repair; without it, it holds without a break.
+        role: which robots fail: those that do this at the onset, of `warehouse.faults.ROLES`;
+            without it, they are drawn.
     """
 
     modes: Annotated[tuple[str, ...], Field(min_length=1), _ONCE]
@@ -139,12 +142,13 @@ class Faults(Factor):
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
     intermittent: tuple[PositiveFloat, PositiveFloat] | None = None
+    role: str | None = None
 
     @property
     def manner(self) -> Manner:
-        """The fields of a fault that say how it fails, as far as they are given."""
-        given: Manner = {} if self.factor is None else {"factor": self.factor}
-        return given if self.intermittent is None else {**given, "intermittent": self.intermittent}
+        """The fields of a fault that say how it fails and whom it strikes, as far as given."""
+        fields = {"factor": self.factor, "intermittent": self.intermittent, "role": self.role}
+        return {name: value for name, value in fields.items() if value is not None}
 
     def __str__(self) -> str:
         """Return in words how long, how far and how steadily robots fail; empty: for good."""
@@ -153,6 +157,7 @@ class Faults(Factor):
         if self.intermittent is not None:
             held, paused = self.intermittent
             said.append(f"{held:g} s failed, {paused:g} s not, in turn")
+        said += [] if self.role is None else [f"role {self.role}"]
         return ", ".join(said)
 
 
@@ -264,7 +269,10 @@ class Specification(_Part):
         if "task" in info.data:
             task = task_of(info.data["task"])
             known = set(task.failure_modes) - {task.removed}
-            for mode in (mode for factor in faults for mode in factor.modes):
+            modes = [
+                mode for factor in faults for both in factor.modes for mode in both.split(BOTH)
+            ]
+            for mode in modes:
                 if mode not in known:
                     raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
         return faults

@@ -219,3 +219,28 @@ def test_trials_without_removed_robots_and_a_second_judgement_are_named(
     assert "earlier judgement, so this one goes into results/judged/lab-2" in (
         capsys.readouterr().out
     )
+
+
+def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fields = {"seeds": 3, "faults": [{"title": "Held out: x", "modes": ["FM1+FM4"], "robots": [1]}]}
+    small = PRESETS["scorecard"].replace(**fields, sizes=[], parameters=[])
+    monkeypatch.setitem(PRESETS, "benchmark", small)
+    command = ["judge", "homing", "--benchmark", "--processes", "1"]
+    assert app.run(command) == 0
+    told = capsys.readouterr().out
+    assert "Worst cell: Held out: x, FM1+FM4, m = 1" in told
+    assert "entries by score" in told
+    assert (folder / "results" / "benchmark" / "homing" / "report.html").exists()
+    assert app.run(command) == 0
+    again = capsys.readouterr().out
+    assert "0 runs played" in again
+    assert (
+        again.split("Report:")[0].split("entries")[1]
+        == told.split("Report:")[0].split("entries")[1]
+    )
+    assert app.run([*command, "--seeds", "5"]) == 2
+    assert "same conditions for everybody" in capsys.readouterr().err
+    assert app.run(["judge", "judged_policy.py:Failing", "--benchmark", "--processes", "1"]) == 1
+    assert "failed" in capsys.readouterr().out

@@ -1,0 +1,186 @@
+"""The benchmark of robustness: a table by cell, the worst one, and a place among the entries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.studies.comparison import Arm
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
+
+from .section import NOTHING, Section, bracketed, mean_p, ratio
+
+STUDY = "benchmark"
+HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
+RESAMPLES = 2_000
+
+
+def table(results: StudyResults) -> Section:
+    """Return P, S, R or A, and FT of every condition, those of a title together."""
+    rows: list[tuple[str, ...]] = []
+    shown: set[str] = set()  # the sound swarm is the original condition of most titles
+    for title, tests in grouped(results.verdicts, lambda one: one.compared.table).items():
+        rows.append((title, "", "", ""))
+        cells = results.cells_of(tests[0].compared)
+        original = tests[0].compared.original
+        if original.case.key not in shown:
+            shown.add(original.case.key)
+            rows.append((f"  {original.setting}", mean_p(cells[original]), "", ""))
+        for changed, found in grouped(tests, lambda one: one.compared.changed).items():
+            by_symbol = {test.compared.indicator: test for test in found}
+            tolerance = by_symbol.pop("FT", None)
+            others = [f"{symbol} {ratio(test)}" for symbol, test in by_symbol.items()]
+            cell = results.cells_of(found[0].compared)[changed]
+            rows.append(
+                (
+                    f"  {changed.setting}",
+                    mean_p(cell),
+                    "; ".join(others),
+                    NOTHING if tolerance is None else ratio(tolerance),
+                )
+            )
+    return Section(
+        f"{results.policies[0]}: benchmark of robustness",
+        ("condition", "P [95 %]", "S, R or A [95 %]", "FT [95 %]"),
+        tuple(rows),
+        tuple(_notes(results)),
+    )
+
+
+def _notes(results: StudyResults) -> Iterator[str]:
+    test, share = worst(results)
+    cells = results.cells_of(test.compared)
+    changed, original = cells[test.compared.changed], cells[test.compared.original]
+    yield (
+        f"Worst cell: {test.compared.table}, {changed.words}: P {mean_p(changed)}, {share:.0%} of "
+        f"{mean_p(original)}."
+    )
+    held_out = spi.mean_interval(score(results))
+    yield f"Score: mean P of the {len(_held_out(results))} held-out cells {bracketed(held_out, 1)}."
+
+
+def worst(results: StudyResults) -> tuple[Verdict, float]:
+    """Return the comparison whose P is the least share of its original condition's, and the share.
+
+    Swarm sizes are left out: a small swarm delivers less by itself.
+
+    Raises:
+        StudyError: no comparison has its runs.
+    """
+    shares = [
+        (test, cells[test.compared.changed].mean.value / cells[test.compared.original].mean.value)
+        for test in results.verdicts
+        if test.estimate is not None and test.after.kind != "size"
+        for cells in [results.cells_of(test.compared)]
+    ]
+    if not shares:
+        raise StudyError("no comparison of the benchmark has its runs: all of them failed")
+    return min(shares, key=lambda one: one[1])
+
+
+def score(results: StudyResults) -> NDArray[np.float64]:
+    """Return mean P over the held-out conditions, of every training and seed, (K, n) or (n,).
+
+    Raises:
+        StudyError: runs are missing, or failed.
+    """
+    cells = _held_out(results)
+    for arm, cell in cells.items():
+        if cell.problem:
+            raise StudyError(f"{arm.setting}: {cell.problem}, so there is no score")
+    return np.asarray(np.mean([cell.by_seed for cell in cells.values()], axis=0))
+
+
+def _held_out(results: StudyResults) -> dict[Arm, Cell]:
+    return {
+        test.compared.changed: results.cells_of(test.compared)[test.compared.changed]
+        for test in results.verdicts
+        if test.compared.table.startswith(HELD_OUT)
+    }
+
+
+class Place(NamedTuple):
+    """An entry's place among others by mean score.
+
+    Attributes:
+        name: of the entry.
+        score: mean, with its interval over trainings and seeds.
+        rank: 1: the best.
+        best, worst: limits of the ranks in 95 % of resamples of trainings and seeds.
+        stability: share of resamples in which it has this rank.
+    """
+
+    name: str
+    score: Interval
+    rank: int
+    best: int
+    worst: int
+    stability: float
+
+
+def places(entries: Mapping[str, NDArray[np.float64]]) -> tuple[Place, ...]:
+    """Return the entries in the order of their scores, and how stable that order is.
+
+    Seeds are resampled for all entries together, as they are played over the same ones, trainings
+    for each entry by itself. Only a single training has no spread over trainings.
+
+    Args:
+        entries: name to scores, (K, n) or (n,), each over the same n seeds.
+    """
+    scores = {name: np.atleast_2d(one) for name, one in entries.items()}
+    rng = np.random.Generator(np.random.Philox(key=len(entries)))
+    n_seeds = min(one.shape[1] for one in scores.values())
+    drawn = np.empty((RESAMPLES, len(scores)))
+    for number in range(RESAMPLES):
+        seeds = rng.integers(n_seeds, size=n_seeds)
+        for place, one in enumerate(scores.values()):
+            drawn[number, place] = one[rng.integers(len(one), size=len(one))][:, seeds].mean()
+    found = _ranks(np.array([[one.mean() for one in scores.values()]]))[0]
+    ranks = _ranks(drawn)
+    limits = np.percentile(ranks, (2.5, 97.5), axis=0, method="nearest").astype(int)
+    rows = [
+        Place(
+            name,
+            spi.mean_interval(entries[name]),
+            int(found[place]),
+            int(limits[0, place]),
+            int(limits[1, place]),
+            float((ranks[:, place] == found[place]).mean()),
+        )
+        for place, name in enumerate(scores)
+    ]
+    return tuple(sorted(rows, key=lambda one: one.rank))
+
+
+def _ranks(scores: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return 1 + how many entries score higher, of every row."""
+    return np.asarray(1 + (scores[:, None, :] > scores[:, :, None]).sum(axis=2))
+
+
+def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
+    """Return the table of entries by score."""
+    rows = tuple(
+        (
+            one.name,
+            bracketed(one.score, 1),
+            f"{one.rank} [{one.best}, {one.worst}]",
+            f"{one.stability:.0%}",
+        )
+        for one in places(entries)
+    )
+    return Section(
+        "Benchmark of robustness: entries by score",
+        ("policy", "score [95 %]", "rank [95 %]", "same rank"),
+        rows,
+        (
+            "Score: mean P of the held-out cells, over trainings and seeds.",
+            f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
+        ),
+    )
