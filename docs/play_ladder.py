@@ -35,7 +35,7 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     for table_name in _tables(cleared):
         columns += [
             (f"time to clear [s], {table_name}", _times(cleared, table_name)),
-            (f"P with restock, {table_name}", _gains(restocked, table_name)),
+            (f"P where items come back, {table_name}", _gains(restocked, table_name)),
         ]
     rungs = cleared.policies
     rows = [
@@ -44,11 +44,9 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     ]
     seeds = cleared.plan.seeds
     text = (
-        f'{len(seeds)} seeds from {seeds[0]:,} on. Times are medians with 95 % intervals; "x of '
-        'y": so many runs were not done after '
-        f"{cleared.plan.specification.scenario.duration:g} s. P is the items delivered in 500 s, "
-        "and in brackets what is more than the rung before, seed by seed; `central`, which has no "
-        "stock, stands beside `homing`."
+        f"{len(seeds)} seeds from {seeds[0]:,} on. Times are medians with 95 % intervals: less is "
+        "better. P is the items delivered in 500 s, and in brackets the gain over the rung above, "
+        "seed by seed; that of `central`, which has no stock, is over `homing`."
     )
     return "\n".join([table(("", *(name for name, _ in columns)), rows), "", text])
 
@@ -69,7 +67,7 @@ def leans_block(found: StudyResults) -> str:
     seeds = found.plan.seeds
     text = (
         f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {len(seeds)} seeds from "
-        f"{seeds[0]:,} on. {section.SATURATED}: in some run every item was delivered."
+        f"{seeds[0]:,} on. {section.SATURATED}: in at least one run every item was delivered."
     )
     head = ("", *(f"`{one}`" for one in (least, *policies)))
     shares = _shares(_cells(found, _tables(found)[0]))
@@ -84,14 +82,14 @@ def _shares(cells: dict[str, Cell]) -> str:
         return f"{(p[script] - p[least]) / (p[network] - p[least]):.0%}"
 
     told = [
-        f"`homing` reaches {share('homing', 'swarm-dt', one)} and `homing-stock` "
-        f"{share('homing-stock', 'swarm-dt', one)} of what `{one}`"
+        f"`homing` has {share('homing', 'swarm-dt', one)} and `homing-stock` "
+        f"{share('homing-stock', 'swarm-dt', one)} of those of `{one}`"
         for one in p
         if one.startswith("ppo-")
     ]
     if not told:
         return ""
-    return f"As it is, {', and '.join(told)} delivers more than `swarm-dt`."
+    return f"As it is, of the deliveries that a network has over `swarm-dt`: {'; '.join(told)}."
 
 
 def _tables(found: StudyResults) -> Sequence[str]:

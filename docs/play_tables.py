@@ -118,8 +118,9 @@ def clearing_block(results: StudyResults) -> str:
     seeds = results.plan.seeds
     limit = results.plan.cases[0].scenario.duration
     text = (
-        f"Median time until all items are delivered [s], with its 95 % interval; {len(seeds)} "
-        f'seeds from {seeds[0]:,} on. "x of y": so many runs were not done after {limit:g} s.'
+        "Median time until all items are delivered [s], with its 95 % interval: less is better; N "
+        f'is 25; {len(seeds)} seeds from {seeds[0]:,} on. "x of y": so many runs were not done '
+        f"after {limit:g} s."
     )
     medians = {
         policy: median_interval(
@@ -130,12 +131,12 @@ def clearing_block(results: StudyResults) -> str:
     if {"swarm-dt", "homing", "homing-stock", "ppo-robust"} <= medians.keys():
         slow, fast = medians["swarm-dt"].value, medians["ppo-robust"].value
         shares = [
-            f"`{script}` saves {(slow - medians[script].value) / (slow - fast):.0%}"
+            f"`{script}` by {(slow - medians[script].value) / (slow - fast):.0%}"
             for script in ("homing", "homing-stock")
         ]
         text += (
-            f"\nOf the {slow - fast:.0f} s by which `ppo-robust` is faster than `swarm-dt`, "
-            f"{' and '.join(shares)}; both are scripts."
+            f"\nWithout a failure `ppo-robust` is {slow - fast:.0f} s faster than `swarm-dt`. Of "
+            f"that, two scripts are faster as well: {' and '.join(shares)}."
         )
     return "\n".join([table(head, rows), "", text])
 
@@ -158,6 +159,7 @@ def costs_block(found: Mapping[str, Any]) -> str:
     lines = [
         table(("", "agent-steps per s", "us per step", "cost per agent-step"), rows),
         "",
+        "Cost: less is better; the median over rounds of the ratio in each.",
         f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.",
     ]
     if "first_step" in found.get("seconds", {}):
