@@ -82,9 +82,9 @@ def findings(page: str) -> str:
         *_paper(block_of(page, "sentences")),
     ]
     lines = [f"* {one}" for one in told]
-    note = f"Means and indicators with 95 % intervals over {seeds} seeds"
+    note = f"95 % intervals over {seeds} seeds"
     note += "".join(f" ({count} where a fault makes P skewed)" for count, _, _ in more)
-    return "\n".join([*lines, "", f"{note}; `docs/results.md` has all of them."])
+    return "\n".join([*lines, "", f"{note}."])
 
 
 def _clearing(block: str) -> Iterator[str]:
@@ -93,25 +93,21 @@ def _clearing(block: str) -> Iterator[str]:
     times = {name.strip("`"): one for name, one in times.items()}
     best = min((name for name in times if name.startswith(_LEARNED)), key=lambda n: times[n].value)
     ratio = times[_REFERENCE].value / times[best].value
+    script = times.get(_STOCK)
+    beside = f"; `{_STOCK}`, a script that heaps items at its edge, in {script.text} s"
     yield (
-        f"**The paper's warehouse is cleared {ratio:.0f} times as fast by a learned swarm**: 25 "
-        f"robots deliver its 60 items in {times[best].text} s with `{best}`, in "
-        f"{times[_REFERENCE].text} s with the paper's Swarm D-T (medians; lifting takes no time)."
+        f"**The paper's warehouse, cleared {ratio:.0f} times as fast**: `{best}` delivers its 60 "
+        f"items in {times[best].text} s, the paper's Swarm D-T in {times[_REFERENCE].text} s"
+        f"{beside if script else ''} (medians; lifting takes no time)."
     )
-    if script := times.get(_STOCK):
-        yield (
-            f"**Much of that is a stock beside the delivery area**: `{_STOCK}`, a script without "
-            f"learning, needs {script.text} s."
-        )
 
 
 def _learned(rows: Rows) -> Iterator[str]:
     p = rows["P, N = 25"]
     best = max((name for name in p if name.startswith(_LEARNED)), key=lambda name: p[name].value)
     yield (
-        f"**A learned swarm delivers {p[best].value / p[_REFERENCE].value:.1f} times as much**: "
-        f"25 robots with `{best}` bring {p[best].text} items in 500 s, where items come back; the "
-        f"paper's Swarm D-T brings {p[_REFERENCE].text}."
+        f"**Where items come back, {p[best].value / p[_REFERENCE].value:.1f} times as many**: "
+        f"{p[best].text} in 500 s; Swarm D-T {p[_REFERENCE].text}."
     )
 
 
@@ -122,29 +118,22 @@ def _faults(rows: Rows) -> Iterator[str]:
     best = {mode: max(row, key=lambda name: row[name].low) for mode, row in r.items()}
     mode = max(r, key=lambda mode: r[mode][best[mode]].value - r[mode][worst[mode]].value)
     lost, kept = worst[mode], best[mode]
-    bears = "withstands it" if r[mode][kept].low > 0.0 else "loses least"
     yield (
-        f"**One collapses under a fault that another shrugs off**: with two of 25 robots in mode "
-        f"{mode} ({_MODES[mode]}) `{lost}` delivers {100 * (_SHARE - r[mode][lost].value):.0f} % "
-        f"less (robustness R = {r[mode][lost].text}), while `{kept}` {bears} "
-        f"({r[mode][kept].text})."
+        f"**One collapses under a fault that another bears**: with two robots in {mode} R of "
+        f"`{lost}` is {r[mode][lost].text}, of `{kept}` {r[mode][kept].text}."
     )
-
-
-_SHARE = 2 / 25  # of the robots that fail: R = (P_F - P_o) / P_o + m/N
 
 
 def _sizes(rows: Rows) -> Iterator[str]:
     s = rows["S, N 25 -> 100"]
     most = max(s, key=lambda name: s[name].value)
     least = min(s, key=lambda name: s[name].value)
-    less = "delivers less with them" if s[least].high < 0 else "gains least"
     title = "Four times the robots do not deliver four times as much"
     if max(one.high for one in s.values()) >= 1.0:
         title = "More robots help some swarms more than others"
     yield (
-        f"**{title}**: from 25 to 100, `{most}` scales best "
-        f"(S = {s[most].text}), and `{least}` {less} ({s[least].text})."
+        f"**{title}**: from 25 to 100 S of `{most}` is {s[most].text}, of `{least}` "
+        f"{s[least].text}."
     )
 
 
@@ -152,9 +141,8 @@ def _paper(block: str) -> Iterator[str]:
     pattern = r"Of (\d+) claims .*? (supports \d+) and (contradicts)\s(\d+ ?.*?); (\d+ are open)\."
     for count, supported, contradicts, refuted, still in re.findall(pattern, block):
         yield (
-            f"**Of {count} claims in the paper's text** this re-implementation {supported} and "
-            f"{contradicts} {refuted}; {still}. Constants that the paper omits were partly fitted "
-            "to its tables, and its number of runs is unknown."
+            f"**Of {count} claims in the paper's text** this re-implementation, with constants "
+            f"that are partly fitted, {supported} and {contradicts} {refuted}; {still}."
         )
 
 
@@ -166,12 +154,11 @@ def speed(page: str) -> str:
         for line in costs.splitlines()
         if line.startswith("| ")
     }
-    arrays, dicts = cells["env.step_arrays"], cells["env.step"]
+    arrays = cells["env.step_arrays"]
     (machine,) = re.findall(r"^On (.*), \d+ cores?, Python .*\.$", costs, flags=re.MULTILINE)
     return (
-        f"A step of 25 robots with bodies, 48 range beams each, radio and logistics takes "
-        f"{arrays[1]} µs on one core of {machine}: {arrays[0]} robot-steps a second "
-        f"({dicts[0]} as PettingZoo's dicts)."
+        f"A step of 25 robots takes {arrays[1]} µs on one core of {machine}: {arrays[0]} "
+        "robot-steps a second."
     )
 
 
@@ -214,10 +201,7 @@ def draw(rows: Rows, path: Path) -> None:
 
 # -- links --------------------------------------------------------------------------------------
 
-NOTE = (
-    "Pictures and links are those of the repository. A package index does not show them; the "
-    "pages lie in `docs/` of the source distribution.\n\n"
-)
+NOTE = "A package index does not show them: pictures and links are those of the repository.\n"
 
 
 def with_address(text: str, address: str | None) -> str:
@@ -229,7 +213,7 @@ def with_address(text: str, address: str | None) -> str:
         return text
     text = re.sub(r'(src="|!\[[^]]*\]\()(?=docs/)', rf"\g<1>{address}/raw/main/", text)
     links = rf"\g<1>{address}/blob/main/"
-    return re.sub(r"^(\[[^]]+\]: )(?!https://)", links, text.replace(NOTE, ""), flags=re.MULTILINE)
+    return re.sub(r"(?<!!)(\[[^]]+\]\()(?!https://)", links, text.replace(NOTE, ""))
 
 
 def written() -> str:

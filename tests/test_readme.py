@@ -31,7 +31,7 @@ def run(block: str) -> dict[str, Any]:
 
 
 def test_every_block_of_code_runs_as_written(capsys: pytest.CaptureFixture[str]) -> None:
-    first, environment, policy = BLOCKS
+    first, environment = BLOCKS
     run(first)
     delivered = re.findall(r"^(\S+) +(\d+) items", capsys.readouterr().out, flags=re.MULTILINE)
     rows = re.findall(r"^\| `(\S+)`.*? \| (\d+) \| (\d+) \| (\d+) \|$", README, flags=re.MULTILINE)
@@ -40,7 +40,9 @@ def test_every_block_of_code_runs_as_written(capsys: pytest.CaptureFixture[str])
     names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
     assert all(names["truncations"].values())
-    assert run_episode(Scenario(), run(policy)["Wanderer"](), seed=0).delivered > 3
+    assert "swarm-logistics judge wanderer:Wanderer" in README
+    wanderer = run((ROOT / "examples" / "wanderer.py").read_text(encoding="utf-8"))["Wanderer"]
+    assert run_episode(Scenario(), wanderer(), seed=0).delivered > 3
 
 
 def test_what_it_says_of_results_is_what_the_page_of_results_says(
