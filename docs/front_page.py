@@ -93,12 +93,13 @@ def _clearing(block: str) -> Iterator[str]:
     times = {name.strip("`"): one for name, one in times.items()}
     best = min((name for name in times if name.startswith(_LEARNED)), key=lambda n: times[n].value)
     ratio = times[_REFERENCE].value / times[best].value
-    script = times.get(_STOCK)
-    beside = f"; `{_STOCK}`, a script that heaps items at its edge, in {script.text} s"
+    beside = ""
+    if script := times.get(_STOCK):
+        beside = f"; `{_STOCK}`, a script that heaps items at its edge, in {script.text} s"
     yield (
         f"**The paper's warehouse, cleared {ratio:.0f} times as fast**: `{best}` delivers its 60 "
         f"items in {times[best].text} s, the paper's Swarm D-T in {times[_REFERENCE].text} s"
-        f"{beside if script else ''} (medians; lifting takes no time)."
+        f"{beside} (medians; lifting takes no time)."
     )
 
 

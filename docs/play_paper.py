@@ -229,7 +229,7 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
 
 def _claims(sentence: str, tests: Sequence[Verdict]) -> list[tuple[str, ...]]:
     """Return a row for each claim of a sentence: what it asks, our value, and the verdict."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for test in tests:
         compared = test.compared
         sign = ">" if test.claimed else "<" if compared.definition.compares == "policy" else "≤"

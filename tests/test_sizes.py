@@ -43,12 +43,12 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 17_800,
-    "tokens of the package": 160_600,
-    "files of the package": 127,
-    "lines of code of studies and report": 3_980,
-    "lines of tests": 18_750,
-    "lines of verification, benchmarks, interop and the scripts of docs": 5_170,
+    "lines of code of the package": 18_120,
+    "tokens of the package": 163_700,
+    "files of the package": 129,
+    "lines of code of studies and report": 4_130,
+    "lines of tests": 18_990,
+    "lines of verification, benchmarks, interop and the scripts of docs": 5_280,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,

@@ -2,7 +2,8 @@
 
 It prints the errors of studies that run until they are clear, of a family of twelve of them, and of
 equivalence at the edge of its margin, with the power at the planned seeds; then the same where some
-runs stall, with the errors that only the runs seen would make.
+runs stall, with the errors that only the runs seen would make; and how often intervals over
+trainings and seeds hold the true value.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from swarm_logistics_env.studies.until_clear import SPENDING
 
 STUDIES = 10_000
 STALL_STUDIES = 3_000
+TRAINED_STUDIES = 1_000
 P_O, P_F = 39.0, 34.0  # true means [items]
 FAMILY = 12
 EDGE = 0.1
@@ -157,6 +159,52 @@ def share_equivalent(
     return found / studies
 
 
+class Coverage(NamedTuple):
+    """Share of studies whose interval holds the truth, and the median of its widths."""
+
+    share: float
+    width: float
+
+
+def trainings_coverage(
+    model: str, trainings: int, seeds: int, spread: float, studies: int = TRAINED_STUDIES
+) -> Coverage:
+    """Return how often the interval of R over trainings and seeds holds the true value.
+
+    Args:
+        model: a name in `MODELS`: how counts scatter around the mean of their training and seed.
+        trainings, seeds: of each study.
+        spread: standard deviation of ln P and of ln(1 + change) between trainings; .2 between
+            seeds.
+    """
+    rng = np.random.default_rng([trainings, seeds])
+    _, mean_o, mean_f = MODELS[model]
+    truth = mean_f / mean_o - 1.0 + _REMOVED / 25
+
+    def factor(shape: tuple[int, int], sd: float) -> Floats:
+        return np.exp(sd * rng.standard_normal(shape) - sd**2 / 2)
+
+    held, widths = 0, []
+    for _ in range(studies):
+        p_o = mean_o * factor((trainings, 1), spread) * factor((1, seeds), 0.2)
+        change = factor((trainings, 1), spread) * factor((1, seeds), 0.2)
+        means = p_o, p_o * mean_f / mean_o * change
+        found = spi.robustness(
+            *(_AROUND[model](rng, mean) for mean in means), n=25, m=_REMOVED, threshold=truth
+        )
+        held += found.p_value is None or found.p_value >= 0.05
+        widths.append((found.high or 0.0) - (found.low or 0.0))
+    return Coverage(held / studies, float(np.median(widths)))
+
+
+_REMOVED = 3
+_AROUND: Mapping[str, Callable[[np.random.Generator, Floats], Floats]] = {
+    "poisson": lambda rng, mean: rng.poisson(mean),
+    "overdispersed": lambda rng, mean: rng.poisson(mean * rng.gamma(20.0, 1 / 20.0, mean.shape)),
+    "geometric": lambda rng, mean: rng.geometric(1 / (1 + mean)) - 1,
+}
+
+
 def _t_statistic(p_o: Floats, p_new: Floats, threshold: float) -> Floats:
     difference = p_new - p_o - threshold * p_o
     spread = difference.std(axis=1, ddof=1) / math.sqrt(difference.shape[1])
@@ -245,6 +293,15 @@ def stall_rows(studies: int = STALL_STUDIES) -> Iterator[Sequence[str]]:
             yield model, seeds, above, below, equal
 
 
+def trainings_rows(studies: int = TRAINED_STUDIES) -> Iterator[Sequence[str]]:
+    """Yield the coverage and the width of intervals over trainings and seeds."""
+    for model in MODELS:
+        for trainings in (5, 10):
+            for spread in (0.0, 0.1, 0.3):
+                told = trainings_coverage(model, trainings, 20, spread, studies)
+                yield model, str(trainings), f"{spread}", f"{told.share:.3f}", f"{told.width:.2f}"
+
+
 TABLES: Mapping[str, tuple[Sequence[str], Callable[[], Iterable[Sequence[str]]]]] = {
     f"Until clear, {STUDIES:,} studies": (
         ("counts", "most seeds", "wrong", "above, below", f"in a family of {FAMILY}"),
@@ -257,6 +314,10 @@ TABLES: Mapping[str, tuple[Sequence[str], Callable[[], Iterable[Sequence[str]]]]
     f"Where runs stall, {STALL_STUDIES:,} studies": (
         ("runs", "seeds", "wrong above", "wrong below", "wrongly equivalent"),
         stall_rows,
+    ),
+    f"R over trainings and 20 seeds, {TRAINED_STUDIES:,} studies": (
+        ("counts", "trainings", "spread between trainings", "coverage", "median width"),
+        trainings_rows,
     ),
 }
 
