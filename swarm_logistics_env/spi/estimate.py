@@ -202,7 +202,8 @@ def judge(
         indicator: Its name.
         terms: Name to performances over seeds [items] and their weights in numerator and
             denominator; the first two are compared, the last is the reference that the ratio
-            divides by. Of several trainings of a policy each has a row, shape (K, n).
+            divides by. Of several trainings of a policy each has a row, shape (K, n); a
+            performance of shape (n,) beside it is of a policy that is not trained.
         offset: Added to the ratio of means.
 
     Raises:
@@ -304,6 +305,15 @@ def _checked(
         name: Term(performance(name, sample, or_trainings=True), in_num, in_den)
         for name, (sample, in_num, in_den) in terms.items()
     }
+    # A policy that is not trained is the same beside every training.
+    most = max((len(term.sample) for term in weighted.values() if term.sample.ndim == 2), default=0)
+    if most:
+        weighted = {
+            name: term._replace(sample=np.tile(term.sample, (most, 1)))
+            if term.sample.ndim == 1
+            else term
+            for name, term in weighted.items()
+        }
     samples = {name: term.sample for name, term in weighted.items()}
     if paired:
         same_seeds(**samples)

@@ -72,6 +72,14 @@ def test_unpaired_seeds_are_of_the_same_trainings() -> None:
     assert found.high == pytest.approx(0.5, abs=0.05)
 
 
+def test_a_script_is_the_same_beside_every_training() -> None:
+    p_o = np.random.default_rng(1).poisson(40, 12)
+    p_new, _ = study(np.random.default_rng(0), 5, 12, 0.2)
+    beside = spi.relative_change(p_o, p_new)
+    assert beside.n_trainings == 5
+    assert beside == spi.relative_change(np.tile(p_o, (5, 1)), p_new)
+
+
 def test_three_trainings_are_too_few_for_a_verdict() -> None:
     p_o, p_f = study(np.random.default_rng(0), 3, 20, 0.0, ratio=0.2)
     found = spi.robustness(p_o, p_f, n=25, m=3)
@@ -93,7 +101,7 @@ def test_no_number_of_seeds_is_planned_over_trainings() -> None:
     ("p_o", "p_f", "told"),
     [
         (np.ones((5, 4)), np.ones((4, 4)), "p_f has 4 x 4, p_o has 5 x 4"),
-        (np.ones((5, 4)), np.ones(20), "p_f has 20, p_o has 5 x 4"),
+        (np.ones((5, 4)), np.ones(20), "p_f has 5 x 20, p_o has 5 x 4"),
         (np.ones((1, 4)), np.ones((1, 4)), "two trainings or more"),
         (np.ones((5, 4)) * np.nan, np.ones((5, 4)), r"p_o\[0, 0\] = nan"),
     ],
