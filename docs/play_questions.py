@@ -42,7 +42,7 @@ def study(name: str, seeds: int | None = None) -> Study:
 
 def policies_compared(found: StudyResults) -> Answer:
     """Answer with all policies side by side, and the report's figure of R."""
-    blocks = {"answer": tables.side_by_side(found), "differences": tables.differences(found)}
+    blocks = {"answer": tables.side_by_side(found)}
     figure = next(f for f in document(found).figures() if f.name.startswith("R-Two-robots"))
     return blocks, figure.draw, figure.height
 

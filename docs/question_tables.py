@@ -17,9 +17,8 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
 LEGEND = (
-    f"{SIGNS['supported'].mark} above the threshold, {SIGNS['refuted'].mark} below it, "
-    f"{SIGNS['equivalent'].mark} open there but P within a tenth of P_o, "
-    f"{SIGNS['inconclusive'].mark} open, {SIGNS['unaffected'].mark} the same runs; under Holm"
+    "supported: above the threshold; refuted: below it; equivalent: open there, but P within a "
+    "tenth of P_o; under Holm"
 )
 
 
@@ -29,9 +28,9 @@ def over(found: StudyResults) -> str:
     return f"{len(seeds)} paired seeds from {seeds[0]:,} on"
 
 
-def with_sign(test: Verdict) -> str:
-    """Return an indicator with its interval and the sign of its verdict."""
-    return f"{section.ratio(test)} {SIGNS[test.conclusion or 'blocked'].mark}"
+def with_verdict(test: Verdict) -> str:
+    """Return an indicator with its interval and its verdict."""
+    return f"{section.ratio(test)} {SIGNS[test.conclusion or 'blocked'].word}"
 
 
 def asked(test: Verdict) -> str:
@@ -71,24 +70,11 @@ def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], flo
 def side_by_side(found: StudyResults) -> str:
     """Return P and the indicators of every policy, a column a policy."""
     rows: dict[str, dict[str, str]] = {}
-    for label, cell, _ in performances(found):
+    for label, cell in performances(found):
         rows.setdefault(label, {})[cell.policy] = section.mean_p(cell)
     for own in _of_all_policies(found):
-        rows[asked(own[0])] = {test.compared.policy: with_sign(test) for test in own}
+        rows[asked(own[0])] = {test.compared.policy: with_verdict(test) for test in own}
     return f"{_columns(rows, found.policies)}\n\n{over(found)}. [95 %]; {LEGEND}."
-
-
-def differences(found: StudyResults) -> str:
-    """Return how P and the indicators of every other policy differ from the first one's."""
-    baseline, *others = found.policies
-    rows: dict[str, dict[str, str]] = {}
-    for label, cell, less in performances(found):
-        rows.setdefault(label, {})[cell.policy] = section.bracketed(less, 1)
-    for first, *own in _of_all_policies(found):
-        rows[asked(first)] = {one.compared.policy: _less(found, one, first) for one in own}
-    shown = _columns(rows, others, [f"`{policy}` less `{baseline}`" for policy in others])
-    told = "An indicator is higher or lower if its interval is clear of 0."
-    return f"{shown}\n\n[95 %], paired by seed, unadjusted. {told}"
 
 
 def _of_all_policies(found: StudyResults) -> list[list[Verdict]]:
@@ -98,18 +84,8 @@ def _of_all_policies(found: StudyResults) -> list[list[Verdict]]:
     return [own for own in questions.values() if len(own) > 1]
 
 
-def _less(found: StudyResults, test: Verdict, first: Verdict) -> str:
-    """Return how much an indicator is above the first policy's, and on which side."""
-    try:
-        less = difference((found, test), (found, first))
-    except spi.IndicatorError:  # without one of the seeds nothing is delivered in the reference
-        return f"{section.NOTHING} open"
-    side = "higher" if (less.low or 0) > 0 else "lower" if (less.high or 0) < 0 else "open"
-    return f"{section.bracketed(less, 3)} {side}"
-
-
-def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | None]]:
-    """Yield label, cell and difference of P from the first policy's; no condition with faults."""
+def performances(found: StudyResults) -> Iterator[tuple[str, Cell]]:
+    """Yield label and cell of each condition without faults."""
     known: set[str] = set()
     cells = [c for c in found.cells if c.arm.setting.kind != "policy" and not c.arm.case.faults]
     by_condition = grouped(cells, lambda cell: (cell.table, cell.arm.setting))
@@ -117,15 +93,12 @@ def performances(found: StudyResults) -> Iterator[tuple[str, Cell, Interval | No
         for cell in own:
             if cell.arm.case.key not in known:
                 known.add(cell.arm.case.key)
-                less = None if cell is own[0] else t_interval(cell.by_seed - own[0].by_seed)
-                yield f"P, {setting}", cell, less
+                yield f"P, {setting}", cell
 
 
-def _columns(
-    rows: Mapping[str, Mapping[str, str]], policies: Sequence[str], heads: Sequence[str] = ()
-) -> str:
+def _columns(rows: Mapping[str, Mapping[str, str]], policies: Sequence[str]) -> str:
     body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
-    return table(("", *(heads or [f"`{policy}`" for policy in policies])), body)
+    return table(("", *(f"`{policy}`" for policy in policies)), body)
 
 
 # -- larger swarms ------------------------------------------------------------------------------
@@ -141,7 +114,7 @@ def by_size(found: StudyResults) -> str:
         (
             f"`{policy}`",
             mode,
-            *map(with_sign, own),
+            *map(with_verdict, own),
             section.bracketed(difference((found, own[-1]), (found, own[0])), 3),
         )
         for (policy, mode), own in tests.items()
@@ -159,7 +132,7 @@ def performances_by_size(found: StudyResults) -> str:
         each = (f"{c.mean.value / c.arm.setting.value:.2f}" for c in own)
         body.append((f"P / N, `{policy}`", *each))
         steps = [test for test in found.verdicts if test.compared.family == (policy, "S")]
-        body.append((f"S up to this N, `{policy}`", "", *map(with_sign, steps)))
+        body.append((f"S up to this N, `{policy}`", "", *map(with_verdict, steps)))
     return table(("", *(f"N = {n:g}" for n in sizes)), body)
 
 
@@ -181,7 +154,7 @@ def repairs(found: StudyResults) -> str:
     body = []
     for policy, mode, tests in repaired_tests(found):
         gain = spi.relative_change(*(_by_seed(found, one, one.compared.changed) for one in tests))
-        body.append((policy, mode, *map(with_sign, tests), _share(gain)))
+        body.append((policy, mode, *map(with_verdict, tests), _share(gain)))
     head = ("policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P [%]")
     return table(head, body)
 
@@ -223,7 +196,7 @@ def wear(found: StudyResults) -> str:
             arms = test.compared.original, test.compared.changed
             change = spi.relative_change(*(_by_seed(found, test, arm) for arm in arms))
             policy, label = test.compared.policy, test.compared.label
-            body.append((f"`{policy}`", label, with_sign(test), _share(change)))
+            body.append((f"`{policy}`", label, with_verdict(test), _share(change)))
     return table(("policy", "worn robots", "R", "change of P [%]"), body)
 
 
@@ -240,11 +213,4 @@ def beside_another_world(found: StudyResults, ideal: StudyResults) -> str:
             change = spi.relative_change(known.by_seed, cell.by_seed)
             means = section.mean_p(known), section.mean_p(cell)
             body.append((f"`{cell.policy}`", f"P, {cell.words}", *means, f"{_share(change)} %"))
-    answers = {(test.compared.policy, test.compared.question): test for test in ideal.verdicts}
-    for test in found.verdicts:
-        same = answers.get((test.compared.policy, test.compared.question))
-        if same is not None and test.compared.indicator == "R":
-            less = section.bracketed(difference((found, test), (ideal, same)), 3)
-            values = with_sign(same), with_sign(test)
-            body.append((f"`{test.compared.policy}`", asked(test), *values, less))
-    return table(("policy", "", "ideal", "realistic", "realistic less ideal"), body)
+    return table(("policy", "", "ideal", "realistic", "change"), body)
