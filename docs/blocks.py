@@ -6,7 +6,7 @@ The blocks of a page are run in their order, in one folder and one Python namesp
     toml      becomes the file that its first line names, `# name.toml`
     console   each `$ swarm-logistics ...`, `| head -N`, `| tail -N` and `|| echo WORDS` included
     text      directly below one of them: what it prints; recorded, and held by the tests
-    sh        is not run; its commands have to exist
+    sh        is not recorded; `python docs/blocks.py --small` runs it with few seeds and steps
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import re
 import shlex
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from swarm_logistics_env.cli import app
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.resolve().parent / "examples"
+README = DOCS.resolve().parent / "README.md"
 LANGUAGES = {"python", "toml", "console", "text", "sh", ""}
 
 _BLOCK = re.compile(r"^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -109,9 +110,9 @@ def comparable(text: str) -> str:
     )
 
 
-def commands(text: str) -> list[list[str]]:
-    """Return the arguments of every `swarm-logistics` command, run or not."""
-    code = "\n".join(b.code for b in blocks(text) if b.language in ("console", "sh"))
+def commands(text: str, languages: Sequence[str] = ("console", "sh")) -> list[list[str]]:
+    """Return the arguments of every `swarm-logistics` command in blocks of these languages."""
+    code = "\n".join(b.code for b in blocks(text) if b.language in languages)
     calls = re.findall(r"^(?:\$ )?swarm-logistics (.*)$", code.replace("\\\n", " "), re.MULTILINE)
     return [shlex.split(call.split(" |")[0], comments=True) for call in calls]
 
@@ -162,7 +163,58 @@ def _printed_by_command(line: str) -> str:
     return printed + (" ".join(shlex.split(otherwise)) + "\n" if code else "")
 
 
+# What makes a command small: options that are added, and options that go with their value.
+SMALL = {
+    ("judge",): (["--seeds", "3", "--all-seeds"], []),
+    ("study", "run"): (["--seeds", "1"], ["--seeds", "--until-clear", "--most", "--shard"]),
+    ("train",): (["--steps", "1"], []),
+}
+FLAGS = {"--until-clear"}  # options without a value
+
+
+def in_small(arguments: list[str]) -> list[str] | None:
+    """Return a command with few seeds and steps; None: it serves until somebody stops it."""
+    if arguments[0] == "watch" and "--save" not in arguments:
+        return None
+    for command, (more, less) in SMALL.items():
+        if tuple(arguments[: len(command)]) == command:
+            kept, rest = [], iter(arguments)
+            for one in rest:
+                if one not in less:
+                    kept.append(one)
+                elif one not in FLAGS:
+                    next(rest)
+            return kept + more
+    return arguments
+
+
+def run_in_small(texts: Mapping[str, str]) -> None:
+    """Run the shell commands of pages one after another in a folder with the pages' files.
+
+    Raises:
+        SystemExit: one of them failed.
+    """
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
+        for example in EXAMPLES.glob("*.py"):
+            Path(example.name).write_text(example.read_text(encoding="utf-8"), encoding="utf-8")
+        for text in texts.values():
+            for block in blocks(text):
+                if file := _FILE.match(block.code):
+                    Path(file[1]).write_text(block.code, encoding="utf-8")
+        for name, text in texts.items():
+            for arguments in commands(text, ("sh", "")):
+                small = in_small(arguments)
+                sys.stdout.write(f"{name}: swarm-logistics {shlex.join(small or arguments)}")
+                sys.stdout.write("\n" if small else ": is not run, it serves a page\n")
+                sys.stdout.flush()
+                if small and app.run(small):
+                    raise SystemExit(f"{name}: swarm-logistics {shlex.join(arguments)} failed")
+
+
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--small"]:
+        run_in_small({page.name: page.read_text("utf-8") for page in [*pages(), README]})
+        raise SystemExit
     for page in [Path(name) for name in sys.argv[1:]] or pages():
         text = page.read_text(encoding="utf-8")
         said = recorded(text)
