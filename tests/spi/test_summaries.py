@@ -1,6 +1,7 @@
+"""Summaries of P and of times: means, intervals, curves of repair, and runs that stalled."""
+
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import IndicatorError
+from swarm_logistics_env.studies.specification import looks_up_to
+from verification.verdict_errors import share_equivalent, wrong_verdicts
 
 P = [31.0, 38, 35, 44, 40, 29, 36]
 
@@ -83,29 +86,151 @@ def test_median_interval_covers_the_median_of_skewed_times() -> None:
     assert spi.median_interval(late) == (np.inf, 10.0, np.inf)
 
 
+def test_the_index_counts_deliveries_after_the_onset() -> None:
+    faulty = [[50.0, 150, 200], [10.0, 100, 120, 130]]  # 2 and 2 after 100 s
+    reference = [[50.0, 150, 200, 300, 310], [120.0, 130, 140]]  # 4 and 3
+    index = spi.resilience_index(faulty, reference, onset=100.0)
+    assert index.value == pytest.approx(4 / 7)
+    assert (index.indicator, index.threshold, index.n_seeds) == ("resilience", 1.0, 2)
+
+
+ONSET, END = 1_000.0, 2_000.0
+
+
+def test_each_run_is_timed_or_censored() -> None:
+    sound = np.arange(0.0, END, 5.0)
+    gap = sound[(sound < 1_000) | (sound > 1_200)]
+    halved = np.concatenate([sound[:200], sound[200:][::2]])
+    seconds, back = spi.repair_times([sound, gap, halved], [sound] * 3, onset=ONSET, end=END)
+    assert back.tolist() == [True, True, False]
+    assert seconds == pytest.approx([0, 200, 900], abs=6)  # followed until the last window begins
+    assert spi.kaplan_meier(seconds, back).share == pytest.approx([2 / 3, 1 / 3])
+
+
+# 6-MP arm of Freireich et al. (1963), the textbook example; True: relapse seen
+WEEKS = [6, 6, 6, 6, 7, 9, 10, 10, 11, 13, 16, 17, 19, 20, 22, 23, 25, 32, 32, 34, 35]
+SEEN = [1, 1, 1, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0]
+
+
+def test_textbook_curve() -> None:
+    curve = spi.kaplan_meier(WEEKS, SEEN)
+    assert curve.seconds.tolist() == [6, 7, 10, 13, 16, 22, 23]
+    expected = [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448]
+    assert curve.share == pytest.approx(expected, abs=5e-4)
+    # R survival, conf.type = "log-log"
+    assert (curve.low[0], curve.high[0]) == pytest.approx((0.620, 0.952), abs=1e-3)
+    assert (curve.low[-1], curve.high[-1]) == pytest.approx((0.188, 0.680), abs=1e-3)
+    assert curve.median() == 23
+    assert (spi.kaplan_meier(WEEKS, SEEN, confidence=0.99).low < curve.low).all()
+
+
+def test_a_curve_without_censoring_and_one_without_events() -> None:
+    curve = spi.kaplan_meier([3, 1, 2, 2], [True] * 4)
+    assert curve.share == pytest.approx([0.75, 0.25, 0.0])
+    assert (curve.low[-1], curve.high[-1], curve.median()) == (0.0, 1.0, 2)
+    curve = spi.kaplan_meier([900.0, 900.0], [False, False])
+    assert (curve.seconds.size, curve.median()) == (0, None)
+
+
+rng = np.random.default_rng(2)
+STEADY = rng.normal(300.0, 6.0, 20).round()
+FAULTY = (STEADY * 0.97 + rng.normal(0.0, 3.0, 20)).round()
+
+
+def test_a_run_below_a_quarter_of_the_median_stalled() -> None:
+    assert spi.share_stalled([40, 41, 39, 9]) == 0.25
+    assert spi.share_stalled([40, 40, 40, 10]) == 0.0
+    # Where most runs deliver nothing, none is an exception.
+    assert spi.share_stalled([0, 0, 0, 40]) == 0.0
+    assert spi.share_stalled(np.random.default_rng(0).poisson(39, 10_000)) == 0.0
+
+
+def test_a_small_effect_waits_for_the_seeds_that_would_show_a_stall() -> None:
+    few: Any = spi.robustness(STEADY, FAULTY, n=25, m=2)
+    assert few.low > 0.0
+    assert (few.verdict, "hidden_stalls" in few.flags) == ("inconclusive", True)
+    needed = spi.seeds_against_stalls(few) or 0
+    # Of so many seeds, none stalls in 2 % of studies if the share takes R down to 0.
+    share = few.value * few.mean_denominator / FAULTY.mean()
+    assert (1 - share) ** needed < 0.02 < (1 - share) ** (needed - 1)
+    times = -(-2 * needed // 20)
+    many = spi.robustness(np.tile(STEADY, times), np.tile(FAULTY, times), n=25, m=2)
+    assert (many.verdict, many.flags) == ("supported", ())
+    assert spi.seeds_against_stalls(many) is None
+
+
+def test_clear_effects_keep_their_verdicts_and_so_do_those_that_a_stall_would_add_to() -> None:
+    assert spi.robustness(STEADY, STEADY[::-1] * 0.4, n=25, m=2).verdict == "refuted"
+    assert spi.scalability(STEADY, STEADY[::-1] * 1.8, n=25, m=25).verdict == "supported"
+    # P_F could only be lower still; P_o would have to fall by a third.
+    assert spi.relative_change(STEADY, FAULTY - 100.0).verdict == "refuted"
+    assert spi.relative_change(STEADY, FAULTY).verdict == "inconclusive"
+    # Where a run stalled, the spread tells.
+    r = spi.robustness(STEADY, np.where(np.arange(20) == 3, 2.0, FAULTY), n=25, m=2)
+    assert (r.at_stake[0], r.verdict, "hidden_stalls" in r.flags) == (0.0, "inconclusive", False)
+
+
+# `python -m verification.verdict_errors` simulates 3,000 studies of each.
+@pytest.mark.parametrize(("stalled", "n"), [("3% stall", 30), ("5% stall", 20), ("10% stall", 10)])
+def test_verdicts_hold_their_level_though_some_runs_stall(stalled: str, n: int) -> None:
+    wrong = wrong_verdicts(stalled, [n], 600)
+    assert max(wrong.above, wrong.below) <= 0.06
+    assert share_equivalent(stalled, n, -0.1, 600) <= 0.06
+
+
+def test_without_the_hidden_stalls_they_would_not() -> None:
+    assert wrong_verdicts("5% stall", [20], 600, only_seen=True).above > 0.12
+    assert share_equivalent("5% stall", 20, -0.1, 600, only_seen=True) > 0.12
+    # Looks until it is clear hold their level too.
+    assert wrong_verdicts("5% stall", looks_up_to(60), 600).above <= 0.06
+
+
+RUNS: dict[str, Any] = {"faulty": [[1.0], [2.0]], "reference": [[1.0], [2.0]], "onset": ONSET}
+
+
 @pytest.mark.parametrize(
-    ("summary", "asked", "message"),
+    ("function", "asked", "message"),
     [
         *(
-            (summary, (p,), message)
+            (summary, {"p": p}, message)
             for summary in (
-                spi.mean_interval,
-                spi.prediction_interval,
-                spi.interquartile_mean,
-                spi.worst_decile,
+                spi.mean_interval, spi.prediction_interval, spi.interquartile_mean,
+                spi.worst_decile, spi.share_stalled,
             )
             for p, message in (([], "empty"), ([1, -1], "negative"))
         ),
-        (spi.probability_of_improvement, (P, P[:3]), "unequal seed sets"),
-        (spi.pairing_correlation, (P, P[:3]), "unequal seed sets"),
-        (spi.mean_interval, (P, 95), "confidence = 95"),
-        (spi.probability_of_improvement, (P, P, 95), "confidence = 95"),
-        (spi.median_interval, ([1.0, np.nan],), "times: should be"),
-        (spi.median_interval, ([],), "times: should be"),
+        (spi.probability_of_improvement, {"p_o": P, "p_new": P[:3]}, "unequal seed sets"),
+        (lambda **asked: spi.pairing_correlation(*asked.values()), {"a": P, "b": P[:3]}, "unequal"),
+        (spi.mean_interval, {"p": P, "confidence": 95}, "confidence = 95"),
+        (
+            spi.probability_of_improvement, {"p_o": P, "p_new": P, "confidence": 95},
+            "confidence = 95",
+        ),
+        (spi.median_interval, {"times": [1.0, np.nan]}, "times: should be"),
+        (spi.median_interval, {"times": []}, "times: should be"),
+        (spi.resilience_index, {"faulty": []}, "faulty is empty"),
+        (spi.resilience_index, {"reference": []}, "reference is empty"),
+        (spi.resilience_index, {"faulty": [[1.0]]}, "unequal seed sets"),
+        (spi.resilience_index, {"faulty": [[-1.0], []]}, r"faulty\[0\]"),
+        (spi.resilience_index, {"reference": [[], [float("nan")]]}, r"reference\[1\]"),
+        (spi.resilience_index, {"reference": [[[1.0]], []]}, r"reference\[0\]"),
+        (spi.resilience_index, {"faulty": [["late"]]}, r"= \['late'\]: should be an array of num"),
+        (spi.resilience_index, {"reference": [[10.0], []]}, "mean of reference = 0"),
+        (spi.resilience_index, {"onset": float("nan")}, "onset = nan"),
+        (spi.repair_times, {"faulty": [[1.0]]}, "unequal seed sets"),
+        (spi.repair_times, {"onset": END, "end": END}, "onset = 2000"),
+        (spi.repair_times, {"end": END, "window": 1_001.0}, "window = 1001"),
+        (spi.repair_times, {"end": END, "window": float("nan")}, "window = nan"),
+        *(
+            (spi.kaplan_meier, {"seconds": seconds, "happened": happened}, "seconds")
+            for seconds, happened in (
+                ([], []), ([1.0], [True, False]), ([-1.0], [True]), ([float("nan")], [True]),
+                ([float("inf")], [False]), (["late"], [True]),
+            )
+        ),
     ],
-)
-def test_what_cannot_be_is_named(
-    summary: Callable[..., Any], asked: tuple[Any, ...], message: str
-) -> None:
+)  # fmt: skip
+def test_what_cannot_be_is_named(function: Any, asked: dict[str, Any], message: str) -> None:
+    usual = {spi.resilience_index: RUNS, spi.repair_times: {**RUNS, "end": END}}
     with pytest.raises(IndicatorError, match=message):
-        summary(*asked)
+        function(**usual.get(function, {}) | asked)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import json
 import random
 import sqlite3
@@ -12,12 +13,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarm_logistics_env import policies
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.errors import SwarmLogisticsError
+from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
+from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.policies.files import write_policy
+from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import NOTE, merge
 from swarm_logistics_env.studies.importing import import_results
@@ -294,3 +300,35 @@ def spoiled(whole: Whole, spoil: Callable[[sqlite3.Connection], None]) -> None:
         read_all(out)
         assert_same_or_missing(whole, out)
         assert {path.name for path in out.iterdir()} <= ALLOWED
+
+
+@functools.cache
+def policy_file() -> bytes:
+    card = PolicyCard(name="small", network=Network(hidden=(8, 6), exploration=0.5))
+    rng = np.random.default_rng(0)
+    shapes = tensor_shapes(card.network)
+    tensors = {name: rng.normal(0, 1, shape).astype("f4") for name, shape in shapes.items()}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "small.safetensors"
+        write_policy(path, card, {**tensors, "deviations": np.abs(tensors["deviations"])})
+        return path.read_bytes()
+
+
+# A file that carries a pickle is refused unread, see tests/policies/test_files.py.
+@given(source=st.randoms(use_true_random=False))
+def test_any_policy_file_is_refused_or_plays(source: random.Random) -> None:
+    pytest.importorskip("safetensors")
+    whole = policy_file()
+    # Mostly where the header is, whose length the first eight bytes tell.
+    end = 8 + int.from_bytes(whole[:8], "little") if source.random() < 0.8 else len(whole)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mine.safetensors"
+        path.write_bytes(mangled(source, whole[:end]) + whole[end:])
+        try:
+            policy = policies.load(str(path))
+        except PolicyError as error:
+            assert_one_sentence(str(error))
+        else:
+            policy.reset(2, 0)
+            assert policy.act(np.ones((2, N_COLUMNS), np.float32)).shape == (2, 4)
+        assert listing(Path(folder)) == {path.name}

@@ -19,7 +19,7 @@ from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.scenario import LONGEST_STRIDE
 from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED
 from verification.invariants import BrokenPromiseError, Watch
-from verification.soak import Tally, play
+from verification.soak import SIZES, TARGETS, Overlaps, Tally, overlaps, play
 
 ROOT = Path(verification.__file__).parents[1]
 
@@ -64,6 +64,21 @@ def test_a_crowd_presses_nobody_out_at_the_longest_stride(heavy: bool) -> None:
             commands = rng.uniform(-1.5, 1.5, (34, 4)) if step % 20 else np.full((34, 4), 1.0)
         world.step(commands)
         watch.look()
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("n_robots", SIZES)
+def test_a_jam_keeps_bodies_apart(n_robots: int, target: str) -> None:
+    assert overlaps(n_robots, target, seed=0).problem(Scenario()) is None
+
+
+@pytest.mark.parametrize("name", ["median", "lasting", "robots", "walls"])
+def test_every_bound_is_checked(name: str) -> None:
+    depths = {"median": 0.001, "lasting": 0.0, "robots": 0.079, "walls": 0.039}
+    assert Overlaps(**depths).problem(Scenario()) is None
+    problem = Overlaps(**{**depths, name: 0.1}).problem(Scenario())
+    assert problem is not None
+    assert problem.startswith(f"{name} overlap 100.0 mm")
 
 
 Spoil = Callable[[Warehouse], None]
