@@ -242,6 +242,26 @@ def test_references_make_a_score_of_what_is_below_zero() -> None:
         (lambda: Study(task=LANE, scenario={"length": "x"}), "length = 'x': should be a number"),
         (lambda: only_run(LANE, policies=["walkr"]), "no policy 'walkr'"),
         (lambda: only_run(LANE, policies=["swarm-dt"]), "the task has no policy 'swarm-dt'"),
+        *(
+            (lambda task=task: Study(task=task, sizes=[{"values": [2, 4]}]), words)
+            for task, words in (
+                ("warehous", "(a name or 'package.module:OBJECT'); did you mean 'warehouse'?"),
+                ("nowhere:TASK", "task 'nowhere:TASK' cannot be imported: No module named 'now"),
+                ("json:nothing", "has no attribute 'nothing'"),
+                ("json:dumps", "is no task: should have the attributes of tasks.Task"),
+                (3, "3 is no task"),
+            )
+        ),
+        *(
+            (lambda fields=fields: Study(task=LANE, **fields), words)
+            for fields, words in (
+                ({"faults": [{"modes": ["silnt"]}]}, "'silnt'; did you mean 'silent'?"),
+                ({"faults": [{"modes": ["removed"]}]}, "no failure mode 'removed'"),
+                ({"parameters": [{"name": "item_radius", "values": [1, 2]}]}, "known: duration, l"),
+                ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
+                ({"scenario": 3}, "should be a table of fields or a ParallelScenario"),
+            )
+        ),
         (
             lambda: only_run(LANE, faults=[{**FAULT, "onsets": [5]}]),
             "removed from the start, not from 5 s on, so FT is not defined here: should be asked",

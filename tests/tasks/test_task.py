@@ -46,39 +46,6 @@ def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_p
     assert Study.stored(out, task=LANE).finished() == (4, 4)
 
 
-@pytest.mark.parametrize(
-    ("task", "words"),
-    [
-        ("warehous", "(a name or 'package.module:OBJECT'); did you mean 'warehouse'?"),
-        ("nowhere:TASK", "task 'nowhere:TASK' cannot be imported: No module named 'nowhere'"),
-        ("json:nothing", "has no attribute 'nothing'"),
-        ("json:dumps", "is no task: should have the attributes of tasks.Task"),
-        (3, "3 is no task"),
-    ],
-)
-def test_what_is_no_task_is_refused_in_one_sentence(task: object, words: str) -> None:
-    with pytest.raises(StudyError) as caught:
-        Study(task=task, sizes=[{"values": [2, 4]}])
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        ({"faults": [{"modes": ["silnt"]}]}, "no failure mode 'silnt'; did you mean 'silent'?"),
-        ({"faults": [{"modes": ["removed"]}]}, "no failure mode 'removed'"),
-        ({"parameters": [{"name": "item_radius", "values": [1, 2]}]}, "known: duration, length"),
-        ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
-        ({"scenario": 3}, "should be a table of fields or a ParallelScenario"),
-    ],
-)
-def test_fields_and_failure_modes_are_those_of_the_task(fields: dict[str, Any], words: str) -> None:
-    Study(task=LANE, parameters=[{"name": "length", "values": [1, 2]}])
-    with pytest.raises(StudyError, match=words):
-        Study(task=LANE, **fields)
-
-
 def test_the_warehouse_is_varied_by_its_numbers_and_presets() -> None:
     assert {"n_robots", "restock", "delivery_width"} & {*WAREHOUSE.fields} == {"delivery_width"}
     assert WAREHOUSE.removed in WAREHOUSE.failure_modes

@@ -8,8 +8,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -142,32 +140,24 @@ def test_an_output_that_is_full_ends_in_one_line(arguments: tuple[str, ...]) -> 
     assert len(done.stderr.splitlines()) == 1
 
 
-@contextmanager
-def read_only(folder: Path) -> Iterator[None]:
-    folder.chmod(0o555)
+@pytest.mark.skipif(sys.platform != "linux", reason="root writes everywhere")
+def test_a_folder_that_is_read_only_is_named_and_stays_as_it_is(tmp_path: Path) -> None:
+    played, empty = tmp_path / "played", tmp_path / "empty"
+    empty.mkdir()
+    Study(out=played, seeds=1, scenario=SCENARIO, sizes=[{"values": [2, 3]}]).run()
+    before = (played / FILE_NAME).read_bytes()
+    for folder in (played, empty):
+        folder.chmod(0o555)
+    run = ("study", "run", "quick", "--processes", "1", "--out")
     try:
-        yield
+        for words in (("study", "report", str(played)), (*run, str(empty)), (*run, f"{empty}/new")):
+            assert str(played if "report" in words else empty) in complaint(command(*words))
     finally:
-        folder.chmod(0o755)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="root writes everywhere")
-def test_a_folder_that_is_read_only_is_named(tmp_path: Path) -> None:
-    with read_only(tmp_path):
-        for out in (tmp_path, tmp_path / "new"):
-            arguments = ("study", "run", "quick", "--out", str(out), "--processes", "1")
-            assert str(tmp_path) in complaint(command(*arguments))
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="root writes everywhere")
-def test_a_study_in_a_folder_that_became_read_only_stays_as_it_is(tmp_path: Path) -> None:
-    Study(out=tmp_path, seeds=1, scenario=SCENARIO, sizes=[{"values": [2, 3]}]).run()
-    before = (tmp_path / FILE_NAME).read_bytes()
-    with read_only(tmp_path):
-        assert str(tmp_path) in complaint(command("study", "report", str(tmp_path)))
-    assert (tmp_path / FILE_NAME).read_bytes() == before
-    assert finished(tmp_path) == 2
+        for folder in (played, empty):
+            folder.chmod(0o755)
+    assert (played / FILE_NAME).read_bytes() == before
+    assert finished(played) == 2
+    assert list(empty.iterdir()) == []
 
 
 def test_a_clock_that_is_set_back_changes_nothing(
