@@ -60,7 +60,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 CAP_DAC_OVERRIDE, PR_CAPBSET_DROP = 1, 24
 
 
-def command(*arguments: str, limit: int | None = None) -> Any:
+def command(*arguments: str, limit: int | None = None, stdout: Any = subprocess.PIPE) -> Any:
     """Run the command line in another process, which may write files of `limit` bytes at most.
 
     Folders that are read-only are so for root as well.
@@ -78,7 +78,8 @@ def command(*arguments: str, limit: int | None = None) -> Any:
     return subprocess.run(
         [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()", *arguments],
         preexec_fn=limited,
-        capture_output=True,
+        stdout=stdout,
+        stderr=subprocess.PIPE,
         text=True,
         check=False,
     )
@@ -129,13 +130,7 @@ def test_what_cannot_be_written_whole_leaves_the_older_file(tmp_path: Path) -> N
 @pytest.mark.parametrize("arguments", [("list", "policies"), ("--help",)])
 def test_an_output_that_is_full_ends_in_one_line(arguments: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
-            [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()", *arguments],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+        done = command(*arguments, stdout=full)
     assert os.strerror(errno.ENOSPC) in complaint(done)
     assert len(done.stderr.splitlines()) == 1
 
