@@ -189,19 +189,19 @@ def in_small(arguments: list[str]) -> list[str] | None:
 
 
 def run_in_small(texts: Mapping[str, str]) -> None:
-    """Run the shell commands of pages one after another in a folder with the pages' files.
+    """Run the shell commands of each page in a folder that has the files of all pages.
 
     Raises:
         SystemExit: one of them failed.
     """
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
-        for example in EXAMPLES.glob("*.py"):
-            Path(example.name).write_text(example.read_text(encoding="utf-8"), encoding="utf-8")
-        for text in texts.values():
-            for block in blocks(text):
-                if file := _FILE.match(block.code):
-                    Path(file[1]).write_text(block.code, encoding="utf-8")
-        for name, text in texts.items():
+    files = {path.name: path.read_text(encoding="utf-8") for path in EXAMPLES.glob("*.py")}
+    for block in (block for text in texts.values() for block in blocks(text)):
+        if file := _FILE.match(block.code):
+            files[file[1]] = block.code
+    for name, text in texts.items():
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
+            for file_name, code in files.items():
+                Path(file_name).write_text(code, encoding="utf-8")
             for arguments in commands(text, ("sh", "")):
                 small = in_small(arguments)
                 sys.stdout.write(f"{name}: swarm-logistics {shlex.join(small or arguments)}")
