@@ -60,7 +60,7 @@ quick: $(DEV)/installed
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -q -p verification.interpreted $(QUICK) && wait $$types
 
 QUICK := $(addprefix tests/warehouse/test_,kinematics.py fault_text.py) tests/studies/test_plan.py tests/verification/test_mutants.py \
-	$(addprefix tests/spi/test_,definitions.py indicators.py multiplicity.py paper_tables.py) \
+	$(addprefix tests/spi/test_,indicators.py multiplicity.py) \
 	$(addprefix tests/test_,imports.py records.py scenario.py streams.py sizes.py)
 
 # What reaches every line of the kernels in seconds, without the compiler.
