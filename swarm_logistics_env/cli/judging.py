@@ -14,12 +14,13 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, called, load
 from swarm_logistics_env.policies.spec import PolicySpec
-from swarm_logistics_env.records import read_table
+from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, slug
 from swarm_logistics_env.report.write import write_report
 from swarm_logistics_env.spi import mean_interval
+from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
 from swarm_logistics_env.studies.importing import import_results
@@ -66,7 +67,7 @@ def judge_command(
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(min=3, help=f"Seeds of a policy at most; {JUDGE_SEEDS} if not given."),
+        typer.Option(help=f"Seeds of a policy at most, 3 or more; {JUDGE_SEEDS} if not given."),
     ] = None,
     until_clear: Annotated[
         bool,
@@ -136,6 +137,10 @@ def judge_command(
         if given:
             kind = "a policy" if is_policy else "a file of trials"
             raise StudyError(f"{option} is not for {kind}, and {asked!r} is one")
+    if seeds is not None and seeds < LEAST_SEEDS:
+        raise StudyError(
+            f"--seeds {seeds}: should be {LEAST_SEEDS} or more, as fewer runs are alike by chance"
+        )
     if plays_benchmark:
         for option, given in {"--seeds": seeds, "--clearing": clearing}.items():
             if given:
@@ -234,6 +239,8 @@ def _judge_policy(
     engine = engine_named("process" if count > 1 else "local", count, None)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
+    if tally.error:
+        typer.echo(f"{tally.failed} runs failed, the first with {plain(tally.error)}\n")
     show_report(results, out, full=full)
     if not clearing and (rank := _rank(results)):
         typer.echo(rank)
@@ -291,7 +298,7 @@ def _rank(results: StudyResults) -> str | None:
     told = json.loads(RECORDED.read_text(encoding="utf-8"))["policies"]
     beside = {name: mean_interval(one["p"]) for name, one in told.items()}
     beside.pop(results.policies[0], None)
-    if mine.low is None or mine.high is None:
+    if mine.low is None or mine.high is None or not any(v.estimate for v in results.verdicts):
         return None
     above = sum(p.low is not None and p.low > mine.high for p in beside.values())
     below = sum(p.high is not None and p.high < mine.low for p in beside.values())

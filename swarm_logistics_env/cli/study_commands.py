@@ -12,7 +12,7 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
-from swarm_logistics_env.report.section import bracketed, said
+from swarm_logistics_env.report.section import bracketed, said, slug
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
@@ -29,7 +29,7 @@ StudyArgument = Annotated[
     typer.Argument(
         metavar="FILE|PRESET",
         # Literal, as to import the presets would slow every command.
-        help="TOML file of a study, or a preset: paper, quick, resilience, scorecard.",
+        help="TOML file of a study, or a preset: benchmark, paper, quick, resilience, scorecard.",
     ),
 ]
 SeedsOption = Annotated[
@@ -129,6 +129,9 @@ def run_command(
         restocked = task.vary(scenario, {"restock": True})
         chosen.specification = chosen.specification.replace(scenario=restocked)
     ending = "-clearing" * clearing + "-restock" * restock
+    # The study of a policy of one's own stands beside that of the preset.
+    whose = "-".join(policy.title for policy in chosen.specification.policies)
+    ending += f"-{slug(whose)[:40]}" if policies else ""
     out = out or Path("results", chosen.specification.name + ending)
     chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
@@ -161,7 +164,9 @@ def run_command(
 def _saturated(asked: Study) -> list[str]:
     """Return the policies that deliver every item of the base scenario at the first seed."""
     plan = asked.plan()
-    whole = {c.policy.title: c for c in reversed(plan.cases) if not c.faults}
+    sound = [case for case in plan.cases if not case.faults]
+    base = [case for case in sound if case.scenario == plan.specification.scenario]
+    whole = {case.policy.title: case for case in reversed(base or sound)}
     if not any(getattr(case.scenario, "n_items", None) for case in whole.values()):
         return []
     seed = plan.seeds[0]

@@ -93,7 +93,8 @@ def show_report(results: StudyResults, out: Path | None, *, full: bool = False) 
         if not full and any(len(line.tests) > 1 for line in whole.answer.lines):
             again = f"swarm-logistics study report {shlex.quote(str(out))} --full"
             typer.echo(f"Each question on a line of its own: {again}")
-    typer.echo(f"For a paper: {plain(in_a_sentence(results))}")
+    if any(test.estimate for test in results.verdicts):
+        typer.echo(f"For a paper: {plain(in_a_sentence(results))}")
 
 
 def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
@@ -132,7 +133,7 @@ def in_one_line(tally: Tally, players: str, out: Path) -> str:
     error = plain(tally.error or "")
     place, to = shlex.quote(str(out)), shlex.quote(str(out / "runs.csv"))
     export = f"swarm-logistics study export {place} --to {to}"
-    why = f", the first with {error}. Each traceback: {export}" if error else ""
+    why = f", the first with {error}. Each traceback, column error: {export}" if error else ""
     return (
         f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
         f"were kept from before; {tally.failed} failed{why}"

@@ -142,7 +142,22 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     order = list(DEFINITIONS)
     policies = results.policies
     lines.sort(key=lambda line: (policies.index(line.policy), order.index(line.indicator)))
+    lines = list(_undefined_together(lines)) if most is not None else lines
     return Answer(_asked(results), _performance(results), tuple(lines), _last(results))
+
+
+def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
+    """Yield the lines; several questions of a policy that are all undefined share one."""
+    undefined = [line for line in lines if not any(test.estimate for test in line.tests)]
+    for policy, here in grouped(undefined, lambda line: line.policy).items():
+        if len(here) < 2:
+            yield from here
+            continue
+        tests = [test for line in here for test in line.tests]
+        symbols = ", ".join(dict.fromkeys(line.indicator for line in here))
+        numbers = tuple(number for line in here for number in line.numbers)
+        yield Line(policy, symbols, f"({len(tests)} questions)", tuple(tests), numbers)
+    yield from (line for line in lines if line not in undefined)
 
 
 def _one(number: int, test: Verdict) -> tuple[object, ...]:
@@ -233,13 +248,14 @@ def _multiple(cell: Cell, baseline: Cell) -> str:
 
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
-    failed = f" ({cell.problem}, which do not count)" if cell.problem else ""
+    failed = f" ({cell.problem} and do not count)" if cell.problem else ""
     if cell.by_seed.any():
         cleared = any(outcome.all_delivered for outcome in cell.outcomes)
         time = f", all items after {section.time_to_clear(cell)} s" if cleared else ""
         return section.mean_p(cell) + failed + time
     most = -math.log(0.05) / cell.n_seeds
-    return f"0{failed} (at most {most:.2f}, as none of {cell.n_seeds} runs delivered anything)"
+    why = f"none of {cell.n_seeds} runs delivered anything"
+    return f"0 (at most {most:.2f}, as {why}{f'; {cell.problem}' if cell.problem else ''})"
 
 
 def _last(results: StudyResults) -> str:
@@ -258,6 +274,8 @@ def _last(results: StudyResults) -> str:
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
         parts.append("some runs stalled")
+    if any(test.conclusion == "inconclusive" for test in tests):
+        parts.append(f"so many more seeds tell a value {_EFFECT:g} away from 0 in 4 of 5 studies")
     claims = [said(test.claim_verdict_holm) for test in tests if test.claim]
     if claims:
         where = " in the paper's text" if reference else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -274,8 +275,8 @@ class Study:
         if differing := noted.specification.differing(self.specification, self.out or Path()):
             raise StudyError(
                 f"{self.out} holds the study {noted.specification.name!r} with other "
-                f"{', '.join(differing)}: should be as it was declared (seeds may be added), or in "
-                "another directory"
+                f"{', '.join(differing)}: this one should be kept in another directory, --out "
+                f"{shlex.quote(f'{self.out}-2')}"
             )
         return noted
 

@@ -189,9 +189,10 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     assert app.run([*local, "--until-clear", "--most", "20"]) == 2
     assert "--most 20: should be more than 20 seeds" in capsys.readouterr().err
     file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
-    capped = [*local, "--policy", "homing", "--seeds", "1", "--out", "capped"]
-    assert app.run(capped) == 0
+    assert app.run([*local, "--policy", "homing", "--seeds", "1"]) == 0
     assert "homing delivers every item before the end" in capsys.readouterr().out
+    # It stands beside the study of the file's own policies.
+    assert Path("results/mine-homing/report.html").exists()
     Path("broken_policy.py").write_text(
         "class Broken:\n"
         "    def reset(self, n_robots, seed): raise RuntimeError('a wheel came off')\n"
@@ -199,7 +200,7 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     )
     broken = ["--policy", "broken_policy:Broken", "--restock", "--out", "broken"]
     assert app.run([*local, *broken]) == 1
-    told = "4 failed, the first with RuntimeError: a wheel came off. Each traceback: "
+    told = "4 failed, the first with RuntimeError: a wheel came off. Each traceback, column error: "
     assert told in capsys.readouterr().out
     assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
 
