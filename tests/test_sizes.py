@@ -43,11 +43,11 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 18_120,
-    "tokens of the package": 163_700,
+    "lines of code of the package": 18_180,
+    "tokens of the package": 164_100,
     "files of the package": 129,
-    "lines of code of studies and report": 4_130,
-    "lines of tests": 18_990,
+    "lines of code of studies and report": 4_150,
+    "lines of tests": 18_880,
     "lines of verification, benchmarks, interop and the scripts of docs": 5_280,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }

@@ -38,9 +38,10 @@ from .study_commands import (
     ProcessesOption,
     run_study,
     study_of,
+    tell_what_a_pilot_shows,
     until_cleared,
 )
-from .terminal import in_one_line, show, show_report, show_table
+from .terminal import say, say_what_was_played, show, show_report, show_table
 
 if TYPE_CHECKING:
     from swarm_logistics_env.attack import AttackResult
@@ -234,26 +235,29 @@ def _judge_policy(
     study = study_of(STUDY, out, seeds, [asked], trust_code, until_clear=looks)
     if clearing:
         until_cleared(study)
-    typer.echo(f"{study.plan()}, kept in {out}\n")
+    say(f"{study.plan()}, kept in {out}")
+    typer.echo()
     count = processes or os.cpu_count() or 1
     engine = engine_named("process" if count > 1 else "local", count, None)
+    tell_what_a_pilot_shows(study)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
     if tally.error:
-        typer.echo(f"{tally.failed} runs failed, the first with {plain(tally.error)}\n")
-    show_report(results, out, full=full)
+        say(f"{tally.failed} runs failed, the first with {plain(tally.error)}")
+    left = f"{tally.left} runs are left." if tally.left else ""
+    show_report(results, out, full=full, unfinished=left)
     if not clearing and (rank := _rank(results)):
-        typer.echo(rank)
+        say(rank)
     if tally.left:
-        typer.echo(f"Stopped after {minutes:g} minutes; the same command goes on: {command}")
+        say(f"Stopped after {minutes:g} minutes; the same command goes on:", command)
     elif any(test.conclusion == "inconclusive" for test in results.verdicts):
         more = max(JUDGE_SEEDS, 2 * seeds)
-        typer.echo(
-            "What is open needs more seeds, from the start: swarm-logistics judge "
-            f"{shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
-            f"--out {shlex.quote(f'{out}-{more}')}"
+        say(
+            "What is open needs more seeds, from the start:",
+            f"swarm-logistics judge {shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
+            f"--out {shlex.quote(f'{out}-{more}')}",
         )
-    typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}", out))
+    say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", out)
     return tally.failed
 
 
@@ -270,21 +274,22 @@ def _play_benchmark(
         one.load()
     out = out or Path("results", "benchmark", slug(policy.title))
     study = study_of(benchmark.STUDY, out, None, [asked], trust_code)
-    typer.echo(f"{study.plan()}, kept in {out}\n")
+    say(f"{study.plan()}, kept in {out}")
+    typer.echo()
     count = processes or os.cpu_count() or 1
     engine = engine_named("process" if count > 1 else "local", count, None)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
     if tally.left or tally.failed:
         show_report(results, out)
-        typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}", out))
+        say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", out)
         return tally.failed
     show(benchmark.table(results))
     entries = {name: np.array(one) for name, one in json.loads(ENTRIES.read_text()).items()}
     entries[policy.title] = benchmark.score(results)
     show(benchmark.leaderboard(entries))
     typer.echo(f"Report: {write_report(results, out, document(results))[0]}")
-    typer.echo(in_one_line(tally, f"{count} process{'es' if count > 1 else ''}", out))
+    say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", out)
     return tally.failed
 
 

@@ -22,7 +22,7 @@ from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
-from .terminal import in_one_line, show_power, show_report, show_table
+from .terminal import say, say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
     str,
@@ -136,41 +136,46 @@ def run_command(
     chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
-    typer.echo(f"{chosen.plan()}\n")
+    say(str(chosen.plan()))
+    typer.echo()
     if warning := chosen.exploratory_because():
-        typer.echo(f"{warning}\n")
-    for policy in _saturated(chosen) if policies and not restock else ():
-        typer.echo(
-            f"{policy} delivers every item before the end, so that P is capped and most verdicts "
-            "will be open. Nothing is capped where items come back, or where P is the rate until "
-            "all are delivered: add --restock or --clearing\n"
-        )
+        say(f"{warning}\n")
+    if policies:
+        tell_what_a_pilot_shows(chosen)
     tally = run_study(chosen, player, part)
     if part is None:
         results = chosen.findings()
         show_report(results, chosen.out, full=full)
     else:
-        typer.echo(
-            f"When all {part.count} shards are done: swarm-logistics study merge "
-            f"{out}/shard-*-of-{part.count} --out {out}"
+        say(
+            f"When all {part.count} shards are done:",
+            f"swarm-logistics study merge {out}/shard-*-of-{part.count} --out {out}",
         )
     count = f"{processes or os.cpu_count() or 1} processes"
     players = {"local": "1 process", "ray": "Ray"}.get(engine, count)
     # The last line: where it is looked for after a report of many pages.
-    typer.echo(in_one_line(tally, players, chosen.out))
+    say_what_was_played(tally, players, chosen.out)
     raise typer.Exit(1 if tally.failed else 0)
 
 
-def _saturated(asked: Study) -> list[str]:
-    """Return the policies that deliver every item of the base scenario at the first seed."""
+def tell_what_a_pilot_shows(asked: Study) -> None:
+    """Say which policies deliver everything or nothing in the base scenario at the first seed."""
     plan = asked.plan()
     sound = [case for case in plan.cases if not case.faults]
     base = [case for case in sound if case.scenario == plan.specification.scenario]
     whole = {case.policy.title: case for case in reversed(base or sound)}
     if not any(getattr(case.scenario, "n_items", None) for case in whole.values()):
-        return []
-    seed = plan.seeds[0]
-    return [title for title, case in whole.items() if case.run(plan.code, seed).play().capped]
+        return
+    for title, case in whole.items():
+        first = [one.run(plan.code, plan.seeds[0]).play() for one in case.trainings]
+        if any(outcome.capped for outcome in first):
+            say(
+                f"{title} delivers every item before the end, so that P is capped and most "
+                "verdicts will be open. Nothing is capped where items come back, or where P is the "
+                "rate until all are delivered: add --restock or --clearing"
+            )
+        elif not any(outcome.delivered or outcome.error for outcome in first):
+            say(f"{title} delivers nothing in a first run. Ctrl-C stops; finished runs are kept.")
 
 
 @study.command("plan")
@@ -216,7 +221,8 @@ def report_command(
 ) -> None:
     """Print the answer and write the report of a study again, from its store alone."""
     stored = Study.stored(directory, trust_code=trust_code)
-    typer.echo(f"{stored.plan()}\n")
+    say(str(stored.plan()))
+    typer.echo()
     show_report(stored.findings(), stored.out, full=full)
 
 

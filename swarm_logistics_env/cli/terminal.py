@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -55,6 +56,16 @@ def show(section: Section) -> None:
     console.print()
 
 
+def say(text: str, command: str = "") -> None:
+    """Print text, folded between words at a terminal, and a command to paste on its own line."""
+    console = Console()
+    if console.is_terminal:
+        text = textwrap.fill(text, console.width, break_long_words=False, break_on_hyphens=False)
+        typer.echo(f"{text}\n{command}" if command else text)
+    else:
+        typer.echo(f"{text} {command}".rstrip())
+
+
 def show_table(
     title: str, columns: Sequence[str], rows: Iterable[tuple[str, ...]], *lines: str
 ) -> None:
@@ -73,12 +84,17 @@ def show_answer(found: Answer, *, whole: bool = False) -> None:
     console.print(shown, soft_wrap=True)
 
 
-def show_report(results: StudyResults, out: Path | None, *, full: bool = False) -> None:
+def show_report(
+    results: StudyResults, out: Path | None, *, full: bool = False, unfinished: str = ""
+) -> None:
     """Print the answer of a study and a sentence for a paper, and write its report into `out`.
 
     Args:
         full: print every table, and a line a question.
+        unfinished: what is left to play; no sentence is for a paper then.
     """
+    if unfinished:
+        say(f"Unfinished: {unfinished}")
     whole = document(results)
     for section in whole.summary if full else ():
         show(section)
@@ -89,12 +105,13 @@ def show_report(results: StudyResults, out: Path | None, *, full: bool = False) 
         if missing := missing_packages():
             typer.echo(how_to_get_figures(missing))
         else:
-            typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}")
+            typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}")
+            typer.echo(f"Tables: {out / 'tables.tex'}")
         if not full and any(len(line.tests) > 1 for line in whole.answer.lines):
             again = f"swarm-logistics study report {shlex.quote(str(out))} --full"
-            typer.echo(f"Each question on a line of its own: {again}")
-    if any(test.estimate for test in results.verdicts):
-        typer.echo(f"For a paper: {plain(in_a_sentence(results))}")
+            say("Each question on a line of its own:", again)
+    if any(test.estimate for test in results.verdicts) and not unfinished:
+        say(f"For a paper: {plain(in_a_sentence(results))}")
 
 
 def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
@@ -127,14 +144,15 @@ def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
     )
 
 
-def in_one_line(tally: Tally, players: str, out: Path) -> str:
-    """Return how many runs `players` have played, in which time; they are kept in `out`."""
+def say_what_was_played(tally: Tally, players: str, out: Path) -> None:
+    """Print how many runs `players` have played, in which time; they are kept in `out`."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     error = plain(tally.error or "")
     place, to = shlex.quote(str(out)), shlex.quote(str(out / "runs.csv"))
     export = f"swarm-logistics study export {place} --to {to}"
-    why = f", the first with {error}. Each traceback, column error: {export}" if error else ""
-    return (
+    why = f", the first with {error}. Each traceback, column error:" if error else ""
+    say(
         f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
-        f"were kept from before; {tally.failed} failed{why}"
+        f"were kept from before; {tally.failed} failed{why}",
+        export if error else "",
     )

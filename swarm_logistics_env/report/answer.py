@@ -65,7 +65,10 @@ class Line:
         if not (low and high):
             return ""
         whole = f"[{section.fixed(min(low), 2)}, {section.fixed(max(high), 2)}]"
-        return whole if len(known) == 1 else f"in {whole}"
+        if len(self.tests) == 1:
+            return whole
+        # A value that is capped or alone has none.
+        return f"in {whole}" if len(low) == len(self.tests) else f"{len(low)} in {whole}"
 
     @property
     def verdict(self) -> str:
@@ -80,6 +83,8 @@ class Line:
         assert test.estimate is not None
         if test.conclusion == UNAFFECTED:
             return f"{words[0]}, exact"
+        if test.conclusion is None:
+            return f"{words[0]}: other questions on {self.indicator} lack runs"
         more = _seeds_more(test.estimate)
         if test.conclusion != "inconclusive" or more is None:
             return words[0]
@@ -268,6 +273,8 @@ def _last(results: StudyResults) -> str:
     if any("assumes_normal" in test.flags for test in tests):
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
+    if any("too_few_seeds" in test.flags for test in tests):
+        parts.append("two seeds give no verdict")
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared, whose report this replaces")
     if any(test.saturated for test in tests):
@@ -287,6 +294,7 @@ def _last(results: StudyResults) -> str:
 def in_a_sentence(results: StudyResults) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
     known = [test for test in results.verdicts if test.interval]
+    known = [test for test in known if test.compared.indicator != "change"] or known
     words = section.counted(said(test.conclusion) for test in results.verdicts)
     told = f"{_performance(results)[:-1]} over {section.seeds_text(results)}"
     asked = section.plural(len(results.verdicts), "question")

@@ -111,8 +111,8 @@ class WatchServer:
             await self._runner.cleanup()
             if "in use" in str(error):
                 raise SetupError(
-                    f"port = {self.port}: is in use, should be another one, or 0 for any that "
-                    "is free"
+                    f"port = {self.port}: is in use: should be another one, or --port 0 for any "
+                    "that is free"
                 ) from None
             raise SetupError(f"host = {self.host}, port = {self.port}: {error.strerror}") from None
         self.port = self._runner.addresses[0][1]
@@ -261,7 +261,7 @@ def serve(
         await server.start()
         announce(
             f"Open {server.address} in a browser on this machine (from another one: "
-            f"ssh -L {server.port}:127.0.0.1:{server.port}). Ctrl-C ends it."
+            f"ssh -L {server.port}:127.0.0.1:{server.port} HOST). Ctrl-C ends it."
         )
         if show is not None:
             threading.Thread(target=show, args=[server.address], daemon=True).start()

@@ -75,7 +75,7 @@ def test_trials_are_judged_and_what_is_written_is_told(
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
-    assert f"Figure: {out / 'figures' / 'answer.svg'}  Tables: {out / 'tables.tex'}\n" in printed
+    assert f"Figure: {out / 'figures' / 'answer.svg'}\nTables: {out / 'tables.tex'}\n" in printed
     assert "For a paper: recorded: P at N = 8, no fault: 12.3 [" in printed
     for name in ("report.html", "report.md", "claims.csv", "figures/answer.svg"):
         assert (out / name).is_file()

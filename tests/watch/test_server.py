@@ -291,7 +291,7 @@ def test_a_page_that_closes_in_mid_send_is_no_error(
 
 
 def test_where_it_cannot_listen_is_told_in_a_sentence(asked: Served) -> None:
-    with pytest.raises(SetupError, match="is in use, should be another one"):
+    with pytest.raises(SetupError, match="is in use: should be another one"):
         asyncio.run(WatchServer(Session(SMALL), asked.server.port).start())
     with pytest.raises(SetupError, match=r"host = 192\.0\.2\.7, port = 0: "):
         asyncio.run(WatchServer(Session(SMALL), 0, host="192.0.2.7").start())
