@@ -15,6 +15,7 @@ from tables import table
 from swarm_logistics_env.report import section
 from swarm_logistics_env.report.drawing import images
 from swarm_logistics_env.report.figures import indicator_figures
+from swarm_logistics_env.report.tables import claims, sentences
 from swarm_logistics_env.spi import relative_change
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
@@ -202,13 +203,13 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
     counted = Counter(map(_said, tests))
     asked = "claims (those of the paper's text, and that P falls without taxis)"
     supported, contradicted, still = (counted[one] for one in ("supported", "refuted", "open"))
-    by_question = {test.compared.question: test for test in tests}
-    rows = []
-    for sentence, questions in PAPER.sentences.items():
-        told = [by_question.pop(one) for one in questions if one in by_question]
-        rows += _claims(f'"{sentence}"', told)
-    rows += _claims("(P falls without taxis)", list(by_question.values()))
-    rows += _claims("(the same of FM3_send)", other)
+    told = {claim for questions in PAPER.sentences.values() for claim in questions}
+    taxis = [test for test in tests if test.compared.question not in told]
+    rows = [
+        *sentences(PAPER, tests),
+        *claims("(P falls without taxis)", taxis),
+        *claims("(the same of FM3_send)", other),
+    ]
     lines = [
         f"Of {len(tests)} {asked} this re-implementation supports {supported} and contradicts",
         f"{contradicted}{f' ({about})' if about else ''}; {still} are open.",
@@ -225,28 +226,6 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
         table(("the paper's text", "claim", "ours [95 %]", "verdict"), rows),
     ]
     return "\n".join(lines)
-
-
-def _claims(sentence: str, tests: Sequence[Verdict]) -> list[tuple[str, ...]]:
-    """Return a row for each claim of a sentence: what it asks, our value, and the verdict."""
-    rows: list[tuple[str, ...]] = []
-    for test in tests:
-        compared = test.compared
-        sign = ">" if test.claimed else "<" if compared.definition.compares == "policy" else "≤"
-        asked = f"{compared.indicator} {sign} {compared.threshold:.3g}"
-        rows.append((sentence, f"{compared.label}: {asked}", section.ratio(test), _told(test)))
-        sentence = ""
-    return rows
-
-
-def _told(test: Verdict) -> str:
-    """Return the verdict on a claim; of an open one the side on which its interval lies."""
-    said, found, threshold = _said(test), test.interval, test.compared.threshold
-    if said != "open" or found is None or found.low is None or found.high is None:
-        return "contradicted" if said == "refuted" else said
-    if found.low <= threshold <= found.high:
-        return said
-    return f"open, leans {'for' if (found.low > threshold) == test.claimed else 'against'}"
 
 
 def _counted(tests: Sequence[Verdict]) -> str:

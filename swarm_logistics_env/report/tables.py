@@ -99,28 +99,42 @@ def _sentences(results: StudyResults) -> Iterator[Section]:
         tests = [test for test in results.verdicts if test.compared.policy == policy]
         said = sentences(reference, tests) if reference else []
         if said and reference:
-            columns = ("the text", "its claims", "contradicted", "open")
+            columns = ("the text", "claim", "ours [95 %]", "verdict")
             yield Section(f"{policy}: what the text says", columns, tuple(said), (reference.whose,))
 
 
 def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[tuple[str, ...]]:
-    """Return each sentence that some test asks of: how its claims fare, which are refuted, open."""
+    """Return a row for each claim of the reference's text, those of a sentence together."""
+    by_question = {test.compared.question: test for test in tests}
     rows = []
-    for sentence, claims in reference.sentences.items():
-        here = [test for test in tests if test.compared.question in claims]
-        verdicts = [section.counted_as(test, test.claim_verdict_holm) for test in here]
-        told = [
-            "; ".join(
-                f"{test.compared.label}: {test.compared.indicator} = {section.ratio(test)}"
-                for test, verdict in zip(here, verdicts)
-                if verdict == word
-            )
-            for word in ("refuted", "open")
-        ]
-        if here:
-            values = (one or NOTHING for one in told)
-            rows.append((f'"{sentence}"', section.counted(verdicts), *values))
+    for sentence, questions in reference.sentences.items():
+        rows += claims(
+            f'"{sentence}"', [by_question[one] for one in questions if one in by_question]
+        )
     return rows
+
+
+def claims(heading: str, tests: Sequence[Verdict]) -> list[tuple[str, ...]]:
+    """Return a row for each claim: below the heading what it asks, our value, and the verdict."""
+    rows: list[tuple[str, ...]] = []
+    for test in tests:
+        compared = test.compared
+        sign = ">" if test.claimed else "<" if compared.definition.compares == "policy" else "≤"
+        asked = f"{compared.label}: {compared.indicator} {sign} {compared.threshold:.3g}"
+        rows.append((heading, asked, section.ratio(test), _on_claim(test)))
+        heading = ""
+    return rows
+
+
+def _on_claim(test: Verdict) -> str:
+    """Return the verdict on a claim; of an open one the side on which its interval lies."""
+    said = section.counted_as(test, test.claim_verdict_holm)
+    found, threshold = test.interval, test.compared.threshold
+    if said != "open" or found is None or found.low is None or found.high is None:
+        return "contradicted" if said == "refuted" else said
+    if found.low <= threshold <= found.high:
+        return said
+    return f"open, leans {'for' if (found.low > threshold) == test.claimed else 'against'}"
 
 
 def _times_to_clear(results: StudyResults) -> Iterator[Section]:

@@ -151,12 +151,11 @@ def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_al
 def test_every_sentence_of_the_paper_stands_beside_its_claims(few: StudyResults) -> None:
     tests = few.verdicts
     rows = sentences(PAPER, tests)
-    assert len(rows) == len(PAPER.sentences) == 9
-    counts = [int(n) for _, counted, *_ in rows for n in re.findall(r"(\d+) \w+", counted)]
-    assert sum(counts) == sum(1 for test in tests if test.compared.question in PAPER.claims) == 41
+    assert len([row for row in rows if row[0]]) == len(PAPER.sentences) == 9
+    assert len(rows) == sum(1 for test in tests if test.compared.question in PAPER.claims) == 41
     (text,) = [section for section in tables(few) if section.title.endswith("what the text says")]
     assert text.rows == tuple(rows)
     assert "re-implementation" in text.lines[0]
     tough = paper(lambda _, at: 39.0 if at.name == "FM4" else 20.0)
-    against = {row[0]: row[2] for row in sentences(PAPER, tough.verdicts)}
-    assert "FM4, m = 3: R = " in next(v for k, v in against.items() if "robust (R > 0)" in k)
+    verdicts = {claim: verdict for _, claim, _, verdict in sentences(PAPER, tough.verdicts)}
+    assert verdicts["FM4, m = 3: R ≤ 0"] == "contradicted"
