@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.rendering import Renderer
@@ -71,11 +71,31 @@ def collapse(name: str) -> None:
             ("two of them deliver nothing (FM4)", ("FM4:2",)),
         )
     ]
-    film = Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400)
+    keep(Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400), name, 80, 48)
+
+
+def keep(film: Film, name: str, milliseconds: int, n_colours: int) -> None:
+    """Write a film that loops, each frame for so long, in the colours of its last frame."""
     frames = [Image.fromarray(frame) for frame in film.frames()]
-    colours = frames[-1].quantize(48)
+    colours = frames[-1].quantize(n_colours)
     first, *rest = (one.quantize(palette=colours, dither=Image.Dither.NONE) for one in frames)
-    first.save(MEDIA / name, save_all=True, append_images=rest, duration=80, loop=0, optimize=True)
+    options = {"duration": milliseconds, "loop": 0, "optimize": True}
+    first.save(MEDIA / name, save_all=True, append_images=rest, **options)
+
+
+def gallery() -> None:
+    """Film each failure mode in a small swarm, and each kind of policy in a large one."""
+    small = Scenario(
+        n_robots=8, warehouse_width=5.0, warehouse_height=4.0, delivery_width=1.2, n_items=10,
+        restock=True,
+    )  # fmt: skip
+    for mode in FAILURE_MODES:
+        faults = [Fault(mode, 2, onset=3.0)]
+        take = Take(f"{mode}, 2 of 8", Play(small, policies.load("homing"), 2, faults))
+        keep(Film([take], 30.0, 8.0, 8.0, size=240), f"mode-{mode}.gif", 125, 24)
+    for name in ("swarm-dt", "homing", "homing-stock", "central", "ppo-delivery", "ppo-robust"):
+        take = Take(name, Play(Scenario(restock=True), policies.load(name), 0))
+        keep(Film([take], 90.0, 20.0, 8.0, size=300), f"policy-{name}.gif", 125, 24)
 
 
 def save(picture: NDArray[np.uint8], name: str) -> None:
@@ -94,4 +114,5 @@ if __name__ == "__main__":
     learned = scene(300.0, scenario=Scenario(restock=True), name="ppo-delivery")
     save(learned, "stock.png")
     collapse("fm4.gif")
+    gallery()
     browser_view("watch.png")
