@@ -79,8 +79,14 @@ def keep(film: Film, name: str, milliseconds: int, n_colours: int) -> None:
     frames = [Image.fromarray(frame) for frame in film.frames()]
     colours = frames[-1].quantize(n_colours)
     first, *rest = (one.quantize(palette=colours, dither=Image.Dither.NONE) for one in frames)
-    options = {"duration": milliseconds, "loop": 0, "optimize": True}
-    first.save(MEDIA / name, save_all=True, append_images=rest, **options)
+    first.save(
+        MEDIA / name,
+        save_all=True,
+        append_images=rest,
+        duration=milliseconds,
+        loop=0,
+        optimize=True,
+    )
 
 
 def gallery() -> None:

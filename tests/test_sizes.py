@@ -44,7 +44,7 @@ def test_no_two_modules_have_one_name() -> None:
 ROOT = PACKAGE.parent
 MOST = {
     "lines of code of the package": 18_180,
-    "tokens of the package": 164_100,
+    "tokens of the package": 164_200,
     "files of the package": 129,
     "lines of code of studies and report": 4_150,
     "lines of tests": 18_880,

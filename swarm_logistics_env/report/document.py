@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
@@ -149,13 +149,8 @@ def _failure_modes(plan: Plan) -> Iterator[Section]:
     modes = dict.fromkeys(fault.mode for case in plan.cases for fault in case.faults)
     known = plan.cases[0].task.failure_modes
     if modes:
-        rows = tuple((mode, _described(mode, known)) for mode in modes)
+        rows = tuple((mode, known[mode]) for mode in modes)
         yield Section("Failure modes", ("mode", "what it does to a robot"), rows)
-
-
-def _described(mode: str, known: Mapping[str, str]) -> str:
-    whole, _, lost = mode.partition("[")
-    return f"{known[whole]}; of this: {lost[:-1].replace(',', ', ')}" if lost else known[whole]
 
 
 def _variations(plan: Plan) -> Iterator[str]:
