@@ -79,14 +79,8 @@ def keep(film: Film, name: str, milliseconds: int, n_colours: int) -> None:
     frames = [Image.fromarray(frame) for frame in film.frames()]
     colours = frames[-1].quantize(n_colours)
     first, *rest = (one.quantize(palette=colours, dither=Image.Dither.NONE) for one in frames)
-    first.save(
-        MEDIA / name,
-        save_all=True,
-        append_images=rest,
-        duration=milliseconds,
-        loop=0,
-        optimize=True,
-    )
+    timing = {"duration": milliseconds, "loop": 0}
+    first.save(MEDIA / name, None, save_all=True, append_images=rest, optimize=True, **timing)
 
 
 def gallery() -> None:

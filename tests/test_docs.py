@@ -7,12 +7,15 @@ import importlib.util
 import io
 import re
 import runpy
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from swarm_logistics_env.cli.app import command_line
+from swarm_logistics_env.studies.specification import read_study_file
+from swarm_logistics_env.train.training import load_training
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -61,6 +64,20 @@ def test_what_a_page_names_exists(name: str) -> None:
     )
     assert pictures
     assert all((DOCS / picture).exists() for picture in pictures)
+
+
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_files_that_a_page_shows_can_be_read(name: str, tmp_path: Path) -> None:
+    for number, block in enumerate(BLOCKS["blocks"](PAGES[name])):
+        if block.language != "toml":
+            continue
+        file = tmp_path / f"block_{number}.toml"
+        file.write_text(block.code, encoding="utf-8")
+        fields = tomllib.loads(block.code)
+        if {"worlds", "ppo", "base"} & fields.keys():
+            load_training(str(file))
+        elif "seeds" in fields and "task" not in fields:  # a page's own task is run with it
+            read_study_file(file, trust_code=True)
 
 
 def parse(arguments: list[str]) -> None:
