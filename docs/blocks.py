@@ -189,7 +189,7 @@ def in_small(arguments: list[str]) -> list[str] | None:
 
 
 def run_in_small(texts: Mapping[str, str]) -> None:
-    """Run the shell commands of each page in a folder that has the files of all pages.
+    """Run the shell commands of the pages one after another in a folder that has all their files.
 
     Raises:
         SystemExit: one of them failed.
@@ -198,10 +198,10 @@ def run_in_small(texts: Mapping[str, str]) -> None:
     for block in (block for text in texts.values() for block in blocks(text)):
         if file := _FILE.match(block.code):
             files[file[1]] = block.code
-    for name, text in texts.items():
-        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
-            for file_name, code in files.items():
-                Path(file_name).write_text(code, encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
+        for file_name, code in files.items():
+            Path(file_name).write_text(code, encoding="utf-8")
+        for name, text in texts.items():
             for arguments in commands(text, ("sh", "")):
                 small = in_small(arguments)
                 sys.stdout.write(f"{name}: swarm-logistics {shlex.join(small or arguments)}")
