@@ -105,7 +105,8 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
             [(reading, *_near(one)) for reading, one in nearness.items()],
         ),
         "",
-        f"Without drift the deliveries of these conditions together change by {_change(parts)}.",
+        "Headings that do not drift change the deliveries of these conditions together by",
+        f"{_change(parts)}.",
     ]
     return "\n".join(lines)
 
@@ -159,7 +160,8 @@ def _change(parts: Sequence[StudyResults]) -> str:
     totals = [sum(cells[one].by_seed[:SEEDS] for one in both) for cells in (drift, exact)]
     found = relative_change(*totals)
     low, high = found.low or 0.0, found.high or 0.0
-    return f"{100 * found.value:+.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+    told = f"{100 * found.value:+.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+    return f"{told}: no clear effect" if low <= 0.0 <= high else told
 
 
 def _paper_rows(cells: Mapping[Setting, Cell]) -> list[tuple[str, list[Setting]]]:
@@ -217,11 +219,15 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
         if not any(_said(test) == "refuted" for test in other)
         else f"The other reading, FM3_send: {_counted(other)}.",
         PAPER.whose,
+        "Supported means only that this re-implementation behaves so: the claims on the",
+        "warehouse's width cannot fail, and those on taxis are not in the paper's text.",
+        '"Up to m robots" is read as "and not with m + 1".',
         "",
         f"FT and R have {len(parts[1].plan.seeds)} seeds, all else {len(parts[0].plan.seeds)}, the",
         "same ones in all conditions; N is 25 but for S. Intervals are of 95 % each and hold one",
         "by one; verdicts hold for all claims on one indicator together (Holm). So a claim may be",
         'open although its interval lies on one side: "leans for" or "leans against" says which.',
+        '"change" is that of P without taxis, relative to P with it.',
         "",
         table(("the paper's text", "claim", "ours [95 %]", "verdict"), rows),
     ]
