@@ -79,7 +79,7 @@ def findings(page: str) -> str:
         *_learned(rows),
         *_faults(rows),
         *_sizes(rows),
-        *_paper(block_of(page, "sentences")),
+        *_paper(block_of(page, "paper")),
     ]
     lines = [f"* {one}" for one in told]
     note = f"95 % intervals over {seeds} seeds"
@@ -139,11 +139,11 @@ def _sizes(rows: Rows) -> Iterator[str]:
 
 
 def _paper(block: str) -> Iterator[str]:
-    pattern = r"Of (\d+) claims .*? (supports \d+) and (contradicts)\s(\d+ ?.*?); (\d+ are open)\."
-    for count, supported, contradicts, refuted, still in re.findall(pattern, block):
+    pattern = r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?); (\d+ are open)\."
+    for count, supported, contradicts, still in re.findall(pattern, block):
         yield (
-            f"**Of {count} claims in the paper's text** this re-implementation, with constants "
-            f"that are partly fitted, {supported} and {contradicts} {refuted}; {still}."
+            f"**Of {count} claims of the paper's text** this re-implementation, with constants "
+            f"that are partly fitted, supports {supported} and {contradicts}; {still}."
         )
 
 

@@ -136,7 +136,8 @@ def clearing_block(results: StudyResults) -> str:
         shares = [f"`{one}` {s:.0f} s ({s / (slow - fast):.0%})" for one, s in saved.items()]
         text += (
             f"\nWithout a failure `ppo-robust` is {slow - fast:.0f} s faster than `swarm-dt`. Two "
-            f"scripts, which learned nothing, save most of that: {' and '.join(shares)}."
+            f"scripts, which learned nothing, save most of that: {' and '.join(shares)}. Of the "
+            "deliveries where items come back they reach [less](#what-the-scripts-owe-to-what)."
         )
     return "\n".join([table(head, rows), "", text])
 

@@ -99,7 +99,7 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
 ) -> None:
     tables.main()
     first = small.read_text()
-    assert first.startswith("Before.\n\n<!-- tables: paper -->\n\n| ")
+    assert first.startswith("Before.\n\n<!-- tables: paper -->\n\nOf ")
     assert first.endswith("\n\n<!-- end of tables -->\nAfter.\n")
     assert "Between." in first
     assert "\nold\n" not in first
