@@ -231,11 +231,11 @@ def _summary(parts: Sequence[StudyResults]) -> list[str]:
     sure = sum(_about(test) == "warehouse_width" for test in of_text)
     return [
         f"Of {len(of_text)} claims of the paper's text this re-implementation supports",
-        f"{counted['supported']} and contradicts {counted['refuted']}{f' ({about})' if about else ''}; "
-        f"{counted['open']} are open. {sure} of",
+        f"{counted['supported']} and contradicts {counted['refuted']}"
+        f"{f' ({about})' if about else ''}; {counted['open']} are open. {sure} of",
         "those supported, on the warehouse's width, cannot fail, as A cannot fall below 0 where a",
-        f"parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in the text:",
-        f"{_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.",
+        f"parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in",
+        f"the text: {_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.",
         PAPER.whose,
         "",
     ]
