@@ -139,7 +139,7 @@ def _sizes(rows: Rows) -> Iterator[str]:
 
 
 def _paper(block: str) -> Iterator[str]:
-    pattern = r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?); (\d+ are open)\."
+    pattern = r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?);\s(\d+ are open)\."
     for count, supported, contradicts, still in re.findall(pattern, block):
         yield (
             f"**Of {count} claims of the paper's text** this re-implementation, with constants "

@@ -228,11 +228,12 @@ def _summary(parts: Sequence[StudyResults]) -> list[str]:
     counted = Counter(map(_said, of_text))
     of = Counter(_about(test) for test in of_text if _said(test) == "refuted")
     about = ", ".join(f"{count} on {what}" for what, count in of.most_common())
+    about = about and f" ({about})"
     sure = sum(_about(test) == "warehouse_width" for test in of_text)
     return [
         f"Of {len(of_text)} claims of the paper's text this re-implementation supports",
-        f"{counted['supported']} and contradicts {counted['refuted']}"
-        f"{f' ({about})' if about else ''}; {counted['open']} are open. {sure} of",
+        f"{counted['supported']} and contradicts {counted['refuted']}{about};",
+        f"{counted['open']} are open. {sure} of",
         "those supported, on the warehouse's width, cannot fail, as A cannot fall below 0 where a",
         f"parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in",
         f"the text: {_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.",
