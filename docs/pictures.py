@@ -71,14 +71,12 @@ def collapse(name: str) -> None:
             ("two of them deliver nothing (FM4)", ("FM4:2",)),
         )
     ]
-    keep(Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400), name, 80, 48)
+    keep(Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400), name, 80)
 
 
-def keep(film: Film, name: str, milliseconds: int, n_colours: int) -> None:
-    """Write a film that loops, each frame for so long, in the colours of its last frame."""
-    frames = [Image.fromarray(frame) for frame in film.frames()]
-    colours = frames[-1].quantize(n_colours)
-    first, *rest = (one.quantize(palette=colours, dither=Image.Dither.NONE) for one in frames)
+def keep(film: Film, name: str, milliseconds: int) -> None:
+    """Write a film that loops, each frame for so long."""
+    first, *rest = (in_film_colours(frame) for frame in film.frames())
     timing = {"duration": milliseconds, "loop": 0}
     first.save(MEDIA / name, None, save_all=True, append_images=rest, optimize=True, **timing)
 
@@ -92,19 +90,22 @@ def gallery() -> None:
     for mode in FAILURE_MODES:
         faults = [Fault(mode, 2, onset=3.0)]
         take = Take(f"{mode}, 2 of 8", Play(small, policies.load("homing"), 2, faults))
-        keep(Film([take], 30.0, 8.0, 8.0, size=240), f"mode-{mode}.gif", 125, 24)
+        keep(Film([take], 30.0, 8.0, 8.0, size=400), f"mode-{mode}.gif", 125)
     for name in ("swarm-dt", "homing", "homing-stock", "central", "ppo-delivery", "ppo-robust"):
         take = Take(name, Play(Scenario(restock=True), policies.load(name), 0))
-        keep(Film([take], 90.0, 20.0, 8.0, size=300), f"policy-{name}.gif", 125, 24)
+        keep(Film([take], 90.0, 20.0, 8.0, size=300), f"policy-{name}.gif", 125)
 
 
 def save(picture: NDArray[np.uint8], name: str) -> None:
-    """Write a picture in the colours that films have: a third of the size, and none shifts."""
-    colours = film_colours()
+    """Write a picture: in the colours of films it takes a third, and none shifts."""
+    in_film_colours(picture).save(MEDIA / name, optimize=True)
+
+
+def in_film_colours(picture: NDArray[np.uint8]) -> Image.Image:
+    """Return a picture in the colours that all films have."""
     palette = Image.new("P", (1, 1))
-    palette.putpalette([part for colour in colours for part in colour])
-    exact = Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-    exact.save(MEDIA / name, optimize=True)
+    palette.putpalette([part for colour in film_colours() for part in colour])
+    return Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
 
 
 if __name__ == "__main__":

@@ -252,7 +252,7 @@ def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float)
 
 
 # The widest texts there may be, so that a picture's size does not change with what happens.
-_WIDEST = ("time 0000.0 s", "N = 000", "P = 000 of 000", "requested: item 000")
+_WIDEST = ("time 0000.0 s", "N = 000", "P = 000 of 000")
 
 
 class Caption:
@@ -367,14 +367,5 @@ def _row(stacks: Sequence[tuple[pygame.Surface, ...]], gap: int) -> pygame.Surfa
 
 
 def _scores(state: WarehouseState, scenario: Scenario) -> tuple[str, ...]:
-    if state.requested == NOBODY:
-        requested = "all delivered"
-    else:
-        requested = f"requested: item {state.requested}"
     total = "" if scenario.restock else f" of {scenario.n_items}"
-    return (
-        f"time {state.time:.1f} s",
-        f"N = {state.n_robots}",
-        f"P = {state.delivered}{total}",
-        requested,
-    )
+    return f"time {state.time:.1f} s", f"N = {state.n_robots}", f"P = {state.delivered}{total}"
