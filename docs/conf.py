@@ -44,14 +44,33 @@ toc_object_entries_show_parents = "hide"
 autodoc_mock_imports = ["stable_baselines3"]
 
 
+# The pages in the order of the site's menu. They stand here, because GitHub would show a list of
+# contents in a page as it is written.
+CONTENTS = {
+    "Use": ("quickstart", "The environment <environment>", "training", "faults"),
+    "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
+    "Research": ("results", "research/questions_of_the_field", "research/readings_and_tries"),
+    "Look up": ("reference", "Promises <promises>", "Comparison <comparison>"),
+}
+
+
 def setup(app: Sphinx) -> None:
-    """Render formulas as MathML, which browsers draw themselves."""
+    """Render formulas as MathML, which browsers draw themselves; add the contents."""
+    app.connect("source-read", add_contents)
     renderers = [(partial(formula, display), None) for display in ("inline", "block")]
     app.add_html_math_renderer("mathml", *renderers)
     app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
 
 
 html_math_renderer = "mathml"
+
+
+def add_contents(app: Sphinx, page: str, text: list[str]) -> None:
+    """Put the list of all pages below the first one."""
+    if page == "index":
+        for caption, pages in CONTENTS.items():
+            listed = "\n".join(pages)
+            text[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{listed}\n```\n"
 
 
 def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str]) -> None:
