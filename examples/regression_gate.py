@@ -36,7 +36,7 @@ def main(seeds=10, duration=200.0, out="results/gate"):
     for text in GATES:
         for answer in answers(Gate.parse(text), results["old"], results["new"]):
             failed |= answer.fails
-            print(f"{'FAILS ' if answer.fails else 'passes'} {text!r}: {answer.name}")
+            print(f"{'FAILS ' if answer.fails else 'passes'} (fails if {text}): {answer.name}")
     return int(failed)
 
 

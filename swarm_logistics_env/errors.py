@@ -45,6 +45,11 @@ class StudyError(SwarmLogisticsError):
     """A study whose specification, store or request cannot be."""
 
 
+def how_to_install(extra: str) -> str:
+    """Return the end of an error message about a package of one of the extras that is missing."""
+    return f"in a clone, pip install -c constraints.txt '.[{extra}]'"
+
+
 def suggest(name: str, known: Iterable[str]) -> str:
     """Return the end of an error message about an unknown `name`.
 

@@ -254,8 +254,7 @@ class _Report(event.Listener):
         total = max(len(_all_kernels), self.n_done)
         if not _Report.is_told:
             _Report.is_told = True
-            left = self.seconds / self.n_done * (total - self.n_done)
-            sys.stderr.write(f"Compiling, which later runs reuse: at most {left:.0f} s.\n")
+            sys.stderr.write("Compiling, which later runs reuse: up to 15 s of a free core.\n")
         if self._bar is None and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import Progress

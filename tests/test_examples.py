@@ -97,7 +97,7 @@ def test_gate_judges_the_change(
     monkeypatch.setattr(policies, "load", load)
     assert main("regression_gate", seeds=6, duration=60.0, out=tmp_path) == code
     (said,) = [line for line in capsys.readouterr().out.splitlines() if "change, no fault" in line]
-    assert said.startswith("FAILS  'change < 0'" if code else "passes 'change < 0'")
+    assert said.startswith(f"{'FAILS ' if code else 'passes'} (fails if change < 0)")
 
 
 @pytest.mark.parametrize("study", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.name)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.requests import checked_count, checked_seed
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.errors import SetupError, how_to_install
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 
@@ -25,7 +25,7 @@ try:
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
-        f"SwarmVecEnv needs stable-baselines3 ({error}): pip install 'swarm-logistics-env[train]'"
+        f"SwarmVecEnv needs stable-baselines3 ({error}): {how_to_install('train')}"
     ) from error
 
 Infos: TypeAlias = list[dict[str, Any]]

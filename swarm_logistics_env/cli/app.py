@@ -197,12 +197,12 @@ FaultOption = Annotated[
     typer.Option(
         "--fault",
         metavar="FAULT",
-        help="MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200; may be repeated.",
+        help="Such as FM1:2@200: two robots from 200 s on (`list faults`); may be repeated.",
     ),
 ]
 PolicyOption = Annotated[
     str,
-    typer.Option(help="Name (`list policies`), path of a policy file, or package.module:Class."),
+    typer.Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class."),
 ]
 SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[

@@ -57,7 +57,7 @@ def judge_command(
         typer.Argument(
             metavar="TRIALS.csv|POLICY",
             help="CSV file, one trial or delivery a row; or a policy: name, path of a policy file, "
-            "package.module:Class, or my.py:Class.",
+            "module:Class or my.py:Class.",
         ),
     ],
     out: Annotated[
@@ -119,8 +119,11 @@ def judge_command(
 ) -> None:
     """Judge trials of real robots or of another simulator; or a policy, until it is clear.
 
-    Columns: robots, fault, faulty, delivered (or performance), and where they apply seed, policy,
-    onset, and any parameter; or time, one delivery a row. Without seeds the study is unpaired.
+    Columns of trials are robots, fault, faulty and delivered (or performance); where they apply
+    seed, policy, onset and any parameter; or time, with a delivery a row.
+
+    Without seeds the study is unpaired.
+
     A policy is played in a warehouse in which delivered items come back, so that P has no cap.
     """
     of_trials = {
@@ -249,7 +252,7 @@ def _judge_policy(
     if not clearing and (rank := _rank(results)):
         say(rank)
     if tally.left:
-        say(f"Stopped after {minutes:g} minutes; the same command goes on:", command)
+        say(f"Stopped after {minutes:g} min; the same command goes on:", command)
     elif any(test.conclusion == "inconclusive" for test in results.verdicts):
         more = max(JUDGE_SEEDS, 2 * seeds)
         say(
@@ -314,7 +317,7 @@ def _rank(results: StudyResults) -> str | None:
 
 
 PolicyArgument = Annotated[
-    str, typer.Argument(metavar="POLICY", help="Name, path of a file, or package.module:Class.")
+    str, typer.Argument(metavar="POLICY", help="Name, path of a file, module:Class or my.py:Class.")
 ]
 
 

@@ -16,6 +16,7 @@ from swarm_logistics_env.policies import Policy, called, known_policies, load
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.scenario import SOURCES, Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.faults import ROLES
 
 from .app import (
     FaultOption,
@@ -42,8 +43,8 @@ def run_command(
         list[str] | None,
         typer.Option(
             "--policy",
-            help="Name (`list policies`), path of a policy file, or package.module:Class; swarm-dt "
-            "if not given. With --film it may be repeated.",
+            help="Name (`list policies`), path of a policy file, module:Class or my.py:Class; "
+            "swarm-dt if not given. With --film it may be repeated.",
         ),
     ] = None,
     seed: SeedOption = 0,
@@ -93,10 +94,9 @@ def run_command(
         f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
     )
     if len(times):
-        gaps = [after - before for before, after in zip([0.0, *times], times)]
+        wait = max(after - before for before, after in zip([0.0, *times], times))
         typer.echo(
-            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, "
-            f"{sum(gaps) / len(gaps):.1f} s apart on average, at most {max(gaps):.1f} s"
+            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s"
         )
     if episode.failed_robots:
         typer.echo(
@@ -268,7 +268,11 @@ def list_command(
         show_table("Policies", ("name", "kind", "about"), known_policies(), line)
     elif what == "faults":
         rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
-        line = "As --fault takes one: MODE:ROBOTS@ONSET, e.g. FM4:2@200"
+        line = (
+            "As --fault takes one: MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM4:2@200: two "
+            "robots (one if not given) from 200 s on (0 s), in any role, for good. Roles: "
+            f"{', '.join(ROLES)}"
+        )
         show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
     else:
         plans = [(name, Study.preset(name).plan()) for name in PRESETS]

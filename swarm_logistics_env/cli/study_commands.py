@@ -12,6 +12,7 @@ import typer
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
+from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.section import bracketed, said, slug
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
@@ -174,7 +175,10 @@ def tell_what_a_pilot_shows(asked: Study) -> None:
                 "verdicts will be open. Nothing is capped where items come back, or where P is the "
                 "rate until all are delivered: add --restock or --clearing"
             )
-        elif not any(outcome.delivered or outcome.error for outcome in first):
+        elif errors := [plain(outcome.error) for outcome in first if outcome.error]:
+            why = errors[0].strip().splitlines()[-1]
+            say(f"{title} fails in a first run: {why}. Ctrl-C stops; finished runs are kept.")
+        elif not any(outcome.delivered for outcome in first):
             say(f"{title} delivers nothing in a first run. Ctrl-C stops; finished runs are kept.")
 
 
@@ -259,7 +263,7 @@ def compare_command(
         fails = bool(gates) and any(answer.fails for answer in said)
         failed |= fails
         result = "fails" if fails else "passes"
-        title = f"Gate {gate.text!r} {result}" if gates else "Change of P"
+        title = f"Gate {result} (fails if {gate.text})" if gates else "Change of P"
         _show_answers(title, said, left_out if gate.subject == "change" else ())
     raise typer.Exit(1 if failed else 0)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import typer
@@ -43,17 +43,33 @@ def show(section: Section) -> None:
         console.out(section_markdown(section), highlight=False)
         return
     console.rule(escape(plain(section.title)), align="left")
-    if section.columns:
+    for shown in _beside(section, console.width):
         table = Table(box=None, pad_edge=False, header_style="bold")
-        for column in section.columns:
+        for place in shown:
             # Folded where a terminal is narrow: a number that is cut is another number.
-            table.add_column(escape(plain(column)), overflow="fold")
+            table.add_column(escape(plain(section.columns[place])), overflow="fold")
         for row in section.rows:
-            table.add_row(*(escape(plain(value)) for value in row))
+            table.add_row(*(escape(plain(row[place])) for place in shown))
         console.print(table)
     for line in section.lines:
         console.print(escape(plain(line)))
     console.print()
+
+
+def _beside(section: Section, width: int) -> Iterator[list[int]]:
+    """Yield which columns stand side by side: the first, and as many others as fit beside it."""
+    columns = zip(section.columns, *section.rows)
+    # A heading may take two lines, and the last column of a table as many as it needs.
+    widths = [max(len(head) // 2, *map(len, cells), 1) for head, *cells in columns]
+    shown: list[int] = []
+    for place in range(len(widths)):
+        taken = sum(widths[one] + 1 for one in shown) + widths[place]
+        if len(shown) > 1 and taken > width:
+            yield shown
+            shown = shown[:1]
+        shown.append(place)
+    if shown:
+        yield shown
 
 
 def say(text: str, command: str = "") -> None:
@@ -117,13 +133,14 @@ def show_report(
 def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
     """Print the seeds that each comparison of a study needs for an effect, given or published."""
     n_seeds, margin = len(results.plan.seeds), results.plan.specification.margin
+    runs = "seeds" if results.plan.paired else "trials a condition"
     columns = (
-        "policy", "verdict on", "assumed effect", f"seeds for {POWER:.0%} power",
-        f"distance that {n_seeds} seeds find", f"seeds for equivalent at {margin:.0%}",
+        "policy", "verdict on", "assumed effect", f"{runs} for {POWER:.0%} power",
+        f"distance that {n_seeds} {runs} find", f"{runs} for equivalent at {margin:.0%}",
     )  # fmt: skip
     hint = f"For another effect: swarm-logistics study plan {shlex.quote(asked)} --effect 0.2"
     rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
-    show_table(f"Seeds needed, from {n_seeds} seeds", columns, rows, hint)
+    show_table(f"Power, from {n_seeds} {runs}", columns, rows, hint)
 
 
 def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.errors import TrainingError, how_to_install
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.train.training import load_training, preset_names
 
@@ -56,9 +56,7 @@ def _train(
         import_module("tensorboard")  # missed before anything is written
         from swarm_logistics_env.train.trainer import train
     except ModuleNotFoundError as error:
-        raise TrainingError(
-            f"training needs more ({error}): pip install 'swarm-logistics-env[train]'"
-        ) from error
+        raise TrainingError(f"training needs more ({error}): {how_to_install('train')}") from error
     out = out or Path("results/train", training.name)
     log = shlex.quote(str(out / "tensorboard"))
     typer.echo(f"To follow it: tensorboard --logdir {log}")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.errors import PolicyError, how_to_install
 from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
@@ -135,8 +135,7 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
         from onnx import TensorProto, checker, helper, numpy_helper
     except ModuleNotFoundError as error:
         raise PolicyError(
-            f"to write ONNX needs the package onnx ({error}): pip install "
-            "'swarm-logistics-env[onnx]'"
+            f"to write ONNX needs the package onnx ({error}): {how_to_install('onnx')}"
         ) from error
     network, tensors = policy.card.network, dict(policy.tensors)
     if not network.listens:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.errors import SetupError, how_to_install
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
@@ -136,9 +136,7 @@ def load_pygame() -> None:
             for module in ("pygame", "pygame.font", "pygame.pkgdata"):
                 importlib.import_module(module)
     except ImportError as error:
-        raise SetupError(
-            f"rendering needs pygame ({error}): pip install 'swarm-logistics-env[render]'"
-        ) from error
+        raise SetupError(f"rendering needs pygame ({error}): {how_to_install('render')}") from error
 
 
 def _open_display() -> None:
@@ -264,7 +262,7 @@ def _ffmpeg() -> str:
         import imageio_ffmpeg
     except ImportError as error:
         raise SetupError(
-            f"a film needs imageio-ffmpeg ({error}): pip install 'swarm-logistics-env[render]'"
+            f"a film needs imageio-ffmpeg ({error}): {how_to_install('render')}"
         ) from error
     try:
         program: str = imageio_ffmpeg.get_ffmpeg_exe()

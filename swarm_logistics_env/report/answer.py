@@ -13,6 +13,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
+from swarm_logistics_env.tasks.task import DEFAULT
 
 from . import section
 from .section import Section, said
@@ -59,7 +60,7 @@ class Line:
     @property
     def interval(self) -> str:
         """The interval; of several values that which holds all of theirs."""
-        known = [test.interval for test in self.tests if test.interval]
+        known = [t.interval for t in self.tests if t.interval and t.conclusion != UNAFFECTED]
         low = [one.low for one in known if one.low is not None]
         high = [one.high for one in known if one.high is not None]
         if not (low and high):
@@ -68,7 +69,9 @@ class Line:
         if len(self.tests) == 1:
             return whole
         # A value that is capped or alone has none.
-        return f"in {whole}" if len(low) == len(self.tests) else f"{len(low)} in {whole}"
+        if len(low) == len(self.tests):
+            return f"in {whole}"
+        return f"{len(low)} of {len(self.tests)} in {whole}"
 
     @property
     def verdict(self) -> str:
@@ -77,19 +80,22 @@ class Line:
         test, problems = self.tests[0], {test.problem for test in self.tests}
         if not any(one.estimate for one in self.tests):
             others = f", and {len(problems) - 1} more reasons" if len(problems) > 1 else ""
-            return f"undefined: {test.problem}{others}"
+            is_unplayed = all(str(problem).endswith(" missing") for problem in problems)
+            return f"{'no verdict' if is_unplayed else words[0]}: {test.problem}{others}"
         if len(self.tests) > 1:
             return words[0] if len(set(words)) == 1 else section.counted(words)
         assert test.estimate is not None
         if test.conclusion == UNAFFECTED:
             return f"{words[0]}, exact"
         if test.conclusion is None:
-            return f"{words[0]}: other questions on {self.indicator} lack runs"
-        more = _seeds_more(test.estimate)
+            return f"no verdict: other questions on {self.indicator} lack runs"
+        if "unbounded" in test.flags and test.conclusion in section.DECIDED:
+            return f"{words[0]} by its test; P_o is too near 0 for an interval"
+        tells, more = _seeds_more(test.estimate)
         if test.conclusion != "inconclusive" or more is None:
             return words[0]
         runs = "seeds" if test.estimate.paired else "trials"
-        return f"open: {more} more {runs} tell {_EFFECT:g}"
+        return f"open: {more} more {runs} tell {tells:g}"
 
     @property
     def contradicts(self) -> bool:
@@ -208,17 +214,20 @@ def _about(tests: Sequence[Verdict]) -> str:
     return f"{after.name} {before.value:g}→{', '.join(values)}{asked}"
 
 
-def _seeds_more(estimate: Estimate) -> int | None:
-    """Return how many more seeds find an effect on the side of the value with 80 % power."""
-    side = math.copysign(_EFFECT, estimate.value - estimate.threshold)
-    needed = spi.seeds_for_power(estimate, estimate.threshold + side, POWER)
-    return None if needed is None or needed <= estimate.n_seeds else needed - estimate.n_seeds
+def _seeds_more(estimate: Estimate) -> tuple[float, int | None]:
+    """Return an effect on the side of the value, and the seeds that 80 % power needs beside."""
+    effect = estimate.threshold + math.copysign(_EFFECT, estimate.value - estimate.threshold)
+    needed = spi.seeds_for_power(estimate, effect, POWER)
+    more = None if needed is None or needed <= estimate.n_seeds else needed - estimate.n_seeds
+    return effect, more
 
 
 def _asked(results: StudyResults) -> str:
     policies = results.policies
     whose = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
     seeds = section.seeds_text(results).split(" (")[0]
+    if any(cell.problem for cell in results.cells):
+        seeds = f"up to {seeds}"
     name = results.plan.specification.name
     return f"{name}: {section.plural(len(results.verdicts), 'question')}, {whose}, {seeds}."
 
@@ -242,7 +251,13 @@ def _performance(results: StudyResults) -> str:
         + (_multiple(one, baseline) if baseline and results.plan.paired else "")
         for one in reversed(here.values())
     )
-    return f"P at {where}: {', '.join(told)}."
+    return f"{_measured(cell)} at {where}: {', '.join(told)}."
+
+
+def _measured(cell: Cell) -> str:
+    case = cell.arm.case
+    is_usual = case.task.name == DEFAULT and hasattr(case.scenario, "duration")
+    return f"P, items in {case.scenario.duration:g} s," if is_usual else "P"
 
 
 def _multiple(cell: Cell, baseline: Cell) -> str:
@@ -265,7 +280,8 @@ def _mean(cell: Cell) -> str:
 
 def _last(results: StudyResults) -> str:
     """Return what the symbols mean, how to read the verdicts, and what limits them, in one line."""
-    tests, reference = results.verdicts, results.plan.specification.reference
+    tests, reference = results.verdicts, results.reference
+    runs = "seeds" if results.plan.paired else "trials a condition"
     asked = {test.compared.indicator for test in tests} - {"change"}
     named = [one.heading for symbol, one in DEFINITIONS.items() if symbol in asked]
     parts = [f"{', '.join(named)}: good above 0"] if named else []
@@ -280,15 +296,19 @@ def _last(results: StudyResults) -> str:
     if any(test.saturated for test in tests):
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
-        parts.append("some runs stalled")
+        parts.append("some runs stalled (P below a quarter of the median; --full names them)")
     if any(test.conclusion == "inconclusive" for test in tests):
-        parts.append(f"so many more seeds tell a value {_EFFECT:g} away from 0 in 4 of 5 studies")
-    claims = [said(test.claim_verdict_holm) for test in tests if test.claim]
-    if claims:
-        where = " in the paper's text" if reference else ""
-        parts.append(f"of {section.plural(len(claims), 'claim')}{where} {section.counted(claims)}")
-    told = "; ".join(parts)
-    return f"{told[0].upper()}{told[1:]}."
+        parts.append(f"so many more {runs} tell a value {_EFFECT:g} away from 0 in 4 of 5 studies")
+    claims = [test for test in tests if test.claim]
+    told = {asked for one in reference.sentences.values() for asked in one} if reference else set()
+    of_text = [test for test in claims if test.compared.question in told]
+    of_others = [test for test in claims if test not in of_text]
+    for where, here in ((" in the paper's text", of_text), (" beside it" * bool(told), of_others)):
+        if here:
+            found = section.counted(said(test.claim_verdict_holm) for test in here)
+            parts.append(f"of {section.plural(len(here), 'claim')}{where} {found}")
+    line = "; ".join(parts)
+    return f"{line[0].upper()}{line[1:]}."
 
 
 def in_a_sentence(results: StudyResults) -> str:
@@ -303,7 +323,10 @@ def in_a_sentence(results: StudyResults) -> str:
         worst = min(known, key=lambda test: test.value or 0.0)
         line = _line([worst], (0,))
         told += f"; the lowest is {line.question} = {line.value} {line.interval}".rstrip()
-    return f"{', '.join(results.policies)}: {told}."
+    whose = results.policies
+    if results.plan.imported_from and len(whose) == 1:  # nobody named it
+        whose = (results.plan.specification.name,)
+    return f"{', '.join(whose)}: {told}."
 
 
 def digest(found: Answer, width: int, most: int | None = MOST_LINES) -> str:

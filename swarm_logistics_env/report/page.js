@@ -1,6 +1,7 @@
 "use strict";
 // Draws the figures of a report from the JSON in it. Loads nothing.
 const data = JSON.parse(document.getElementById("data").textContent);
+const repeat = data.paired ? "seed" : "trial";
 const at = (id) => document.getElementById(id);
 const MARKS = [
   (x, y) => `M${x - 4},${y}a4,4 0 1,0 8,0a4,4 0 1,0 -8,0`,
@@ -99,7 +100,7 @@ function drawComparison() {
       if (value === null || value < low || value > high) return;
       // Spread out by the golden ratio: beside each other, and the same at every drawing.
       const shift = room * (((k * 0.618034) % 1) * 2 - 1);
-      drawn += `<circle class="dot" cx="${x + shift}" cy="${y(value)}" r="2.6" fill="${colour(c)}" ${target} data-seed="${k}"><title>${escaped(point.policy)}, ${escaped(view.categories[point.at])}, seed ${data.seeds[k] ?? k}: ${tidy(value)}</title></circle>`;
+      drawn += `<circle class="dot" cx="${x + shift}" cy="${y(value)}" r="2.6" fill="${colour(c)}" ${target} data-seed="${k}"><title>${escaped(point.policy)}, ${escaped(view.categories[point.at])}, ${repeat} ${data.seeds[k] ?? k}: ${tidy(value)}</title></circle>`;
     });
     if (point.value === null) continue;
     if (point.low !== null && point.high !== null) {
@@ -117,7 +118,7 @@ function drawComparison() {
   at("policies").innerHTML = shown.map((policy) => {
     const c = data.policies.indexOf(policy);
     return `<span><svg width="12" height="12" viewBox="-6 -6 12 12" style="display:inline"><path d="${MARKS[c % 6](0, 0)}" fill="${colour(c)}"/></svg> ${escaped(policy)}</span>`;
-  }).join("") + "<span>bar: 95 % interval</span><span>dot: one seed, click it</span>" + (crosses.length ? "<span>×: published</span>" : "");
+  }).join("") + `<span>bar: 95 % interval</span><span>dot: one ${repeat}, click it</span>` + (crosses.length ? "<span>×: published</span>" : "");
 }
 
 // One question: paired slopes, delivery curves, and one run
@@ -150,7 +151,7 @@ function showQuestion() {
   drawCurves();
   at("arms").innerHTML = chosen.arms.map(([symbol, name], i) =>
     `<span><b style="color:${colour(i)}">●</b> ${escaped(symbol)}: ${escaped(name)}</span>`).join("")
-    + "<span>thin: one seed, click it; bold: mean</span>";
+    + (data.paired ? "<span>thin: one seed, click it; bold: mean</span>" : "<span>dot: one trial; bold: mean</span>");
   showRun();
 }
 
@@ -171,11 +172,11 @@ function drawSlopes() {
       drawn += `<polyline class="thin${marked}" points="${points.join(" ")}" stroke="var(--ink)" data-seed="${k}"><title>seed ${data.seeds[k]}</title></polyline>`;
     }
     points.forEach((point, i) => {
-      if (point) drawn += `<circle class="dot${marked}" cx="${x(i)}" cy="${y(samples[i][k])}" r="4" fill="${colour(i)}" data-seed="${k}"><title>seed ${data.seeds[k]}: ${samples[i][k]}</title></circle>`;
+      if (point) drawn += `<circle class="dot${marked}" cx="${x(i)}" cy="${y(samples[i][k])}" r="4" fill="${colour(i)}" data-seed="${k}"><title>${repeat} ${data.seeds[k]}: ${samples[i][k]}</title></circle>`;
     });
   }
   drawn += `<polyline fill="none" points="${means.map((p, i) => `${x(i)},${y(p)}`).join(" ")}" stroke="var(--ink)" stroke-width="3.5"/>`;
-  put(place, width, height, drawn, "P seed by seed");
+  put(place, width, height, drawn, `P ${repeat} by ${repeat}`);
 }
 
 function timesOf(gaps) {
@@ -209,12 +210,13 @@ function drawCurves() {
 
 function showRun() {
   const seed = data.seeds[chosen.seed], place = at("run");
+  place.hidden = !data.paired;  // unpaired trials have nothing in common but their place
   const runs = chosen.arms.map(([symbol, name, condition]) => {
     const { p, command } = data.conditions[condition];
     const shown = command ? `<code>${escaped(command)} --seed ${seed}</code>` : "";
     return `${escaped(symbol)}, ${escaped(name)}: P = ${p[chosen.seed] ?? "no run"}${shown}`;
   });
-  place.innerHTML = `<b>${data.paired ? "Seed" : "Run"} ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
+  place.innerHTML = `<b>Seed ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
 }
 
 // Tables sort by the first number of a cell, or by its text

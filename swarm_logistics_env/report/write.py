@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.errors import StudyError, how_to_install
 from swarm_logistics_env.records import becoming, plain
 from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.studies.results import StudyResults, frame_of_cells, frame_of_verdicts
@@ -97,7 +97,7 @@ def how_to_get_figures(missing: Sequence[str]) -> str:
     """Return the sentence that says what to install."""
     return (
         f"report.html and the drawings of figures need {' and '.join(missing)}: "
-        "pip install 'swarm-logistics-env[study]', then ask for the report again."
+        f"{how_to_install('study')}, then ask for the report again."
     )
 
 
@@ -165,6 +165,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
     data = page_data(results)
     return template("page.html.jinja").render(
         document=document,
+        paired=results.plan.paired,
         answer=document.answer,
         axis=axis(document.answer),
         signs=SIGNS,

@@ -23,7 +23,7 @@ from multiprocessing.connection import Connection
 from types import ModuleType
 from unittest.mock import patch
 
-from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.errors import StudyError, how_to_install, suggest
 from swarm_logistics_env.kernels import QUIET
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run
@@ -299,9 +299,7 @@ def _connected(address: str | None, cores: int | None) -> tuple[ModuleType, bool
     try:
         import ray
     except ImportError:
-        raise StudyError(
-            "the engine ray needs Ray: pip install 'swarm-logistics-env[ray]'"
-        ) from None
+        raise StudyError(f"the engine ray needs Ray: {how_to_install('ray')}") from None
     if ray.is_initialized():
         return ray, False
     # Its reports of use are for the user to switch on.

@@ -171,6 +171,8 @@ class Study:
                 if self.specification.until_clear:
                     seeds = max(run.seed for run in missing) - self.specification.first_seed + 1
                     title += f", up to {seeds} seeds"
+                if minutes is not None:
+                    title += f", for {minutes:g} min"
                 outcomes, took = play(missing, engine, store, title, end)
                 left = len(missing) - len(outcomes)
                 played += len(outcomes)
@@ -250,7 +252,7 @@ class Study:
         return frame_of_verdicts(self.findings().verdicts)
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
-        """Write report.md, cells.csv and claims.csv into a directory; return their paths.
+        """Write the report into a directory, see `report.write`; return the paths of its files.
 
         Args:
             path: the directory; None: the study's own.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -113,12 +114,22 @@ class Cell:
     @cached_property
     def mean(self) -> Interval:
         """Mean P with its 95 % interval; NaN: no run."""
-        return spi.mean_interval(self.by_seed) if self.n_seeds else _UNKNOWN
+        return self._possible(spi.mean_interval(self.by_seed)) if self.n_seeds else _UNKNOWN
 
     @cached_property
     def one_run(self) -> Interval:
         """Mean P with the 95 % interval of one further run."""
-        return spi.prediction_interval(self.by_seed.ravel()) if self.n_seeds else _UNKNOWN
+        if not self.n_seeds:
+            return _UNKNOWN
+        return self._possible(spi.prediction_interval(self.by_seed.ravel()))
+
+    def _possible(self, interval: Interval) -> Interval:
+        """Return an interval that ends at the number of items where none comes back."""
+        scenario = self.arm.case.scenario
+        if interval.high is None or getattr(scenario, "restock", True):
+            return interval
+        most: float = getattr(scenario, "n_items", math.inf)
+        return interval._replace(high=min(interval.high, most))
 
     @property
     def stalled(self) -> float:

@@ -4,8 +4,8 @@ Items are no obstacles until no laden robot stands above them: the item collisio
 
 An unladen robot may stand above items. Were those solid to it from the moment it lifts another,
 they would shove it off, through its neighbours and walls where there is no room. So what it stands
-above is masked (`Items.covered`), as is an item that is put down, and is solid again when robots
-have left it.
+above is masked (`Items.covered`), as is an item that is put down, and is solid again when laden
+robots have left it.
 """
 
 from __future__ import annotations

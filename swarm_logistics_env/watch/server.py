@@ -16,7 +16,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_logistics_env.errors import SetupError, SwarmLogisticsError
+from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, how_to_install
 from swarm_logistics_env.watch.messages import Recording, changes, encode, fixed_data, frame, obey
 from swarm_logistics_env.watch.session import Session
 
@@ -73,9 +73,7 @@ class WatchServer:
         try:
             from aiohttp import web
         except ImportError as error:
-            raise SetupError(
-                f"watch needs aiohttp ({error}): pip install 'swarm-logistics-env[watch]'"
-            ) from None
+            raise SetupError(f"watch needs aiohttp ({error}): {how_to_install('watch')}") from None
         self._web = web
         self.session, self.port, self.host = session, port, host
         self.token = token or secrets.token_urlsafe(18)

@@ -59,7 +59,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ["change < 0", "possibly change < -0.1"],
             0,
             [
-                "Gate 'change < 0' passes",
+                "Gate passes (fails if change < 0)",
                 *(
                     f"| mine: change, N = {size} (Scalability) | 0.000 | exact: the runs of both "
                     "studies are the same |"
@@ -69,7 +69,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ),
         # Another policy in the place of the judged one is named.
         ("still", ["change < 0"], 1, ["| mine -> Still: change, N = 6 (Scalability) | -1.000"]),
-        ("still", ["change > 0"], 0, ["Gate 'change > 0' passes"]),
+        ("still", ["change > 0"], 0, ["Gate passes (fails if change > 0)"]),
         ("still", [], 0, ["Change of P"]),  # without a gate nothing fails
         ("fresh seeds", ["change < 0"], 1, ["share no seed: the old one has 0 to 5, the new one"]),
     ],
@@ -112,7 +112,7 @@ def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(
     capsys.readouterr()
     for arguments, code, words in (
         ([old, new], 0, "change, FM1, m = 1"),
-        ([old, new, "--fail-if", "R < 0"], 1, "Gate 'R < 0' fails"),
+        ([old, new, "--fail-if", "R < 0"], 1, "Gate fails (fails if R < 0)"),
         ([old, new, "--fail-if", "change < -0.2 at FM1"], 1, "fails"),
         ([new, old, "--fail-if", "R < 0", "--fail-if", "change < 0"], 0, "passes"),
         # Seeds 2 and 3: 44 + 41 instead of 43 + 42. By their places it would be another change.

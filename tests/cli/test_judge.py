@@ -76,7 +76,7 @@ def test_trials_are_judged_and_what_is_written_is_told(
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
     assert f"Figure: {out / 'figures' / 'answer.svg'}\nTables: {out / 'tables.tex'}\n" in printed
-    assert "For a paper: recorded: P at N = 8, no fault: 12.3 [" in printed
+    assert "For a paper: lab: P at N = 8, no fault: 12.3 [" in printed
     for name in ("report.html", "report.md", "claims.csv", "figures/answer.svg"):
         assert (out / name).is_file()
     report = (out / "report.md").read_text()
@@ -136,7 +136,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(
     assert app.run([*command, "--minutes", "0"]) == 0
     printed = capsys.readouterr().out
     again = "swarm-logistics judge homing --processes 1 --seeds 5 --minutes 0"
-    assert f"Stopped after 0 minutes; the same command goes on: {again}\n" in printed
+    assert f"Stopped after 0 min; the same command goes on: {again}\n" in printed
     assert "1 runs played" in printed.splitlines()[-1]
     assert app.run(command) == 0
     printed = capsys.readouterr().out
@@ -144,9 +144,9 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(
     study = Study.stored(out)
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
-    assert f"P at N = 4, no fault: {p:.1f} [" in printed
+    assert f"P, items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
     assert f"Figure: {out / 'figures' / 'answer.svg'}" in printed
-    assert f"For a paper: homing: P at N = 4, no fault: {p:.1f} [" in printed
+    assert f"For a paper: homing: P, items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
     assert "P of the shipped policies here: " in printed
     shipped = printed.split("P of the shipped policies here: ")[1].splitlines()[0]
     assert " homing " not in shipped  # not ranked by itself
@@ -166,7 +166,8 @@ def test_a_policy_is_played_until_it_is_clear(
     printed = capsys.readouterr().out
     assert Study.stored("clear").specification.until_clear
     # Nobody delivers: there is no ratio, and every question stops at the first look.
-    assert "no fault: 0 (at most 0.15, as none of 20 runs delivered anything)." in printed
+    told = "no fault: 0 (at most 0.15, as none of 20 runs delivered anything)."
+    assert told in " ".join(printed.split())
     assert "undefined: it delivers nothing" in printed
     assert "80 runs played" in printed.splitlines()[-1]
     assert app.run([*given, "all", "--all-seeds"]) == 0

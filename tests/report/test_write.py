@@ -140,7 +140,7 @@ def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_al
     names = {path.name for path in write_report(single, tmp_path)}
     assert names == {"report.md", "cells.csv", "claims.csv", "tables.tex"}
     text = (tmp_path / "report.md").read_text()
-    assert f"need {package}: pip install 'swarm-logistics-env[study]'" in text
+    assert f"need {package}: in a clone, pip install -c constraints.txt '.[study]'" in text
     assert "![" not in text
     assert {path.suffix for path in (tmp_path / "figures").iterdir()} == {".csv"}
     assert "S = 0.611 (no interval) over one seed (0). Unadjusted: open; Holm-adj" in text

@@ -70,7 +70,7 @@ def test_ray_with_two_local_nodes(played: Path, tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore")
 def test_ray_that_is_missing_or_a_cluster_that_is_not_there_is_named() -> None:
-    words = "no Ray cluster at auto" if has_ray else r"swarm-logistics-env\[ray\]"
+    words = "no Ray cluster at auto" if has_ray else r"\.\[ray\]"
     with pytest.raises(StudyError, match=words):
         Study(**SMALL).run("ray", address="auto")
 
