@@ -95,7 +95,7 @@ def _clearing(block: str) -> Iterator[str]:
     ratio = times[_REFERENCE].value / times[best].value
     beside = ""
     if script := times.get(_STOCK):
-        beside = f"; `{_STOCK}`, a script that heaps items at its edge, in {script.text} s"
+        beside = f"; `{_STOCK}`, a script that heaps items at the delivery area, in {script.text} s"
     yield (
         f"**The paper's warehouse, cleared {ratio:.0f} times as fast**: `{best}` delivers its 60 "
         f"items in {times[best].text} s, the paper's Swarm D-T in {times[_REFERENCE].text} s"
@@ -108,7 +108,7 @@ def _learned(rows: Rows) -> Iterator[str]:
     best = max((name for name in p if name.startswith(_LEARNED)), key=lambda name: p[name].value)
     yield (
         f"**Where items come back, {p[best].value / p[_REFERENCE].value:.1f} times as many**: "
-        f"{p[best].text} in 500 s; Swarm D-T {p[_REFERENCE].text}."
+        f"`{best}` {p[best].text} in 500 s; Swarm D-T {p[_REFERENCE].text}."
     )
 
 
@@ -157,10 +157,7 @@ def speed(page: str) -> str:
     }
     arrays = cells["env.step_arrays"]
     (machine,) = re.findall(r"^On (.*), \d+ cores?, Python .*\.$", costs, flags=re.MULTILINE)
-    return (
-        f"A step of 25 robots takes {arrays[1]} µs on one core of {machine}: {arrays[0]} "
-        "robot-steps a second."
-    )
+    return f"A step of 25 robots takes {arrays[1]} µs on one core of {machine}."
 
 
 # -- the picture --------------------------------------------------------------------------------
