@@ -198,11 +198,10 @@ def _row(label: str, cells: list[Cell], missed: set[Setting]) -> tuple[str, ...]
 
 def sentences_block(parts: Sequence[StudyResults]) -> str:
     """Return each sentence of the paper with the verdicts on the claims that it makes."""
-    tests = [test for part in parts[:2] for test in part.verdicts if test.claim]
-    other = [test for test in parts[2].verdicts if test.claim]
+    of_text, beside, other = _claims(parts)
     rows = [
-        *sentences(PAPER, tests),
-        *claims("(P falls without taxis)", [test for test in tests if not _told(test)]),
+        *sentences(PAPER, of_text),
+        *claims("(P falls without taxis)", beside),
         *claims("(the same of FM3_send)", other),
     ]
     lines = [
@@ -221,10 +220,7 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
 
 def _summary(parts: Sequence[StudyResults]) -> list[str]:
     """Return how many claims are supported and contradicted, and what that means."""
-    tests = [test for part in parts[:2] for test in part.verdicts if test.claim]
-    of_text = [test for test in tests if _told(test)]
-    beside = [test for test in tests if not _told(test)]
-    other = [test for test in parts[2].verdicts if test.claim]
+    of_text, beside, other = _claims(parts)
     counted = Counter(map(_said, of_text))
     of = Counter(_about(test) for test in of_text if _said(test) == "refuted")
     about = ", ".join(f"{count} on {what}" for what, count in of.most_common())
@@ -242,9 +238,13 @@ def _summary(parts: Sequence[StudyResults]) -> list[str]:
     ]
 
 
-def _told(test: Verdict) -> bool:
-    """Return whether the paper's text makes this claim."""
-    return any(test.compared.question in questions for questions in PAPER.sentences.values())
+def _claims(parts: Sequence[StudyResults]) -> tuple[list[Verdict], ...]:
+    """Return the verdicts on claims: of the paper's text, beside it, and with FM3_send."""
+    tests = [test for part in parts[:2] for test in part.verdicts if test.claim]
+    told = {asked for questions in PAPER.sentences.values() for asked in questions}
+    of_text = [test for test in tests if test.compared.question in told]
+    beside = [test for test in tests if test not in of_text]
+    return of_text, beside, [test for test in parts[2].verdicts if test.claim]
 
 
 def _counted(tests: Sequence[Verdict]) -> str:

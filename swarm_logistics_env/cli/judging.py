@@ -120,9 +120,8 @@ def judge_command(
     """Judge trials of real robots or of another simulator; or a policy, until it is clear.
 
     Columns of trials are robots, fault, faulty and delivered (or performance); where they apply
-    seed, policy, onset and any parameter; or time, with a delivery a row.
-
-    Without seeds the study is unpaired.
+    seed, policy, onset and any parameter; or time, with a delivery a row. Without seeds the study
+    is unpaired.
 
     A policy is played in a warehouse in which delivered items come back, so that P has no cap.
     """

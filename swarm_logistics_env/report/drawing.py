@@ -29,34 +29,17 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
 WIDTH = 5.2  # inch: still legible at the width of a phone
 _STYLE: Any = {  # matplotlib types each of its names
-    "axes.edgecolor": INK,
-    "axes.facecolor": "none",
-    "axes.grid": True,
-    "axes.grid.axis": "y",
-    "axes.labelcolor": INK,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": "medium",
-    "figure.facecolor": PAPER,
-    "font.family": "DejaVu Sans",
-    "font.size": 9.5,
-    "grid.alpha": 0.25,
-    "grid.color": INK,
-    "grid.linewidth": 0.5,
-    "legend.columnspacing": 1.2,
-    "legend.fontsize": 9.0,
-    "legend.frameon": False,
+    "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "grid.color": INK,
+    "xtick.color": INK, "ytick.color": INK, "axes.facecolor": "none",
+    "figure.facecolor": PAPER, "savefig.facecolor": PAPER,
+    "axes.grid": True, "axes.grid.axis": "y", "grid.alpha": 0.25, "grid.linewidth": 0.5,
+    "axes.spines.right": False, "axes.spines.top": False,
+    "axes.titlelocation": "left", "axes.titlesize": "medium",
+    "font.family": "DejaVu Sans", "font.size": 9.5, "lines.linewidth": 1.6,
+    "legend.columnspacing": 1.2, "legend.fontsize": 9.0, "legend.frameon": False,
     "legend.handletextpad": 0.5,
-    "lines.linewidth": 1.6,
-    "savefig.facecolor": PAPER,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "swarm-logistics-env",
-    "text.color": INK,
-    "text.parse_math": False,
-    "xtick.color": INK,
-    "ytick.color": INK,
-}
+    "svg.fonttype": "none", "svg.hashsalt": "swarm-logistics-env", "text.parse_math": False,
+}  # fmt: skip
 _NO_METADATA = {"Creator": None, "Date": None, "Format": None, "Type": None}
 DOTS_PER_INCH = 200
 

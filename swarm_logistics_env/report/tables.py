@@ -202,8 +202,6 @@ def warnings(results: StudyResults) -> Iterator[str]:
         if test.problem:
             compared = test.compared
             what = f"{compared.policy}, {compared.indicator}, {compared.label}"
-            if compared.threshold:
-                what += f" > {compared.threshold:g}"
             yield f"{what} is undefined: {test.problem}."
 
 

@@ -201,23 +201,10 @@ def _unbroken(text: str) -> str:
 
 
 _ESCAPES = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "->": r"$\to$",
-    "–": "--",
-    "∞": r"$\infty$",
-    "†": r"\dag{}",
-    "<": "$<$",
-    ">": "$>$",
-}
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+    "->": r"$\to$", "–": "--", "∞": r"$\infty$", "†": r"\dag{}", "<": "$<$", ">": "$>$",
+}  # fmt: skip
 _FOUND = re.compile("|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True))))
 
 

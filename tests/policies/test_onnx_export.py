@@ -39,7 +39,7 @@ def test_without_the_package_it_says_what_to_install(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path
     )
-    assert "pip install 'swarm-logistics-env[onnx]'" in done.stdout
+    assert "pip install -c constraints.txt '.[onnx]'" in done.stdout
 
 
 def test_scripts_are_refused(tmp_path: Path) -> None:

@@ -267,5 +267,5 @@ def test_wrong_arguments_and_a_missing_pygame_are_told(monkeypatch: pytest.Monke
         with pytest.raises(SetupError, match=message):
             Renderer(ONE[1], mode, size)  # type: ignore[arg-type]
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(SetupError, match=r"pip install 'swarm-logistics-env\[render\]'"):
+    with pytest.raises(SetupError, match=r"pip install -c constraints.txt '\.\[render\]'"):
         Renderer(Scenario(), "rgb_array")

@@ -82,7 +82,7 @@ def test_what_cannot_be_written_is_refused_first(
         with pytest.raises(SetupError, match=words):
             video.check_film(tmp_path / name)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(SetupError, match=r"pip install 'swarm-logistics-env\[render\]'"):
+    with pytest.raises(SetupError, match=r"pip install -c constraints.txt '\.\[render\]'"):
         video.check_film(tmp_path / "film.mp4")
 
 
