@@ -59,11 +59,11 @@ def show(section: Section) -> None:
 def _beside(section: Section, width: int) -> Iterator[list[int]]:
     """Yield which columns stand side by side: the first, and as many others as fit beside it."""
     columns = zip(section.columns, *section.rows)
-    # A heading may take two lines, and the last column of a table as many as it needs.
-    widths = [max(len(head) // 2, *map(len, cells), 1) for head, *cells in columns]
+    # A long heading is folded.
+    widths = [max(min(len(head), 12), *map(len, cells), 1) for head, *cells in columns]
     shown: list[int] = []
     for place in range(len(widths)):
-        taken = sum(widths[one] + 1 for one in shown) + widths[place]
+        taken = sum(widths[one] + 2 for one in shown) + widths[place]
         if len(shown) > 1 and taken > width:
             yield shown
             shown = shown[:1]

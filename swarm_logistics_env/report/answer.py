@@ -298,7 +298,7 @@ def _last(results: StudyResults) -> str:
     if any(cell.stalled for cell in results.cells):
         parts.append("some runs stalled (P below a quarter of the median; --full names them)")
     if any(test.conclusion == "inconclusive" for test in tests):
-        parts.append(f"so many more {runs} tell a value {_EFFECT:g} away from 0 in 4 of 5 studies")
+        parts.append(f"so many more {runs} find such a value in 4 of 5 studies")
     claims = [test for test in tests if test.claim]
     told = {asked for one in reference.sentences.values() for asked in one} if reference else set()
     of_text = [test for test in claims if test.compared.question in told]
@@ -350,7 +350,9 @@ def _rows(found: Answer, width: int) -> Iterator[str]:
     """Yield the lines in columns; the verdict is folded where the terminal is narrow."""
     columns = zip(*((line.question, line.value, line.interval) for line in found.lines))
     widths = [max(map(len, column)) for column in columns]
-    widths[0] = min(widths[0], max(8, width - sum(widths[1:]) - 16))
+    # A verdict is to fit in one line; an open one is longer than most questions.
+    room = width - sum(widths[1:]) - 6 - min(30, max(len(line.verdict) for line in found.lines))
+    widths[0] = min(widths[0], max(8, room, min(24, room + 20)))
     for policy, lines in grouped(found.lines, lambda line: line.policy).items():
         if len({line.policy for line in found.lines}) > 1:
             yield f"{policy}:"
