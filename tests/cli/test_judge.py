@@ -34,6 +34,10 @@ class Failing(Mine):
     def act(self, observations):
         raise RuntimeError("no more")
 
+class Short(Mine):
+    def act(self, observations):
+        return np.zeros((len(observations), 3))
+
 class NoAct:
     def reset(self, n_robots, seed): ...
 """
@@ -184,6 +188,15 @@ def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(
     assert "P: no run has succeeded." in printed
     assert "12 failed, the first with RuntimeError: no more" in printed.splitlines()[-1]
     assert "3 of 3 runs failed" in Path("card", "report.md").read_text()
+
+
+def test_commands_of_a_wrong_shape_are_refused_before_anything_is_kept(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["judge", "judged_policy:Short", "--processes", "1", "--out", "card"]
+    assert app.run(given) == 2
+    assert "commands of shape (4, 3): should be (4, 4)" in capsys.readouterr().err
+    assert not Path("card").exists()
 
 
 def test_recorded_p_is_that_of_the_shipped_policies() -> None:
