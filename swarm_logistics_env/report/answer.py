@@ -235,8 +235,7 @@ def _asked(results: StudyResults) -> str:
 def _performance(results: StudyResults) -> str:
     shown = [one for one in results.cells if one.arm.setting.kind != "policy" and one.n_seeds]
     # Where the swarm is as it should be, or else in the first condition.
-    whole = [c for c in shown if c.arm.setting.kind == "fault" and not c.arm.setting.value]
-    base = whole or shown
+    base = [c for c in shown if c.arm.setting.kind == "fault" and not c.arm.setting.value] or shown
     here = {c.policy: c for c in reversed(base) if c.arm.setting == base[0].arm.setting}
     if not here:
         return "P: no run has succeeded."
@@ -339,20 +338,23 @@ def digest(found: Answer, width: int, most: int | None = MOST_LINES) -> str:
     """
     head = [line for text in (found.asked, found.performance) for line in _fold(text, width)]
     tail = _fold(found.last, width)
-    rows = list(_rows(found, width))
+    rows = _rows(found, width)
     room = None if most is None else most - len(head) - len(tail)
     if room is not None and len(rows) > room:
         rows = [*rows[: room - 1], f"and {len(rows) - room + 1} lines more: --full"]
     return "\n".join([*head, *rows, *tail])
 
 
-def _rows(found: Answer, width: int) -> Iterator[str]:
-    """Yield the lines in columns; the verdict is folded where the terminal is narrow."""
+def _rows(found: Answer, width: int) -> list[str]:
+    """Return the lines in columns, as few as questions and verdicts can be folded into."""
     columns = zip(*((line.question, line.value, line.interval) for line in found.lines))
-    widths = [max(map(len, column)) for column in columns]
-    # A verdict is to fit in one line; an open one is longer than most questions.
-    room = width - sum(widths[1:]) - 6 - min(30, max(len(line.verdict) for line in found.lines))
-    widths[0] = min(widths[0], max(8, room, min(24, room + 20)))
+    longest, *others = [max(map(len, column)) for column in columns]
+    most = min(longest, max(8, width - sum(others) - 16))
+    tried = range(min(20, most), most + 1)
+    return min((list(_in_columns(found, [w, *others], width)) for w in tried), key=len)
+
+
+def _in_columns(found: Answer, widths: Sequence[int], width: int) -> Iterator[str]:
     for policy, lines in grouped(found.lines, lambda line: line.policy).items():
         if len({line.policy for line in found.lines}) > 1:
             yield f"{policy}:"
