@@ -63,7 +63,6 @@ class Moment:
     requested: int
     delivered_by: list[int]
     contact: list[bool]
-    lifts: list[bool]
     delivers: list[bool]
     heard: list[float]
 
@@ -75,7 +74,7 @@ class Moment:
         return cls(
             s.step, s.robot_present.tolist(), x, y, s.robot_item.tolist(),
             s.robot_in_delivery.tolist(), item_x, item_y, s.item_carrier.tolist(), s.requested,
-            list(s.delivered_by), s.robot_contact.tolist(), s.lifts.tolist(), s.delivers.tolist(),
+            list(s.delivered_by), s.robot_contact.tolist(), s.delivers.tolist(),
             s.robot_heard.tolist(),
         )  # fmt: skip
 
@@ -260,19 +259,18 @@ def rewards(
             is_delivered = before.carriers[item] != NOBODY and before.carriers[item] in new
             if who == robot and not is_delivered:
                 way += min(now.item_x[item], edge) - min(before.item_x[item], edge)
-        discount = weights.get("discount", 1.0)
+        delivers = now.delivers[robot]
+        deeper = 0.0
+        if is_ == was == robot and now.requested == before.requested:
+            deeper = 2.0 * (max(now.x[robot], edge) - max(before.x[robot], edge))
         terms = {
             "delivery": len(new),
             "own_delivery": new.count(robot),
-            "lift_requested": 0 if new else (is_ == robot) - (was == robot),
+            "lift_requested": 0 if new else ((is_ == robot) - (was == robot)) * delivers,
             "approach": inside - inside_before if same_request else 0.0,
             "stocking": way,
-            "carrying": discount * (is_ == robot) - (was == robot),
-            "carried_way": discount * inside * (is_ == robot) - inside_before * (was == robot),
             "contact": period * now.contact[robot],
-            "blocked_request": period * (is_ == robot and not now.delivers[robot]),
-            "in_the_way": period * (scenario.warehouse_width - now.x[robot])
-            * (not now.lifts[robot]),
+            "blocked_request": (period + deeper) * (is_ == robot and not delivers),
         }  # fmt: skip
         paid = sum(weights.get(name, 0.0) * value for name, value in terms.items())
         total.append(paid if before.present[robot] else 0.0)

@@ -18,15 +18,13 @@ class RewardTerms:
     """The weighted sum of named terms, one value per robot and step.
 
     Args:
-        weights: term -> weight; see `REWARD_TERMS` for the terms. With terms that pay the change of
-            a potential, "discount" as well: the discount of the learner, above 0, at most 1.
+        weights: term -> weight; see `REWARD_TERMS` for the terms.
 
     Attributes:
         pays_steadily: whether a step without a delivery may pay.
 
     Raises:
-        SetupError: `weights` is not a dict, a term is unknown, a weight is not a finite number, or
-            the discount is missing, goes with no term, or is out of range.
+        SetupError: `weights` is not a dict, a term is unknown, or a weight is not a finite number.
     """
 
     def __init__(self, weights: Mapping[str, float] | None = None) -> None:
@@ -35,7 +33,6 @@ class RewardTerms:
                 f'rewards = {weights!r}: should be None or a dict, as {{"delivery": 1.0}}'
             )
         self.weights = dict(DEFAULT_WEIGHTS if weights is None else weights)
-        self._discount = _discount_of(self.weights)
         for name, weight in self.weights.items():
             if name not in REWARD_TERMS:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
@@ -45,7 +42,7 @@ class RewardTerms:
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""
-        self._before = Before(world, self._discount)
+        self._before = Before(world)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
         """Return what the step just taken earns each robot, (N,)."""
@@ -54,7 +51,7 @@ class RewardTerms:
             earned = term(world, self._before)
             if earned is not None:
                 total += weight * earned
-        self._before = Before(world, self._discount)
+        self._before = Before(world)
         return total
 
 
@@ -63,11 +60,10 @@ class Before:
 
     Args:
         world: the world in that state.
-        discount: the learner's, for terms that pay the change of a potential.
     """
 
-    def __init__(self, world: Warehouse, discount: float) -> None:
-        state, self.discount = world.state, discount
+    def __init__(self, world: Warehouse) -> None:
+        state = world.state
         self.delivered, self.requested = len(state.delivery_times), state.requested
         self.carrier = carrier = state.carrier
         self.carrier_x = 0.0 if carrier == NOBODY else float(state.robot_position[carrier, 0])
@@ -91,16 +87,20 @@ def own_delivery(world: Warehouse, before: Before) -> Earned:
 
 
 def lift_requested(world: Warehouse, before: Before) -> Earned:
-    """1 to the robot that took up the requested item, -1 to the one that let go of it."""
+    """1 to the robot that took up the requested item, -1 to the one that let go of it.
+
+    Nothing to one that cannot deliver (privileged: as `approach`).
+    """
     carrier = world.state.carrier
     # Deliveries tell that the request changed; the item's number does not, as the same item may be
     # asked for again with `restock`.
     if world.state.delivered != before.delivered or carrier == before.carrier:
         return None
     paid = np.zeros(world.state.n_robots)
-    if carrier != NOBODY:
+    delivers = world.state.delivers
+    if carrier != NOBODY and delivers[carrier]:
         paid[carrier] += 1.0
-    if before.carrier != NOBODY:
+    if before.carrier != NOBODY and delivers[before.carrier]:
         paid[before.carrier] -= 1.0
     return paid
 
@@ -140,39 +140,6 @@ def stocking(world: Warehouse, before: Before) -> Earned:
     return paid
 
 
-def carrying(world: Warehouse, before: Before) -> Earned:
-    """Potential: 1 of the robot that carries the requested item, 0 of the others."""
-    return _change_of_potential(world, before, 1.0, 1.0)
-
-
-def carried_way(world: Warehouse, before: Before) -> Earned:
-    """Potential: metres from the far wall to the requested item's carrier; at most the storage.
-
-    Privileged: as `approach`.
-    """
-    edge = world.scenario.storage_width
-    carrier = world.state.carrier
-    x = 0.0 if carrier == NOBODY else float(world.state.robot_position[carrier, 0])
-    return _change_of_potential(world, before, min(before.carrier_x, edge), min(x, edge))
-
-
-def _change_of_potential(world: Warehouse, before: Before, earlier: float, later: float) -> Earned:
-    """Return discount x potential after the step - potential before it, of both carriers.
-
-    Whatever is paid so changes no optimum (Ng et al. 1999): from one state to the same again it
-    adds up to nothing, and what was paid for a lift is taken back by the delivery.
-    """
-    carrier = world.state.carrier
-    if carrier == before.carrier == NOBODY:
-        return None
-    paid = np.zeros(world.state.n_robots)
-    if before.carrier != NOBODY:
-        paid[before.carrier] -= earlier
-    if carrier != NOBODY:
-        paid[carrier] += before.discount * later
-    return paid
-
-
 def contact(world: Warehouse, before: Before) -> Earned:
     """Seconds that the robot touched a robot, a wall or an obstacle; weigh it negatively."""
     return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
@@ -181,28 +148,22 @@ def contact(world: Warehouse, before: Before) -> Earned:
 def blocked_request(world: Warehouse, before: Before) -> Earned:
     """Seconds that a robot that cannot deliver held the requested item; weigh it negatively.
 
-    Privileged: such a robot only finds out inside the delivery area, as nothing happens there.
+    A metre into the delivery area counts `SECONDS_A_METRE`, and the way out gives them back: an
+    item that is let go there is found by nobody. Privileged: as `approach`.
     """
     carrier = world.state.carrier
     if carrier == NOBODY or world.state.delivers[carrier]:
         return None
     paid = np.zeros(world.state.n_robots)
     paid[carrier] = world.scenario.control_period
+    if carrier == before.carrier and before.requested == world.state.requested:
+        edge = world.scenario.storage_width
+        x = float(world.state.robot_position[carrier, 0])
+        paid[carrier] += SECONDS_A_METRE * (max(x, edge) - max(before.carrier_x, edge))
     return paid
 
 
-def in_the_way(world: Warehouse, before: Before) -> Earned:
-    """Seconds times metres to the delivery area's wall, if it cannot lift; weigh it negatively.
-
-    At the wall behind the delivery area it is out of the way of those that search and carry. Dead
-    robots count as well. Privileged: a robot only finds out by holding on to items in vain.
-    """
-    state = world.state
-    if state.lifts.all():
-        return None
-    away = world.scenario.warehouse_width - state.robot_position[:, 0]
-    return np.where(state.lifts, 0.0, away * world.scenario.control_period)
-
+SECONDS_A_METRE = 2.0
 
 REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "delivery": delivery,
@@ -210,31 +171,10 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "lift_requested": lift_requested,
     "approach": approach,
     "stocking": stocking,
-    "carrying": carrying,
-    "carried_way": carried_way,
     "contact": contact,
     "blocked_request": blocked_request,
-    "in_the_way": in_the_way,
 }
-POTENTIALS = frozenset({"carrying", "carried_way"})
 _AT_DELIVERIES = {"delivery", "own_delivery"}
-
-
-def _discount_of(weights: dict[str, float]) -> float:
-    """Take the discount out of the weights; 1 where none is needed."""
-    used = sorted(POTENTIALS.intersection(weights))
-    if "discount" not in weights:
-        if used:
-            raise SetupError(
-                f"rewards[{used[0]!r}] pays the change of a potential: rewards['discount'] should "
-                "be given, the discount of the learner"
-            )
-        return 1.0
-    discount = finite_number("rewards['discount']", weights.pop("discount"))
-    if not used or not 0.0 < discount <= 1.0:
-        what = "above 0, at most 1" if used else f"left out, or stand beside {sorted(POTENTIALS)}"
-        raise SetupError(f"rewards['discount'] = {discount}: should be {what}")
-    return discount
 
 
 def finite_number(name: str, value: float) -> float:

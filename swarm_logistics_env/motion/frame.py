@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.memory import clear_the_way, steer
+from swarm_logistics_env.motion.memory import clear_the_way, stand_to_handle, steer
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
@@ -40,15 +40,13 @@ def _names() -> tuple[str, ...]:
         "velocity_along", "velocity_aside", "heading_along", "heading_aside",
         "home_along", "home_aside", "home_certainty", "failed", "stuck",
         "whim_along", "whim_aside",
-        "kept_home_along", "kept_home_aside", "kept_home_distance", "cannot_deliver",
-        "cannot_lift", "cannot_lift_home_along", "cannot_lift_home_aside",
-        "cannot_lift_home_distance", "cannot_lift_inside",
+        "kept_home_along", "kept_home_aside", "kept_home_distance",
+        "cannot_deliver", "cannot_lift", "delivering_in_vain", "items_in_view",
+        "top_speed", "handling_time", "turns_to_drive",
     )  # fmt: skip
 
 
 INPUTS = _names()
-# New inputs are added at the end, so a network reads the first so many of them.
-INPUT_COUNTS = (INPUTS.index("kept_home_along"), INPUTS.index("cannot_lift"), len(INPUTS))
 LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 
 
@@ -58,7 +56,7 @@ class MotionFrame:
     Each row has a memory of its own (see `memory`), begun anew by `begin`.
 
     Args:
-        scenario: for its control period, its drive and the top rate of turning.
+        scenario: for its control period and for what robots know of their bodies.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
 
     Attributes:
@@ -67,25 +65,36 @@ class MotionFrame:
 
     def __init__(self, scenario: Scenario, listens: bool = True) -> None:
         self._period = scenario.control_period
-        self._turns = scenario.drive == "differential"
-        self._widest_turn = scenario.max_turn_rate * scenario.control_period
+        self._body = known.body_of(scenario)
         self._listens = listens
         self.begin(np.empty(0, np.uint64))
 
-    def begin(self, keys: NDArray[np.uint64]) -> None:
-        """Begin an episode of as many rows as there are keys, which are those of their streams."""
+    def begin(self, keys: NDArray[np.uint64], bodies: NDArray[np.float64] | None = None) -> None:
+        """Begin an episode of as many rows as there are keys, which are those of their streams.
+
+        Args:
+            bodies: (N, 3) of robots that are not all as the scenario has them (`memory.body_of`).
+        """
         self.keys = keys.copy()
         self.counts = np.zeros(len(keys), np.int64)
         self.memory = np.empty((len(keys), known.N_COLUMNS))
-        known.begin_memory(keys, self.memory)
+        known.begin_memory(keys, self._bodies(keys) if bodies is None else bodies, self.memory)
         self.turned = np.zeros(len(keys))
 
-    def begin_rows(self, rows: NDArray[np.int64], keys: NDArray[np.uint64]) -> None:
+    def begin_rows(
+        self,
+        rows: NDArray[np.int64],
+        keys: NDArray[np.uint64],
+        bodies: NDArray[np.float64] | None = None,
+    ) -> None:
         """Begin an episode in these rows alone."""
         self.keys[rows], self.counts[rows] = keys, 0
         fresh = np.empty((len(rows), known.N_COLUMNS))
-        known.begin_memory(keys, fresh)
+        known.begin_memory(keys, self._bodies(keys) if bodies is None else bodies, fresh)
         self.memory[rows] = fresh
+
+    def _bodies(self, keys: NDArray[np.uint64]) -> NDArray[np.float64]:
+        return np.tile(self._body, (len(keys), 1))
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on."""
@@ -118,15 +127,15 @@ class MotionFrame:
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
 
-        A robot that is caged by items clears its way instead. A differential robot turns its body
-        to where it wants to drive.
+        A robot that is caged by items clears its way instead, and one that handles an item stands.
+        A differential robot turns its body to where it wants to drive.
         """
         commands = np.zeros((len(outputs), 4))
         turn_outputs(outputs.astype(np.float64), self.turned, commands)
         clear_the_way(self._rows, self.memory, commands)
+        stand_to_handle(self._rows, self._period, self.memory, commands)
         known.note_commands(self._rows, commands, self.memory)
-        if self._turns:
-            steer(self._widest_turn, self.memory, commands)
+        steer(self.memory, commands)
         return commands
 
     def outputs_for(self, commands: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -187,14 +196,17 @@ def read_rows(
         sure = math.tanh(sure)
         read[at], read[at + 1] = sure * (cos * x + sin * y), sure * (cos * y - sin * x)
         read[at + 2] = sure * min(max(own[known.AWAY], -FARTHEST), FARTHEST) / FARTHEST
-        read[at + 3] = own[known.CANNOT_DELIVER]
-        # The way home once more, for a robot that cannot lift: the weights of these inputs can be
-        # learned alone, and robots that read zeros decide as before (`Training.learn_inputs`).
-        cannot_lift = 1.0 if own[known.CANNOT_LIFT] > 0.0 else 0.0
-        read[at + 4] = cannot_lift
-        read[at + 5], read[at + 6] = cannot_lift * read[at], cannot_lift * read[at + 1]
-        read[at + 7] = cannot_lift * read[at + 2]
-        read[at + 8] = cannot_lift * sensed[row.IN_DELIVERY_AREA]
+        at += 3
+        read[at], read[at + 1] = own[known.CANNOT_DELIVER], own[known.CANNOT_LIFT]
+        surely = own[known.HANDLING_TIME] + known.SURELY_IN_VAIN
+        read[at + 2] = min(1.0, own[known.DELIVERING] / surely)
+        in_view = 0.0
+        for place in range(row.N_ITEMS_IN_VIEW):
+            in_view += sensed[row.ITEMS + row.ITEM_WIDTH * place]
+        read[at + 3] = in_view / row.N_ITEMS_IN_VIEW
+        read[at + 4] = own[known.TOP_SPEED] / 2.0
+        read[at + 5] = own[known.HANDLING_TIME] / 2.0
+        read[at + 6] = 1.0 if own[known.WIDEST_TURN] > 0.0 else 0.0
 
 
 @kernel
@@ -219,11 +231,11 @@ def read_items(
     sensed: NDArray[np.float32], cos: float, sin: float, read: NDArray[np.float32], at: int
 ) -> int:
     """Fill the inputs of obstacles and the requested item; return the column after them."""
-    delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+    carries = sensed[row.CARRYING] > 0.5
     for place in range(N_OBSTACLES):
         there = row.ITEMS + row.ITEM_WIDTH * place
         x, y = float(sensed[there + 1]), float(sensed[there + 2])
-        is_there = 1.0 if delivers and sensed[there] > 0.5 else 0.0
+        is_there = 1.0 if carries and sensed[there] > 0.5 else 0.0
         read[at] = is_there
         read[at + 1] = is_there * (cos * x + sin * y)
         read[at + 2] = is_there * (cos * y - sin * x)
@@ -240,6 +252,7 @@ def read_items(
             read[at + 3] = away
             read[at + 4] = max(0.0, 1.0 - away / NEAR)
             read[at + 5] = sensed[there + 4]
+            break  # the nearest one comes first
     return at + 6
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.scenario import Scenario
 
 BEAM_ANGLE = 2.0 * math.pi / row.N_BEAMS
 QUARTER = 0.5 * math.pi
@@ -69,14 +70,21 @@ SIGHTINGS, WATCHED = 11, 12  # number of times it saw how a wall stands, and for
 TURNED, DRIFT = 13, 14  # of that direction since the first sighting [rad], and per second [rad/s]
 KEPT_X, KEPT_Y = 15, 16  # as HOME, from WALL on and fading in KEPT_TIME
 AWAY = 17  # from the border of the delivery area as far as it reckons, negative inside [m]
-CANNOT_DELIVER = 18  # 1: it has carried the requested item inside the area, and nothing happened
-IN_VAIN = 19  # times that it held on to items in vain since it lifted one
-CANNOT_LIFT = 20  # [s] for which it goes on to take its gripper for broken
-N_COLUMNS = 21
+CANNOT_DELIVER = 18  # 1: it takes its delivery for broken; falls to 0 in RETRY_TIME
+CANNOT_LIFT = 19  # 1: it takes its gripper for broken; falls to 0 in RETRY_TIME
+IN_VAIN = 20  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
+DELIVERING = 21  # [s] that it held the requested item inside the area; fades as IN_VAIN
+CARRIED = 22  # whether it carried anything
+HANDLES = 23  # [s] for which it goes on to stand, to lift, put down or deliver
+# What its maker knows of its body, see `body_of`; they stay for the whole episode.
+BODY = 24
+TOP_SPEED, HANDLING_TIME, WIDEST_TURN = BODY, BODY + 1, BODY + 2
+N_COLUMNS = 27
 
 FAILURE_TIME = 60.0  # [s]
-RETRY_TIME = 120.0  # [s], after which a gripper is tried again: it may have been repaired
-SURELY_IN_VAIN = 3.0  # times; fewer may be chance: a delivery frees what it just put down
+RETRY_TIME = 120.0  # [s], after which it tries again: it may have been repaired
+SURELY_IN_VAIN = 1.0  # [s] beyond its handling time; less may be a reading that came late
+FADING_TIME = 60.0  # [s], in which evidence of a failure fades
 HOME_TIME = 10.0  # [s], in which a remembered direction fades: by then a gyro may have drifted
 KEPT_TIME = 60.0  # [s], in which a direction fades that is held against the walls
 STUCK_TIME = 1.5  # [s]
@@ -87,10 +95,26 @@ STANDS = 0.2  # [m/s] and less
 MOVES = 0.1  # [m/s] and more: its velocity has a direction
 
 
+def body_of(scenario: Scenario) -> NDArray[np.float64]:
+    """Return a robot's top speed [m/s], handling time [s] and widest turn in a period [rad], (3,).
+
+    The widest turn is 0 of a robot that drives in every direction and never has to turn.
+    """
+    turns = scenario.drive == "differential"
+    widest = scenario.max_turn_rate * scenario.control_period if turns else 0.0
+    return np.array([scenario.max_speed, scenario.handling_time, widest])
+
+
 @kernel
-def begin_memory(keys: NDArray[np.uint64], memory: NDArray[np.float64]) -> None:
-    """Fill memories (N, N_COLUMNS) of robots that know nothing, with random headings."""
+def begin_memory(
+    keys: NDArray[np.uint64], bodies: NDArray[np.float64], memory: NDArray[np.float64]
+) -> None:
+    """Fill memories (N, N_COLUMNS) of robots that know their bodies (N, 3) and nothing else.
+
+    Their headings are random.
+    """
     memory[:] = 0.0
+    memory[:, BODY:] = bodies
     for robot in range(memory.shape[0]):
         angle = 2.0 * math.pi * uniform(keys[robot], 0)
         memory[robot, HEADING_X], memory[robot, HEADING_Y] = math.cos(angle), math.sin(angle)
@@ -106,28 +130,7 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
         delivers = sensed[row.CARRYING_REQUESTED] > 0.5
 
-        known[FAILED] *= 1.0 - period / FAILURE_TIME
-        known[CANNOT_LIFT] = max(0.0, known[CANNOT_LIFT] - period)
-        if sensed[row.CARRYING] > 0.5:
-            known[IN_VAIN], known[CANNOT_LIFT] = 0.0, 0.0
-        elif known[HELD] > 0.5:
-            is_in_vain = False
-            for place in range(row.N_ITEMS_IN_VIEW):
-                item = row.ITEMS + row.ITEM_WIDTH * place
-                away = math.sqrt(sensed[item + 1] ** 2 + sensed[item + 2] ** 2)
-                if sensed[item] < 0.5 or away >= SURELY_IN_REACH:
-                    continue
-                if sensed[item + 3] > 0.5:
-                    known[FAILED] = 1.0
-                # It lifts no item again that it just put down, unless that is requested.
-                is_in_vain |= sensed[item + 3] > 0.5 or sensed[item + 4] < 0.5
-            if is_in_vain and known[HELD] < 1.5:
-                known[IN_VAIN] += 1.0
-            if known[IN_VAIN] >= SURELY_IN_VAIN:
-                known[IN_VAIN], known[CANNOT_LIFT] = 0.0, RETRY_TIME
-        if is_inside and delivers:
-            known[FAILED] = 1.0
-            known[CANNOT_DELIVER] = 1.0
+        diagnose(sensed, period, known)
 
         known[STUCK] = max(0.0, known[STUCK] - period / STUCK_TIME)
         stands = delivers and known[HELD] > 1.5 and speed < STANDS
@@ -147,6 +150,54 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
             known[HOME_Y] += way * y / speed
         reckon(sensed, period, known)
         known[WAS_INSIDE] = 1.0 if is_inside else 0.0
+
+
+@kernel
+def diagnose(sensed: NDArray[np.float32], period: float, known: NDArray[np.float64]) -> None:
+    """Take one robot's row into what its memory tells of failures of its own.
+
+    It takes its gripper or its delivery for broken only after having held on in vain for longer
+    than its handling time; then it tries again later. Readings may come late.
+    """
+    is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
+    carries, delivers = sensed[row.CARRYING] > 0.5, sensed[row.CARRYING_REQUESTED] > 0.5
+    known[FAILED] *= 1.0 - period / FAILURE_TIME
+    for column in (CANNOT_LIFT, CANNOT_DELIVER):
+        known[column] = max(0.0, known[column] - period / RETRY_TIME)
+    for column in (IN_VAIN, DELIVERING):
+        known[column] *= 1.0 - period / FADING_TIME
+    # What it brought inside and did not let go of was delivered.
+    if is_inside and not carries and known[HELD] > 1.5:
+        known[DELIVERING], known[CANNOT_DELIVER], known[FAILED] = 0.0, 0.0, 0.0
+    if carries != (known[CARRIED] > 0.5):
+        known[HANDLES] = 0.0
+    known[CARRIED] = 1.0 if carries else 0.0
+    surely = known[HANDLING_TIME] + SURELY_IN_VAIN - 0.5 * period
+    if carries:
+        known[IN_VAIN], known[CANNOT_LIFT] = 0.0, 0.0
+    elif known[HELD] > 0.5 and known[HELD] < 1.5 and item_in_reach(sensed):
+        known[IN_VAIN] += period
+        if known[IN_VAIN] > surely:
+            known[IN_VAIN], known[CANNOT_LIFT], known[FAILED] = 0.0, 1.0, 1.0
+    if is_inside and delivers:
+        known[DELIVERING] += period
+        if known[DELIVERING] > surely:
+            known[CANNOT_DELIVER], known[FAILED] = 1.0, 1.0
+
+
+@kernel
+def item_in_reach(sensed: NDArray[np.float32]) -> bool:
+    """Return whether a gripper that works lifts something here if it closes.
+
+    It lifts no item again that it just put down, unless that is requested.
+    """
+    found = False
+    for place in range(row.N_ITEMS_IN_VIEW):
+        item = row.ITEMS + row.ITEM_WIDTH * place
+        away = math.sqrt(sensed[item + 1] ** 2 + sensed[item + 2] ** 2)
+        may_lift = sensed[item + 3] > 0.5 or sensed[item + 4] < 0.5
+        found |= sensed[item] > 0.5 and away < SURELY_IN_REACH and may_lift
+    return found
 
 
 @kernel
@@ -217,15 +268,47 @@ def note_commands(
 
 
 @kernel
-def steer(widest: float, memory: NDArray[np.float64], commands: NDArray[np.float64]) -> None:
+def stand_to_handle(
+    rows: NDArray[np.float32],
+    period: float,
+    memory: NDArray[np.float64],
+    commands: NDArray[np.float64],
+) -> None:
+    """Let robots stand in the commands (N, 4) while they lift, put down or deliver.
+
+    The world makes them stand anyway; so their memories know that their bodies do not turn.
+    """
+    for robot in range(commands.shape[0]):
+        sensed, own, grips = rows[robot], memory[robot], commands[robot, 3]
+        if own[HANDLING_TIME] <= 0.0:
+            continue
+        own[HANDLES] = max(0.0, own[HANDLES] - period)
+        carries = sensed[row.CARRYING] > 0.5
+        begins = carries and grips < -0.5
+        begins |= not carries and grips > 0.5 and own[CANNOT_LIFT] <= 0.0 and item_in_reach(sensed)
+        is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
+        delivers = sensed[row.CARRYING_REQUESTED] > 0.5 and own[CANNOT_DELIVER] <= 0.0
+        begins |= is_inside and delivers
+        if begins and own[HANDLES] <= 0.0:
+            own[HANDLES] = own[HANDLING_TIME] + period
+        if own[HANDLES] > 0.0:
+            commands[robot, :3] = 0.0
+
+
+@kernel
+def steer(memory: NDArray[np.float64], commands: NDArray[np.float64]) -> None:
     """Turn commands (N, 4) to drive in a direction into turns and motion ahead or back.
 
+    Of robots that drive in every direction they stay as they are.
+
     Args:
-        widest: the largest turn of a control period [rad].
         memory: (N, N_COLUMNS); its directions are turned back by the robot's own turn.
         commands: forward and left as if the drive were holonomic; left becomes 0.
     """
     for robot in range(commands.shape[0]):
+        widest = memory[robot, WIDEST_TURN]
+        if widest <= 0.0:
+            continue
         x, y = commands[robot, 0], commands[robot, 1]
         speed = math.sqrt(x * x + y * y)
         if speed < 1e-6:

@@ -113,8 +113,10 @@ def decide_homing(
         push_y *= AVOID_GAIN
         speed, gripper = 1.0, -1.0
         if sensed[row.CARRYING_REQUESTED] > 0.5:
-            if not is_inside:
+            # Inside it stands, and lets go only once it takes its delivery for broken.
+            if not is_inside or own[known.FAILED] < 0.5:
                 gripper = 1.0
+            speed = 0.0 if is_inside and gripper > 0.0 else 1.0
             if own[known.STUCK] > 0.0:
                 angle = random_heading(keys[robot], random_headings[robot])
                 x, y = math.cos(angle), math.sin(angle)

@@ -24,7 +24,7 @@ from pydantic import (
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import INPUT_COUNTS, INPUTS, OUTPUTS, MotionFrame
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -40,8 +40,7 @@ class Network(_Part):
     """The inputs, layers and outputs of a trained policy.
 
     Args:
-        inputs: the names of its inputs in order, see `motion.INPUTS`; or their number, for the
-            first of them.
+        inputs: the names of its inputs in order, see `motion.INPUTS`.
         outputs: the names of its outputs in order, see `motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
@@ -60,15 +59,6 @@ class Network(_Part):
     activation: Literal["tanh", "relu"] = "tanh"
     exploration: NonNegativeFloat = 0.0
 
-    @field_validator("inputs", mode="before")
-    @classmethod
-    def _named(cls, inputs: Any) -> Any:
-        if not isinstance(inputs, int):
-            return inputs
-        if inputs not in INPUT_COUNTS:
-            raise ValueError(f"should be one of {', '.join(map(str, INPUT_COUNTS))}")
-        return INPUTS[:inputs]
-
     @field_validator("inputs", "outputs")
     @classmethod
     def _known(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
@@ -76,10 +66,8 @@ class Network(_Part):
         for place, (name, wanted) in enumerate(zip(names, right)):
             if name != wanted:
                 raise ValueError(f"column {place} is {name!r}: should be {wanted!r}")
-        allowed = INPUT_COUNTS if right is INPUTS else (len(right),)
-        if len(names) not in allowed:
-            counts = " or ".join(map(str, allowed))
-            raise ValueError(f"has {len(names)} columns: should have {counts}")
+        if len(names) != len(right):
+            raise ValueError(f"has {len(names)} columns: should have {len(right)}")
         return names
 
 
@@ -275,7 +263,7 @@ class LearnedPolicy:
         self.configure(Scenario())
 
     def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows: the control period."""
+        """Take what a robot's maker knows: its control period and its body."""
         self._frame = MotionFrame(scenario, self.card.network.listens)
         self.reset(0, 0)
 

@@ -29,6 +29,7 @@ from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion.frame import OUTPUTS, MotionFrame
+from swarm_logistics_env.motion.memory import body_of
 from swarm_logistics_env.policies.learned import STREAM, Network
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.scenario import Scenario
@@ -160,7 +161,10 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world."""
         self.observations = self.venv.reset()
-        self.frame.begin(self._keys())
+        self._bodies = np.empty((self.num_envs, 3))
+        for world in range(len(self.venv.worlds)):
+            self._note_body(world)
+        self.frame.begin(self._keys(), self._bodies)
         return self._read()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
@@ -177,8 +181,16 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             ends = np.hstack([self.frame.peek(last, over)[:, : self._n_inputs], self._known[over]])
             for row, read in zip(over.tolist(), ends):
                 infos[row]["terminal_observation"] = read
-            self.frame.begin_rows(over, self._keys()[over])
+            for world, rows in enumerate(self.venv.rows_of_worlds):
+                if dones[rows].any():
+                    self._note_body(world)
+            self.frame.begin_rows(over, self._keys()[over], self._bodies[over])
         return self._read(), rewards, dones, infos
+
+    def _note_body(self, world: int) -> None:
+        # Every episode may have robots of another kind.
+        scenario = self.venv.worlds[world].warehouse.scenario
+        self._bodies[self.venv.rows_of_worlds[world]] = body_of(scenario)
 
     def _read(self) -> NDArray[np.float32]:
         inputs = self.frame.read(self.observations)[:, : self._n_inputs]
@@ -234,10 +246,6 @@ def make_learner(
     with torch.no_grad():
         learner.policy.log_std.copy_(torch.tensor(ppo.deviations).log())
         learner.policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
-    if training.learn_inputs:
-        is_learned = torch.tensor([name in training.learn_inputs for name in network.inputs])
-        weight: Any = linears(learner.policy)[0].weight
-        weight.register_hook(lambda gradient: gradient * is_learned.to(gradient))
     return learner
 
 

@@ -83,8 +83,6 @@ def train(
         )
     device, begun = device_of(device), _new_view(training)
     first = None if training.start is None else _tensors_of_start(training, training.start)
-    # A robot that reads 0 in the inputs learned decides as before only with the same noise.
-    kept = {"deviations": first["deviations"]} if first and training.learn_inputs else {}
     enter(out, training, command)
     # Small networks gain little from more threads and lose much if cores are shared; the sums would
     # depend on the number of threads as well.
@@ -105,13 +103,13 @@ def train(
         log.references = log.references or reference_means(training)
         total, done = training.agent_steps, learner.num_timesteps
         with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
-            callback = TrainingCallback(training, view, log, out, progress, kept)
+            callback = TrainingCallback(training, view, log, out, progress)
             learner.learn(total - done, [callback, *callbacks], reset_num_timesteps=False)
             callback.end()
     view.close()
     asked = training.evaluation
     log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
-    tensors = {**tensors_of(learner.policy), **kept}
+    tensors = tensors_of(learner.policy)
     card = _card(training, learner.num_timesteps, log, command)
     path = out / f"{training.name}.safetensors"
     # The file is written before the scores are measured, which takes minutes.
@@ -130,27 +128,12 @@ def _tensors_of_start(training: Training, name: str) -> Mapping[str, NDArray[np.
     policy, network = load(name), training.network
     if not isinstance(policy, LearnedPolicy):
         raise TrainingError(f"start = {name!r}: should be a trained policy")
-    begun = policy.card.network
-    n_new = len(network.inputs) - len(begun.inputs)
-    if n_new < 0:
-        raise TrainingError(
-            f"network.inputs = {len(network.inputs)}: should be at least {len(begun.inputs)}, as "
-            f"many as start = {name!r} reads"
-        )
-    if training.learn_inputs and network != begun.replace(inputs=network.inputs):
-        raise TrainingError(
-            f"network: should be that of start = {name!r} but for `inputs`, as learn_inputs leaves "
-            "all else as it is there"
-        )
-    # What it hears and how it explores may differ otherwise; its tensors have to fit. The weights
-    # of new inputs are zeros.
-    tensors = dict(policy.tensors)
-    tensors["layers.0.weight"] = np.pad(tensors["layers.0.weight"], ((0, 0), (0, n_new)))
+    # What it hears and how it explores may differ; its tensors have to fit.
     try:
-        check_tensors(network, tensors)
+        check_tensors(network, policy.tensors)
     except PolicyError as error:
         raise TrainingError(f"start = {name!r}: {error}") from error
-    return tensors
+    return policy.tensors
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
@@ -163,10 +146,9 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         log: TrainingLog,
         out: Path,
         progress: ProgressBar,
-        kept: Mapping[str, NDArray[np.float32]],
     ) -> None:
         super().__init__()
-        self._training, self._view, self._log, self._kept = training, view, log, kept
+        self._training, self._view, self._log = training, view, log
         self._out, self._progress = out, progress
         self._start, self._saved_at = time.monotonic(), -math.inf
         self._before = log.seconds
@@ -180,12 +162,9 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self._log.cpu_seconds += self._cpu_seconds()
         is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
         policy = self.model.policy
-        is_all_free = is_free and not self._training.learn_inputs
         for layer in linears(policy):
-            layer.requires_grad_(is_all_free)
-        policy.log_std.requires_grad_(is_all_free)
-        # The first layer's weights hold those of `learn_inputs`; `make_learner` keeps the others.
-        linears(policy)[0].weight.requires_grad_(is_free)
+            layer.requires_grad_(is_free)
+        policy.log_std.requires_grad_(is_free)
         done = min(1.0, self.num_timesteps / self._training.agent_steps)
         floor = self._training.ppo.floor(done)
         with torch.no_grad():
@@ -220,7 +199,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def _evaluate(self) -> None:
         training, log = self._training, self._log
-        tensors = {**tensors_of(self.model.policy), **self._kept}
+        tensors = tensors_of(self.model.policy)
         card = _card(training, self.num_timesteps, log)
         means = evaluate(
             LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import faults_among, scenario_fields
-from swarm_logistics_env.environment.rewards import POTENTIALS, RewardTerms
+from swarm_logistics_env.environment.rewards import RewardTerms
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.records import FileName, each_of, one_of, read_table
@@ -47,8 +47,6 @@ class Training(Part):
         about: a sentence about the policy, for its card.
         scenario: the conditions; a table of fields makes one.
         start: name or path of a trained policy that this one goes on from; none: from nothing.
-        learn_inputs: inputs whose weights alone are learned; none: everything is learned. All else
-            stays as in `start`, so that a robot that reads 0 in them decides as before, bit by bit.
         worlds: kinds of worlds that run side by side. A training from nothing begins to learn in
             easy ones, which therefore stand beside the hard ones.
         threads: how many threads step the worlds, and how many processes measure the scores; no
@@ -56,7 +54,7 @@ class Training(Part):
         seed: the number that decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
-            added to them. Potentials are discounted by `ppo.gamma`.
+            added to them.
         indicators: the indicators that are paid instead of the task reward; none: the task reward.
         conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
@@ -72,7 +70,6 @@ class Training(Part):
     about: str = ""
     scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
     start: str | None = None
-    learn_inputs: tuple[str, ...] = ()
     worlds: Annotated[
         tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
     ] = (WorldKind(count=6),)
@@ -90,9 +87,7 @@ class Training(Part):
     @field_validator("rewards")
     @classmethod
     def _terms(cls, rewards: dict[str, float]) -> dict[str, float]:
-        if "discount" in rewards:
-            raise ValueError("discount: should be left out, it is `ppo.gamma`")
-        RewardTerms(_discounted(rewards, 1.0))
+        RewardTerms(rewards)
         return rewards
 
     @model_validator(mode="after")
@@ -111,13 +106,6 @@ class Training(Part):
                     f"conditions.robots = {most}: should be at most the smallest swarm, "
                     f"{world.n_robots} robots"
                 )
-        for name in self.learn_inputs:
-            if name not in self.network.inputs:
-                raise ValueError(
-                    f"learn_inputs: no input {name!r}{suggest(name, self.network.inputs)}"
-                )
-        if self.learn_inputs and self.start is None:
-            raise ValueError("learn_inputs: should be left out, as there is no `start`")
         rows = self.rows * self.ppo.n_steps
         if rows % self.ppo.n_minibatches:
             raise ValueError(
@@ -125,11 +113,6 @@ class Training(Part):
                 f"{self.rows} robots x {self.ppo.n_steps} steps"
             )
         return self
-
-    @property
-    def reward_weights(self) -> dict[str, float]:
-        """The rewards as the environment takes them: potentials with the learner's discount."""
-        return _discounted(self.rewards, self.ppo.gamma)
 
     @property
     def world_scenarios(self) -> tuple[Scenario, ...]:
@@ -151,10 +134,6 @@ class Training(Part):
     def rows(self) -> int:
         """The number of robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
-
-
-def _discounted(rewards: dict[str, float], gamma: float) -> dict[str, float]:
-    return rewards if POTENTIALS.isdisjoint(rewards) else {**rewards, "discount": gamma}
 
 
 def preset_names() -> list[str]:
@@ -195,7 +174,7 @@ def make_worlds(training: Training) -> SwarmVecEnv:
 def _make_env(training: Training, world: int) -> Wrapper:
     scenario = training.world_scenarios[world]
     env = EpisodeMix(
-        SwarmLogisticsEnv(scenario, rewards=training.reward_weights),
+        SwarmLogisticsEnv(scenario, rewards=training.rewards),
         training.world_conditions[world],
     )
     asked = training.indicators

@@ -23,12 +23,19 @@ from .wrapper import Condition
 class GivenPerformances:
     """Performances that were given as numbers, for instance from a study.
 
+    Args:
+        performances: of each condition [items].
+        whatever_changes: whether a performance without changes stands for conditions in which
+            parameters differ as well.
+
     Raises:
         SetupError: a performance is negative or not finite, or a key is not a `Condition`.
     """
 
-    def __init__(self, performances: Mapping[Condition, float]) -> None:
-        self._performances = dict(performances)
+    def __init__(
+        self, performances: Mapping[Condition, float], *, whatever_changes: bool = False
+    ) -> None:
+        self._performances, self._whatever_changes = dict(performances), whatever_changes
         for condition, items in self._performances.items():
             if not isinstance(condition, Condition):
                 raise SetupError(f"references: key {condition!r} should be a Condition")
@@ -43,6 +50,8 @@ class GivenPerformances:
         Raises:
             SetupError: it was not given.
         """
+        if self._whatever_changes:
+            condition = dataclasses.replace(condition, changes=())
         if condition not in self._performances:
             raise SetupError(f"references should have the performance of {condition}")
         return float(self._performances[condition])

@@ -49,8 +49,9 @@ class IndicatorReward(Wrapper):
     When a parameter changes in mid-run, the next reward corrects what was paid before, so that
     the return is still A.
 
-    *References as numbers.* Give P_o of the environment's own scenario, or a performance for each
-    condition, for instance the means of a study. Then episodes without faults and changes pay
+    *References as numbers.* Give P_o of the environment's own scenario, which then stands for
+    episodes with other parameters as well, or a performance for each condition, for instance the
+    means of a study. Then episodes without faults and changes pay
     nothing (except P). Beware: **R, FT, S and A rise when P_o falls**, and nothing in such a
     reward holds P_o up. So infos report P_o beside them: the value given and, if such episodes are
     played, the value measured. Look at both, or add P to the weights.
@@ -135,8 +136,10 @@ class IndicatorReward(Wrapper):
             self._references = self.measured = references
         else:
             given = references if isinstance(references, Mapping) else {self.condition: references}
-            self._references, self.measured = GivenPerformances(given), RunningMeans()
-            if given is not references:
+            is_one = given is not references
+            self._references = GivenPerformances(given, whatever_changes=is_one)
+            self.measured = RunningMeans()
+            if is_one:
                 self._references.divisor(self.condition)
         # Errors that can be known before the first episode are raised now.
         for scenario in self.env.scenarios:

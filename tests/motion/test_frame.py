@@ -101,9 +101,10 @@ def test_a_robot_that_cannot_lift_or_deliver_notices_and_forgets() -> None:
     frame = frame_of(1)
     rows = nothing()
     rows[0, row.ITEMS : row.ITEMS + 4] = 1.0, 0.1, 0.0, 1.0  # the requested item, in reach
-    assert told(frame.read(rows), "failed") == 0.0
-    frame.command(np.array([[0.0, 0.0, 1.0]]))
-    assert told(frame.read(rows), "failed") == 1.0
+    for step in range(12):
+        read = frame.read(rows)
+        assert told(read, "failed") == told(read, "cannot_lift") == (step > 10)
+        frame.command(np.array([[0.0, 0.0, 1.0]]))
     for _ in range(600):
         frame.command(np.zeros((1, 3)))
         read = frame.read(nothing())
@@ -112,7 +113,10 @@ def test_a_robot_that_cannot_lift_or_deliver_notices_and_forgets() -> None:
     frame = frame_of(1)
     rows = nothing()
     rows[0, [row.CARRYING, row.CARRYING_REQUESTED, row.IN_DELIVERY_AREA]] = 1.0
-    assert told(frame.read(rows), "failed") == 1.0
+    inputs = [frame.read(rows) for _ in range(12)]
+    assert [told(read, "failed") for read in inputs] == [0.0] * 10 + [1.0, pytest.approx(1.0, 0.01)]
+    assert told(inputs[4], "delivering_in_vain") == pytest.approx(0.5, abs=0.01)
+    assert told(inputs[-1], "cannot_deliver") == pytest.approx(1.0, abs=0.01)
 
 
 def test_standing_still_with_the_requested_item_is_being_stuck() -> None:
@@ -232,18 +236,25 @@ def test_a_caged_robot_lets_go_and_carries_off_what_is_in_its_way() -> None:
     assert all(commands(moving)[3] == 1.0 for _ in range(100))
 
 
-def test_a_robot_that_cannot_lift_reads_the_way_home_once_more_and_others_read_zeros() -> None:
+def test_a_robot_knows_its_own_body_whatever_its_neighbours_have() -> None:
+    scenario = Scenario(max_speed=1.0, handling_time=0.5, drive="differential")
     frame = MotionFrame(Scenario())
-    frame.begin(np.arange(2, dtype=np.uint64))
-    frame.memory[:, known.KEPT_X] = 2.0
-    frame.memory[:, known.AWAY] = 4.0
-    frame.memory[0, known.CANNOT_LIFT] = 60.0
-    rows = np.zeros((2, row.N_COLUMNS), np.float32)
-    rows[:, row.IN_DELIVERY_AREA] = 1.0
-    unable, able = frame.read(rows)
-    new = INPUTS.index("cannot_lift")
-    home = INPUTS.index("kept_home_along")
-    assert unable[new] == unable[new + 4] == 1.0
-    assert (unable[new + 1 : new + 4] == unable[home : home + 3]).all()
-    assert np.abs(unable[new + 1 : new + 3]).max() > 0.5
-    assert not able[new:].any()
+    bodies = np.stack([known.body_of(Scenario()), known.body_of(scenario)])
+    frame.begin(row_keys(0, "test", 2), bodies)
+    read = frame.read(nothing(2))
+    assert [told(read[:1], one) for one in INPUTS[-3:]] == [1.0, 0.0, 0.0]
+    assert [told(read[1:], one) for one in INPUTS[-3:]] == [0.5, 0.25, 1.0]
+    commands = frame.command(np.array([[0.3, 0.9, 0.0]] * 2))
+    assert commands[0, 2] == commands[1, 1] == 0.0
+    assert commands[0, 1] != 0.0 != commands[1, 2], "one drives aside, the other one turns"
+    frame.begin_rows(np.array([1]), frame.keys[1:])
+    assert told(frame.read(nothing(2))[1:], "handling_time") == 0.0
+
+
+def test_of_several_requests_the_nearest_is_read_and_who_carries_sees_obstacles() -> None:
+    rows = caged((0.2, 0.0, False), (0.3, 0.0, True), (0.9, 0.0, True), carries="another")
+    read = frame_of(1).read(rows)
+    assert told(read, "requested_distance") == pytest.approx(0.3)
+    assert told(read, "items_in_view") == 3 / 8
+    assert [told(read, f"obstacle_{n}_present") for n in range(4)] == [1.0, 1.0, 1.0, 0.0]
+    assert not told(frame_of(1).read(caged((0.2, 0.0, False), carries="")), "obstacle_0_present")

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.train.training import load_training, preset_names
 from swarm_logistics_env.warehouse import Fault
@@ -51,19 +50,6 @@ def delivered(name: str, *faults: Fault, **fields: float) -> float:
 @pytest.mark.parametrize(("name", "n_robots"), [(name, n) for name in SHIPPED for n in (5, 30)])
 def test_they_deliver_more_than_swarm_dt(name: str, n_robots: int) -> None:
     assert delivered(name, n_robots=n_robots) > 1.5 * delivered("swarm-dt", n_robots=n_robots)
-
-
-def test_robust_differs_from_its_second_stage_in_the_inputs_that_it_learned_alone() -> None:
-    before, after = policies.load("ppo-robust-second"), policies.load("ppo-robust")
-    assert isinstance(before, LearnedPolicy)
-    assert isinstance(after, LearnedPolicy)
-    learned = after.card.training["learn_inputs"]
-    assert [name for name in after.card.network.inputs if name in learned] == learned
-    assert after.card.network.inputs[: -len(learned)] == before.card.network.inputs
-    for name, weights in before.tensors.items():
-        kept = after.tensors[name]
-        kept = kept[:, : -len(learned)] if name == "layers.0.weight" else kept
-        assert (kept == weights).all()
 
 
 def test_a_fast_drift_costs_delivery_little() -> None:

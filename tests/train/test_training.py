@@ -8,7 +8,7 @@ import pytest
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions, PPOSettings
+from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.train.training import EpisodeMix
 from swarm_logistics_env.warehouse import Fault
 
@@ -19,18 +19,6 @@ def test_every_preset_can_be(name: str) -> None:
     assert training.name == f"ppo-{name}"
     assert Training.from_json(training.to_json()) == training
     assert training.about
-
-
-def test_the_arms_differ_from_the_indicator_preset_in_what_they_are_about_alone() -> None:
-    indicator = load_training("indicator")
-    same_mix = load_training("indicator-arm-same-mix")
-    deliveries = load_training("indicator-arm-deliveries")
-    reward = {"indicators": None, "rewards": same_mix.rewards}
-    names = {"name": same_mix.name, "about": same_mix.about}
-    assert indicator.replace(**reward, **names) == same_mix
-    names = {"name": deliveries.name, "about": deliveries.about}
-    worlds = tuple(world.replace(conditions=()) for world in same_mix.worlds)
-    assert same_mix.replace(conditions=(), worlds=worlds, **names) == deliveries
 
 
 def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
@@ -44,12 +32,6 @@ def test_worlds_of_several_kinds_stand_side_by_side(tmp_path: Path) -> None:
     assert (met, training.rows) == ([(3, 8), (3, 8), (5, 60)], 11)
 
 
-def test_potentials_are_discounted_as_the_learner_discounts() -> None:
-    training = Training(rewards={"carrying": 0.5}, ppo=PPOSettings(gamma=0.9))
-    assert training.reward_weights == {"carrying": 0.5, "discount": 0.9}
-    assert Training(ppo=PPOSettings(gamma=0.9)).reward_weights == {"delivery": 1.0}
-
-
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
@@ -57,7 +39,6 @@ def test_potentials_are_discounted_as_the_learner_discounts() -> None:
         ("[ppo]\nlearnrate = 1", "no field 'learnrate'; did you mean 'learning_rate'"),
         ("[[conditions]]\nmodes = ['FM9']", "no failure mode 'FM9'; did you mean"),
         ("[rewards]\ndeliver = 1.0", "no reward term 'deliver'; did you mean 'delivery'"),
-        ("[rewards]\ncarrying = 1.0\ndiscount = 0.9", "should be left out, it is `ppo.gamma`"),
         ("[scenario]\nn_itens = 5", "Scenario has no field 'n_itens'"),
         ("[ppo]\nn_minibatches = 7", "should divide the batch of 150 robots x 128 steps"),
         ("worlds = []", "worlds"),
