@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from tables import table
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.report import drawing, section
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
@@ -45,15 +46,19 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     seeds = cleared.plan.seeds
     text = (
         f"{len(seeds)} seeds from {seeds[0]:,} on. Times are medians with 95 % intervals: less is "
-        "better. P is the items delivered in 500 s, and in brackets the gain over the rung above, "
-        "seed by seed; that of `central`, which has no stock, is over `homing`."
+        "better; those of networks are means over their trainings and seeds. P is the items "
+        "delivered in 500 s, and in brackets the gain over the rung above, seed by seed; that of "
+        "`central`, which has no stock, is over `homing`."
     )
     return "\n".join([table(("", *(name for name, _ in columns)), rows), "", text])
 
 
 def _before(rungs: Sequence[str]) -> list[str]:
     """Return the rung that each is compared with."""
-    return ["homing" if rung == "central" else before for rung, before in zip(rungs, ("", *rungs))]
+    return [
+        "" if rung.startswith("ppo-") else "homing" if rung == "central" else before
+        for rung, before in zip(rungs, ("", *rungs))
+    ]
 
 
 def leans_block(found: StudyResults) -> str:
@@ -63,15 +68,21 @@ def leans_block(found: StudyResults) -> str:
     rows = []
     for name in _tables(found):
         cells = _cells(found, name)
-        rows.append((name, *(section.mean_p(cells[one]) for one in (least, *policies))))
+        rows.append((name, *(_p_and_stalls(cells[one]) for one in (least, *policies))))
     seeds = found.plan.seeds
     text = (
         f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {len(seeds)} seeds from "
-        f"{seeds[0]:,} on. {section.SATURATED}: in at least one run every item was delivered."
+        f"{seeds[0]:,} on, of each training. {section.SATURATED}: in at least one run every item "
+        "was delivered. Stalled: so many of the runs delivered less than a quarter of the median."
     )
     head = ("", *(f"`{one}`" for one in (least, *policies)))
     shares = _shares(_cells(found, _tables(found)[0]))
     return "\n".join([table(head, rows), "", text, shares])
+
+
+def _p_and_stalls(cell: Cell) -> str:
+    stalled = spi.share_stalled(cell.by_seed.ravel())
+    return section.mean_p(cell) + (f"; {stalled:.0%} stalled" if stalled else "")
 
 
 def _shares(cells: dict[str, Cell]) -> str:

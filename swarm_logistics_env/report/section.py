@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
+
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.summaries import Interval
@@ -208,9 +210,15 @@ def plural(count: int, noun: str) -> str:
 
 
 def time_to_clear(cell: Cell) -> str:
-    """Return the median time until all items were delivered [s], and how many runs were late."""
+    """Return the median time until all items were delivered [s], and how many runs were late.
+
+    Of several trainings the mean over trainings and seeds; an interval needs all runs in time.
+    """
     times = [outcome.time_to_clear for outcome in cell.outcomes]
     late = sum(map(math.isinf, times))
+    several = len(cell.arm.case.trainings)
+    if several > 1 and not (late or cell.problem):
+        return bracketed(spi.mean_interval(np.reshape(times, (several, -1))), 0)
     found = bracketed(spi.median_interval(times), 0)
     return f"{found} ({late} of {len(times)})" if late else found
 

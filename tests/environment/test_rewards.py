@@ -160,8 +160,7 @@ def test_after_the_last_delivery_every_term_still_pays(world: Warehouse) -> None
     terms = started(world, dict.fromkeys(REWARD_TERMS, 1.0))
     touch(world)
     deliver(world, 1, next_request=NOBODY)
-    way = world.state.robot_position[1, 0]
-    assert terms.pay(world).tolist() == pytest.approx([1.0, 1.0 - min(way, STORAGE), 1.0, 1.0])
+    assert terms.pay(world).tolist() == pytest.approx([1.0, 2.0, 1.0, 1.0])
     assert terms.pay(world).tolist() == [0.0] * 4
 
 

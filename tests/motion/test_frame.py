@@ -103,7 +103,7 @@ def test_a_robot_that_cannot_lift_or_deliver_notices_and_forgets() -> None:
     rows[0, row.ITEMS : row.ITEMS + 4] = 1.0, 0.1, 0.0, 1.0  # the requested item, in reach
     for step in range(12):
         read = frame.read(rows)
-        assert told(read, "failed") == told(read, "cannot_lift") == (step > 10)
+        assert told(read, "failed") == told(read, "cannot_lift") == (step > 9)
         frame.command(np.array([[0.0, 0.0, 1.0]]))
     for _ in range(600):
         frame.command(np.zeros((1, 3)))

@@ -113,7 +113,7 @@ def test_a_robot_that_lifts_stands_so_that_its_memory_does_not_turn(
     memory[0, known.HANDLING_TIME], memory[0, known.WIDEST_TURN] = 0.5, 0.1 * turn_rate
     memory[0, known.HOME_X] = 1.0
     rows = sensed(item_at=0.1)
-    for _ in range(6):  # the step in which it closes, and those of the handling time
+    for _ in range(7):  # the step in which it closes, those of the handling time, and one more
         commands = np.array([[0.0, 1.0, 0.0, 1.0]])
         known.stand_to_handle(rows, 0.1, memory, commands)
         known.steer(memory, commands)

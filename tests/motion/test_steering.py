@@ -13,11 +13,11 @@ from swarm_logistics_env.motion.memory import steer
 @pytest.mark.parametrize("direction", [0.0, 0.3, 1.5, -0.6, 3.0, -2.0])
 def test_it_gets_to_drive_where_it_wants_to_and_remembers_that_it_turned(direction: float) -> None:
     memory = np.zeros((1, known.N_COLUMNS))
-    memory[0, known.HOME_X] = 2.0
+    memory[0, known.HOME_X], memory[0, known.WIDEST_TURN] = 2.0, 0.6
     heading, wanted = 0.0, direction
     for _ in range(10):
         commands = np.array([[math.cos(wanted), math.sin(wanted), 0.0, 1.0]])
-        steer(0.6, memory, commands)
+        steer(memory, commands)
         assert abs(commands[0, 2]) <= 1.0
         assert commands[0, 1] == 0.0
         assert commands[0, 3] == 1.0

@@ -1,0 +1,57 @@
+"""Which of several trainings is the median one: `python docs/play_medians.py FILE ...`.
+
+Declared before the trainings: each is played in all conditions of the development tables of the
+benchmark, over 4 seeds of its own; the one whose P, averaged over these conditions, is the median
+(of an even number the lower one of the two) is shipped under the recipe's name.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from swarm_logistics_env.policies import load
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.presets import load_preset
+
+SEEDS, FIRST_SEED = 4, 700_000
+DEVELOPMENT = "Development"
+
+
+def means(files: list[str]) -> dict[str, float]:
+    """Return P of each policy, averaged over the development conditions."""
+    whole = load_preset("benchmark")
+    tables = {
+        name: [one for one in getattr(whole, name) if one.title.startswith(DEVELOPMENT)]
+        for name in ("faults", "parameters")
+    }
+    study = Study(
+        name="medians",
+        policies=[{"name": one, "label": one} for one in files],
+        seeds=SEEDS,
+        first_seed=FIRST_SEED,
+        scenario=whole.scenario,
+        out=Path("results", "medians", "-".join(Path(one).stem for one in files)),
+        **tables,
+    )
+    study.run(processes=2)
+    cells = {(cell.policy, cell.arm.case.key): cell for cell in study.findings().cells}
+    return {
+        one: float(np.mean([cell.mean.value for (name, _), cell in cells.items() if name == one]))
+        for one in files
+    }
+
+
+def main() -> None:
+    """Print the mean of each file, the least first, and the median one."""
+    found = means(sys.argv[1:])
+    ascending = sorted(found, key=lambda one: found[one])
+    for one in ascending:
+        print(f"{one}: training seed {load(one).card.seed}, mean P {found[one]:.1f}")
+    print(f"Median: {ascending[(len(ascending) - 1) // 2]}")
+
+
+if __name__ == "__main__":
+    main()
