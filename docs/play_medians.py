@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import load_preset
 
@@ -49,7 +49,7 @@ def main() -> None:
     found = means(sys.argv[1:])
     ascending = sorted(found, key=lambda one: found[one])
     for one in ascending:
-        print(f"{one}: training seed {load(one).card.seed}, mean P {found[one]:.1f}")
+        print(f"{one}: training seed {read_card(Path(one)).seed}, mean P {found[one]:.1f}")
     print(f"Median: {ascending[(len(ascending) - 1) // 2]}")
 
 

@@ -114,8 +114,6 @@ def part(module: str) -> str:
     """The part of the package a module belongs to: `warehouse` for `….warehouse.physics`."""
     if module in {f"{PACKAGE}.studies", f"{PACKAGE}.studies.study"}:
         return "Study"
-    if module == f"{PACKAGE}.train.ppo":  # a script, which runs the command line
-        return "cli"
     return module.split(".")[1] if "." in module else "__init__"
 
 

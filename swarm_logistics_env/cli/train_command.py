@@ -66,7 +66,7 @@ def _train(
 
 
 def _show_training(path: Path) -> None:
-    from swarm_logistics_env.train.curve import BEST, PICTURE
+    from swarm_logistics_env.train.trainer import BEST, PICTURE
 
     card = read_card(path)
     rows = tuple(

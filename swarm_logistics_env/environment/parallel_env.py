@@ -16,7 +16,6 @@ from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
 
-from .dict_view import ArrayStep, DictView, agent_names
 from .requests import (
     OPTIONS,
     as_array,
@@ -28,7 +27,7 @@ from .requests import (
     scenario_fields,
 )
 from .rewards import RewardTerms
-from .spaces import Spaces, global_state
+from .spaces import ArrayStep, DictView, Spaces, agent_names, global_state
 
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer

@@ -11,9 +11,9 @@ from gymnasium.spaces import Box, Discrete
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import motion
-from swarm_logistics_env.environment.dict_view import ArrayStep
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import as_array, numbers_of
+from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
 from swarm_logistics_env.streams import row_keys

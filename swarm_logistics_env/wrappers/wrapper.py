@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo.utils import BaseParallelWrapper
 
-from swarm_logistics_env.environment.dict_view import ArrayStep, DictView
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import checked_options, checked_seed
+from swarm_logistics_env.environment.spaces import ArrayStep, DictView
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.adapters import CentralEnv
-from swarm_logistics_env.environment.dict_view import agent_names
 from swarm_logistics_env.environment.requests import gathered
+from swarm_logistics_env.environment.spaces import agent_names
 from swarm_logistics_env.errors import CommandError
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
 

@@ -16,8 +16,8 @@ from swarm_logistics_env import Fault, Scenario, policies, run_episode
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.studies.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
-from swarm_logistics_env.train.curve import TrainingLog
 from swarm_logistics_env.train.settings import Evaluation
+from swarm_logistics_env.train.trainer import TrainingLog
 
 SCENARIO = Scenario(
     n_robots=6, n_items=9, warehouse_width=3.0, warehouse_height=3.0, duration=20.0, restock=True
