@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,9 @@ from play_ladder import draw_ladder, ladder_block, ladder_studies, leans_block
 from play_paper import draw_figures, paper_block, paper_studies, sentences_block
 from tables import rewritten, table
 
-from swarm_logistics_env.cli.judging import RECORDED, STUDY
+from swarm_logistics_env.cli.judging import ENTRIES, RECORDED, STUDY
 from swarm_logistics_env.policies import NAMES, load
-from swarm_logistics_env.report import section
+from swarm_logistics_env.report import benchmark, section
 from swarm_logistics_env.spi import median_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT
@@ -188,6 +188,38 @@ def costs_block(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+# -- the benchmark ------------------------------------------------------------------------------
+
+ENTRANTS = (
+    "swarm-dt", "swarm-dt-follow", "homing", "homing-stock", "central", "central-stock",
+    "ppo-delivery@all", "ppo-robust@all",
+)  # fmt: skip
+
+
+def benchmark_studies(out: Path) -> tuple[Study, ...]:
+    """Return the benchmark's study of each entrant, each in a directory of its own."""
+    return tuple(
+        Study.preset(benchmark.STUDY, out=out / "benchmark" / section.slug(name), policies=[name])
+        for name in ENTRANTS
+    )
+
+
+def benchmark_block(found: Sequence[StudyResults]) -> str:
+    """Return the leaderboard and every entrant's worst cell; note the scores for `judge`."""
+    scores = {one.policies[0]: benchmark.score(one) for one in found}
+    ENTRIES.write_text(json.dumps({name: one.tolist() for name, one in scores.items()}) + "\n")
+    board = benchmark.leaderboard(scores)
+    worst = {}
+    for results in found:
+        test, share = benchmark.worst(results)
+        worst[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
+    rows = [(f"`{name}`", *rest, worst[name]) for name, *rest in board.rows]
+    head = (*board.columns, "worst cell, share of P without it")
+    seeds = found[0].plan.seeds
+    text = f"{len(seeds)} seeds from {seeds[0]:,} on, of each training. {' '.join(board.lines)}"
+    return "\n".join([table(head, rows), "", text])
+
+
 # -- what `judge` ranks a policy beside ---------------------------------------------------------
 
 
@@ -210,6 +242,7 @@ def main() -> None:
     cleared, restocked, leans = play(ladder_studies(OUT))
     draw_ladder(restocked, MEDIA / "ladder.svg")
     policies, robust = play(policy_studies(OUT))
+    entered = play(benchmark_studies(OUT))
     blocks = {
         "clearing": clearing_block(*play([clearing_study(OUT)])),
         "paper": paper_block(paper),
@@ -218,6 +251,7 @@ def main() -> None:
         "leans": leans_block(leans),
         "policies": policies_block(policies),
         "robust": robust_block(robust),
+        "benchmark": benchmark_block(entered),
     }
     if BENCHMARK.exists():
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
