@@ -36,6 +36,7 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "<!-- tables: ladder -->\n<!-- end of tables -->\n"
         "<!-- tables: leans -->\n<!-- end of tables -->\n"
         "<!-- tables: robust -->\n<!-- end of tables -->\n"
+        "<!-- tables: benchmark -->\n<!-- end of tables -->\n"
         "<!-- tables: policies -->\nold\n<!-- end of tables -->\nAfter.\n"
     )
     short: dict[str, Any] = {"seeds": 2, "first_seed": 3, "scenario": {"duration": 40.0}}
@@ -78,6 +79,11 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         tasks = "clearing", "warehouse", "warehouse"
         return tuple(Study(out=out / f"l{i}", task=task, **fields) for i, task in enumerate(tasks))
 
+    def benchmark_studies(out: Path) -> tuple[Study, ...]:
+        widths = {"name": "delivery_width", "values": [2.0, 1.0], "title": "Held out: narrow"}
+        fields: dict[str, Any] = {**short, "parameters": [widths]}
+        return (Study(out=out / "benchmark", policies=["homing"], **fields),)
+
     monkeypatch.setattr(tables.front_page, "main", lambda: None)
     for name, value in {
         "PAGE": page,
@@ -89,6 +95,8 @@ def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "policy_studies": policy_studies,
         "clearing_study": clearing_study,
         "ladder_studies": ladder_studies,
+        "benchmark_studies": benchmark_studies,
+        "ENTRIES": tmp_path / "entries.json",
         "MEDIA": tmp_path,
     }.items():
         monkeypatch.setattr(tables, name, value)
@@ -118,7 +126,7 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     assert small.read_text() == first
     drawn = {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")}
     assert drawn == {"S", "FT", "A"}
-    assert played == [0] * 10
+    assert played == [0] * 11
     # Nor does what is played anew change a digit.
     monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
     tables.main()
@@ -136,34 +144,17 @@ def test_its_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -
         seeds = study.plan().seeds
         assert min(seeds) >= 20_000
         assert max(seeds) < FIRST_OF_TRAININGS
-    assert [len(one.plan().seeds) for one in studies] == [
-        20,
-        100,
-        100,
-        20,
-        20,
-        20,
-        20,
-        30,
-        30,
-        30,
-        20,
-    ]
+    counts = [20, 100, 100, 20, 20, 20, 20, 30, 30, 30, 20]
+    assert [len(one.plan().seeds) for one in studies] == counts
 
 
 @pytest.mark.parametrize("page", [PAGE, README], ids=["results.md", "README.md"])
 def test_no_table_is_typed_by_hand(page: str) -> None:
     named = [name for name, _ in BLOCK.findall(PAGE)]
     assert named == [
-        "clearing",
-        "paper",
-        "sentences",
-        "ladder",
-        "leans",
-        "policies",
-        "robust",
+        "clearing", "paper", "sentences", "ladder", "leans", "policies", "robust", "benchmark",
         "costs",
-    ]
+    ]  # fmt: skip
     rest = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
     # `test_readme` plays what this one says.
     rest = re.sub(r"^\| items in 200 s.*?\n\n", "", rest, flags=re.DOTALL | re.MULTILINE)
