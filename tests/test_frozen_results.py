@@ -21,7 +21,7 @@ from swarm_logistics_env.tasks import Outcome
 
 FROZEN = Path(__file__).parent / "frozen"
 SHIPPED = Path(__file__).parents[1] / "examples" / "shipped_policies.toml"
-POLICIES = ["swarm-dt", "swarm-dt-follow", "homing", "ppo-delivery", "ppo-robust", "ppo-indicator"]
+POLICIES = ["swarm-dt", "swarm-dt-follow", "homing", "ppo-delivery", "ppo-robust"]
 NUMBERS = ("value", "low", "high", "p_value", "p_holm", "change", "change_low", "change_high")
 WORDS = (
     "policy", "indicator", "comparison", "verdict", "verdict_holm", "claim_verdict_holm",

@@ -103,7 +103,7 @@ def test_a_robot_that_cannot_lift_or_deliver_notices_and_forgets() -> None:
     rows[0, row.ITEMS : row.ITEMS + 4] = 1.0, 0.1, 0.0, 1.0  # the requested item, in reach
     for step in range(12):
         read = frame.read(rows)
-        assert told(read, "failed") == told(read, "cannot_lift") == (step > 9)
+        assert (told(read, "failed") > 0.9) == (told(read, "cannot_lift") > 0.9) == (step > 9)
         frame.command(np.array([[0.0, 0.0, 1.0]]))
     for _ in range(600):
         frame.command(np.zeros((1, 3)))
@@ -114,7 +114,7 @@ def test_a_robot_that_cannot_lift_or_deliver_notices_and_forgets() -> None:
     rows = nothing()
     rows[0, [row.CARRYING, row.CARRYING_REQUESTED, row.IN_DELIVERY_AREA]] = 1.0
     inputs = [frame.read(rows) for _ in range(12)]
-    assert [told(read, "failed") for read in inputs] == [0.0] * 10 + [1.0, pytest.approx(1.0, 0.01)]
+    assert [told(read, "failed") > 0.9 for read in inputs] == [False] * 9 + [True] * 3
     assert told(inputs[4], "delivering_in_vain") == pytest.approx(0.5, abs=0.01)
     assert told(inputs[-1], "cannot_deliver") == pytest.approx(1.0, abs=0.01)
 

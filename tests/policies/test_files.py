@@ -10,12 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from safetensors.numpy import load_file, save_file
 
-from swarm_logistics_env import observations as row
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import PolicyCard, files, identity, read_card
 from swarm_logistics_env.policies.files import CARD, write_policy
-from swarm_logistics_env.policies.learned import LearnedPolicy
 
 Tensors = dict[str, NDArray[np.float32]]
 
@@ -106,22 +104,8 @@ def test_columns_that_are_not_read_any_more_are_refused(
 ) -> None:
     rewrite(file, card.to_json().replace("wall_3", "wall_33"), tensors)
     refused(file, "column 3 is 'wall_33': should be 'wall_3'")
-    rewrite(file, card.to_json().replace(',"cannot_lift_inside"', ""), tensors)
-    refused(file, "has 92 columns: should have 84 or 88 or 93")
-    with pytest.raises(PolicyError, match="85: should be one of 84, 88, 93"):
-        card.network.replace(inputs=85)
-
-
-@pytest.mark.parametrize("count", [84, 88])
-def test_a_network_of_the_first_inputs_is_played(
-    card: PolicyCard, tensors: Tensors, count: int
-) -> None:
-    first = card.network.replace(inputs=count)
-    assert first.inputs == card.network.inputs[:count]
-    weights = tensors["layers.0.weight"][:, :count].copy()
-    policy = LearnedPolicy(card.replace(network=first), {**tensors, "layers.0.weight": weights})
-    policy.reset(3, 0)
-    assert policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape == (3, 4)
+    rewrite(file, card.to_json().replace(',"turns_to_drive"', ""), tensors)
+    refused(file, "has 93 columns: should have 94")
 
 
 @pytest.mark.parametrize("text", ["", "[1]", '{"name": "x"}', '{"a": 1}', "\0"])

@@ -16,9 +16,12 @@ SHORT = Scenario(restock=True, duration=80.0)
 SEEDS = range(4)
 
 
-def test_there_is_one_for_each_preset_of_training() -> None:
-    trainings = [load_training(name) for name in preset_names() if "-arm-" not in name]
-    assert sorted(training.name for training in trainings) == SHIPPED
+def test_each_is_a_training_of_a_preset_and_the_median_one_has_its_name() -> None:
+    recipes = {name.partition("@")[0] for name in SHIPPED}
+    assert recipes <= {load_training(name).name for name in preset_names()}
+    assert recipes <= set(SHIPPED)
+    seeds = [(card.name, card.seed) for card in map(policies.read_card, WEIGHTS.glob("*"))]
+    assert len(set(seeds)) == len(seeds), "every training once"
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -26,18 +29,17 @@ def test_they_are_small_and_say_how_they_were_made(name: str) -> None:
     file = WEIGHTS / f"{name}.safetensors"
     card = policies.read_card(file)
     assert file.stat().st_size < 1_000_000
-    assert card.name == name
-    assert card.command.startswith("swarm-logistics train ")
+    assert card.name == name.partition("@")[0]
+    assert "@" not in name or name.endswith(f"@{card.seed}")
     assert "/tmp" not in json.dumps(card.model_dump(mode="json"))
     assert card.scores
     assert all(score.low is not None and score.low <= score.value for score in card.scores)
-    preset = load_training(card.command.split()[-1])
+    recipe = card.name.removeprefix("ppo-")
+    seed = f" --seed {card.seed}" if card.seed else ""
+    assert card.command == f"swarm-logistics train {recipe}{seed}"
+    preset = load_training(recipe, seed=card.seed)
+    assert preset.start is None
     assert preset.model_dump(mode="json", exclude_defaults=True) == card.training
-    start: str | None = name
-    while start is not None:  # from nothing, or from one that began so
-        training = policies.read_card(WEIGHTS / f"{start}.safetensors").training
-        assert "imitation" not in training
-        start = training.get("start")
 
 
 @cache

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, run_episode
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.observations import IN_DELIVERY_AREA, N_COLUMNS
 from swarm_logistics_env.policies import NAMES, Policy, load
 
 
@@ -90,6 +90,7 @@ def test_a_command_follows_from_its_own_row_alone_and_stays_within_bounds(name: 
 @each_of_robots
 def test_reset_begins_anew_and_is_asked_for_the_number_of_robots(name: str) -> None:
     rows, policy = np.ones((3, N_COLUMNS), np.float32), fresh(name, 3, seed=1)
+    rows[:, IN_DELIVERY_AREA] = 0.0  # where it delivers, a robot stands whatever it draws
     first = [policy.act(rows) for _ in range(4)]
     policy.reset(3, 1)
     np.testing.assert_array_equal(first, [policy.act(rows) for _ in range(4)])
