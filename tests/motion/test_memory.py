@@ -135,7 +135,7 @@ def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(
     laden[0, [row.CARRYING, row.CARRYING_REQUESTED]] = 1.0
     hold(memory, laden, 1)
     known.remember(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
-    hold(memory, sensed(item_at=0.1), 8)
+    hold(memory, sensed(item_at=0.1), 9)
     assert memory[0, known.CANNOT_LIFT] == 0.0
 
 
