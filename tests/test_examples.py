@@ -49,7 +49,7 @@ def test_a_loop_of_ones_own_learns_on_the_frame_of_motion(
     torch = pytest.importorskip("torch", reason="needs the extra train")
     pytest.importorskip("stable_baselines3", reason="needs the extra train")
     torch.set_num_threads(1)
-    own, scripted = main("ppo_from_nothing", total_timesteps=30_720, duration=20.0, judged=2)
+    own, scripted = main("ppo_from_nothing", total_timesteps=92_160, duration=20.0, judged=2)
     assert len(own) == len(scripted) == 2
     assert sum(scripted) > 0
     assert sum(own) > 0  # an untrained one delivers nothing

@@ -24,7 +24,7 @@ from .wrapper import Wrapper
 class MotionFrame(Wrapper):
     """Gives each robot a memory of its own, and turns what it reads and commands into its motion.
 
-    Observations become rows of `motion.INPUTS` (93 numbers, most within -1 and 1): walls,
+    Observations become rows of `motion.INPUTS` (94 numbers, most within -1 and 1): walls,
     neighbours, items and the lowest timer, relative to the direction in which the robot drives,
     and what it remembers, such as the way to the delivery area. Actions become rows of
     `motion.OUTPUTS`: along and aside, fractions of the top speed, and the gripper, all within -1
@@ -43,7 +43,7 @@ class MotionFrame(Wrapper):
         >>> env = MotionFrame(swarm_logistics_v0.parallel_env(n_robots=3))
         >>> observations, infos = env.reset(seed=0)
         >>> observations["robot_0"].shape, env.action_space("robot_0").shape
-        ((93,), (3,))
+        ((94,), (3,))
     """
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper, listens: bool = True) -> None:
@@ -53,7 +53,7 @@ class MotionFrame(Wrapper):
         self._output_space = Box(-1.0, 1.0, (len(OUTPUTS),), np.float32)
 
     def observation_space(self, agent: str) -> Box:
-        """Return the space of a row of inputs (93,), the same for every agent."""
+        """Return the space of a row of inputs (94,), the same for every agent."""
         return self._read_space
 
     def action_space(self, agent: str) -> Box:
@@ -63,7 +63,7 @@ class MotionFrame(Wrapper):
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
-        """Begin an episode and return the first inputs (N, 93)."""
+        """Begin an episode and return the first inputs (N, 94)."""
         observations = super().reset_arrays(seed, options)
         return self._read(observations)
 
