@@ -227,7 +227,11 @@ def record_scores(out: Path) -> None:
     """Record P of the shipped swarms in the study of `judge`; one that needs the state is none."""
     loaded = {name: load(name) for name in NAMES if "@" not in name}
     names = [name for name, one in loaded.items() if not getattr(one, "needs_state", False)]
-    study = Study.preset(STUDY, out=out / STUDY, policies=names)
+    # Of that study the sound swarm alone is recorded, so one fault is enough.
+    fault = {"modes": ["FM1"], "robots": [1]}
+    study = Study.preset(
+        STUDY, out=out / STUDY, policies=names, sizes=(), parameters=(), faults=[fault]
+    )
     (found,) = play([study])
     p = {c.policy: {"p": c.by_seed.tolist()} for c in found.cells if c.arm.setting == NO_FAULT}
     seeds = [found.plan.seeds[0], found.plan.seeds[-1]]
