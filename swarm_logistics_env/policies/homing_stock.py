@@ -132,14 +132,12 @@ def decide_homing_stock(
             x, y = math.cos(angle) + PULL * home_x, math.sin(angle) + PULL * home_y
             x, y = freest_direction(sensed, own, x + push_x, y + push_y)
         elif sensed[row.CARRYING_REQUESTED] > 0.5:
-            if not is_inside or own[known.FAILED] < 0.5:
-                gripper = 1.0
+            gripper = 1.0 if not is_inside or own[known.FAILED] < 0.5 else -1.0
             speed = 0.0 if is_inside and gripper > 0.0 else 1.0
-            if not is_inside:
-                if sure > 0.0:
-                    x, y = home_x, home_y
-                else:
-                    x, y = home_direction(sensed, own, x, y)
+            if not is_inside and sure > 0.0:
+                x, y = home_x, home_y
+            elif not is_inside:
+                x, y = home_direction(sensed, own, x, y)
             x, y = freest_direction(sensed, own, x + push_x, y + push_y)
         elif sensed[row.CARRYING] > 0.5:
             if item >= 0:  # it lets go outside, and lifts that one
