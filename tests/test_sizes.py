@@ -43,11 +43,11 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 18_190,
-    "tokens of the package": 164_800,
+    "lines of code of the package": 18_275,
+    "tokens of the package": 165_720,
     "files of the package": 129,
     "lines of code of studies and report": 4_152,
-    "lines of tests": 18_890,
+    "lines of tests": 18_990,
     "lines of verification, benchmarks, interop and the scripts of docs": 5_300,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
