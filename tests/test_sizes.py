@@ -47,8 +47,8 @@ MOST = {
     "tokens of the package": 165_720,
     "files of the package": 129,
     "lines of code of studies and report": 4_152,
-    "lines of tests": 18_990,
-    "lines of verification, benchmarks, interop and the scripts of docs": 5_300,
+    "lines of tests": 19_070,
+    "lines of verification, benchmarks, interop and the scripts of docs": 5_970,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
