@@ -19,7 +19,7 @@ TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark interop tasks docs docs-check dist absolute-links format clean
+.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -32,7 +32,8 @@ help:
 	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
-	@echo "make interop         TorchRL, BenchMARL, RLlib and SuperSuit on the environment; see interop/"
+	@echo "make interop         four learners of other people's code, three trainings each (2.5 core-hours): results/interop"
+	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make docs-check      every command of README and pages, with few seeds and steps"
@@ -90,12 +91,14 @@ test-lowest test-newest: test-%: .venvs/%/wheel
 benchmark: $(BENCHMARK)/installed
 	$(BENCHMARK)/bin/python -m benchmarks --out results/benchmark
 
-# Each library in an environment of its own: calls of its wrappers as tests, and what learns with it.
-interop: $(TORCHRL)/installed $(BENCHMARL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
-	for library in torchrl benchmarl rllib supersuit; do \
+# Each library in an environment of its own: what learns with it, and calls of its wrappers as tests.
+interop: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed
+	$(DEV)/bin/python -m interop
+
+interop-calls: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
+	for library in dev torchrl benchmarl rllib supersuit; do \
 		.venvs/$$library/bin/python -m pytest -rs tests/test_interop.py || exit 1; \
 	done
-	$(BENCHMARL)/bin/python -m interop.benchmarl_learning
 
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py

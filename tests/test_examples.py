@@ -56,13 +56,6 @@ def test_a_loop_of_ones_own_learns_on_the_frame_of_motion(
     assert "Swarm D-T's" in capsys.readouterr().out
 
 
-@pytest.mark.filterwarnings("default")  # theirs
-def test_torchrl_learns_on_the_frame_of_motion() -> None:
-    pytest.importorskip("torchrl", reason="needs torchrl")
-    own, scripted = main("torchrl_from_nothing", total_frames=2_000, duration=20.0, judged=2)
-    assert len(own) == len(scripted) == 2
-
-
 def test_own_policy_is_judged_beside_swarm_dt(tmp_path: Path) -> None:
     table = main("judge_my_policy", seeds=2, duration=20.0, out=tmp_path / "out")
     assert sorted(set(table["policy"])) == ["Straight", "swarm-dt"]

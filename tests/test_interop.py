@@ -1,18 +1,21 @@
-"""Other people's wrappers, unchanged, around the environment: `make interop` has them installed.
+"""Other people's wrappers and learners: `make interop-calls` has them installed.
 
 TorchRL, SuperSuit and RLlib, each with robots that have failed from the start and with swarms whose
-size changes between episodes.
+size changes between episodes; and two updates of each learner of `interop`.
 """
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from swarm_logistics_env import swarm_logistics_v0
+from swarm_logistics_env import Scenario, policies, swarm_logistics_v0
 from swarm_logistics_env.adapters import CentralEnv
+from swarm_logistics_env.train.training import load_training
 from swarm_logistics_env.wrappers import FaultInjection, FixedAgents, SwarmSize
 
 N_ROBOTS, STEPS = 5, 20
@@ -82,3 +85,87 @@ def test_rllib_trains(condition: str, central: bool) -> None:
     algorithm = config.build_algo()
     assert algorithm.train()["env_runners"]["episode_len_mean"] == STEPS
     algorithm.stop()
+
+
+def small_world() -> Any:
+    pytest.importorskip("torch", reason="needs torch")
+    return importlib.import_module("interop.small_world")
+
+
+@pytest.mark.parametrize("name", ["small", "paper"])
+def test_the_worlds_of_the_task_are_those_that_all_learn_in(name: str) -> None:
+    yaml, shared = pytest.importorskip("yaml"), small_world()
+    path = Path(shared.__file__).parent / "swarm_logistics" / f"{name}.yaml"
+    fields = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert fields.pop("rewards") == shared.REWARDS
+    assert Scenario(**fields) == shared.WORLDS[name]
+    preset = load_training("delivery")
+    assert preset.rewards == shared.REWARDS
+    assert (
+        shared.WORLDS[name] == {"small": preset.world_scenarios[0], "paper": preset.scenario}[name]
+    )
+
+
+@pytest.mark.parametrize(
+    ("module", "library", "learner"),
+    [
+        ("sb3_ppo", "stable_baselines3", "sb3-ppo"),
+        ("torchrl_ppo", "torchrl", "torchrl-ppo"),
+        ("benchmarl_ppo", "benchmarl", "benchmarl-ippo"),
+        ("benchmarl_ppo", "benchmarl", "benchmarl-mappo"),
+    ],
+)
+def test_each_learner_learns_two_updates_and_writes_a_policy(
+    module: str, library: str, learner: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip(library)
+    shared = small_world()
+    changed = {"RESULTS": tmp_path, "SEEDS": range(1), "CURVE_SEEDS": range(1), "POINTS": 1}
+    for name, value in changed.items():
+        monkeypatch.setattr(shared, name, value)
+    points, tell = list[Any](), shared.Learning.tell
+
+    def watched(learning: Any, agent_steps: int, tensors: Any) -> None:
+        points.append(tensors())
+        tell(learning, agent_steps, tensors)
+
+    monkeypatch.setattr(shared.Learning, "tell", watched)
+    learning = shared.Learning(learner, "small", 0, agent_steps=30_720)
+    row = learning.end(importlib.import_module(f"interop.{module}").learn(learning))
+    assert (learning.agent_steps, row["agent_steps"]) == (30_720, 30_720)
+    assert points[0]["layers.2.bias"].tolist() == pytest.approx([0.8, 0.0, 0.0], abs=1e-6)
+    assert points[0]["deviations"].tolist() == pytest.approx([0.5] * 3, abs=1e-3)
+    assert all((points[0][name] != points[-1][name]).any() for name in points[0])
+    policy: Any = policies.load(str(tmp_path / f"{learner}-small-0.safetensors"))
+    assert (policy.card.network.hidden, policy.card.agent_steps) == ((128, 64), 30_720)
+    assert (len(row["P"]), list(row["P_F"])) == (1, ["FM1", "FM2", "FM3", "FM4"])
+
+
+def test_worlds_of_torchrl_end_and_begin_each_for_itself() -> None:
+    utils = pytest.importorskip("torchrl.envs.utils", reason="needs torchrl")
+    worlds = importlib.import_module("interop.torchrl_worlds").TorchRLWorlds
+    sizes = iter([20, 30] * 2)
+
+    def make() -> Any:
+        env = swarm_logistics_v0.parallel_env(n_robots=3, max_cycles=next(sizes))
+        return FaultInjection(env, "removed", robots=1, onset=0.5)
+
+    utils.check_env_specs(worlds(make, [0, 1]))
+    env = worlds(make, [0, 1])
+    done = env.rollout(65, break_when_any_done=False)["next", "done"][..., 0]
+    assert [where.nonzero().flatten().tolist() for where in done] == [[19, 39, 59], [29, 59]]
+
+
+def test_the_plan_is_at_most_four_hours_and_one_more_training_stands_beside_its_prediction() -> (
+    None
+):
+    small_world()
+    plan = importlib.import_module("interop.__main__")
+    minutes = [each.minutes for each in plan.LEARNERS.values()]
+    in_paper = plan.BEST * max(each["paper"] for each in minutes)
+    assert 3 * (sum(each["small"] for each in minutes) + in_paper) <= 240
+    rows = [{"seed": seed, "P": [p, p + 2.0]} for seed, p in enumerate([40.0, 44.0, 42.0, 60.0])]
+    assert plan.each_training(rows[:3]) == "41.0, 45.0, 43.0"
+    assert plan.each_training(rows).endswith("; seed 3: 61.0, predicted 43.0 [33.1, 52.9]")
+    assert plan.is_clear([40.0, 44.0, 42.0] * 4, [20.0, 30.0, 22.0] * 4)
+    assert not plan.is_clear([22.0, 28.0, 22.0] * 4, [20.0, 30.0, 22.0] * 4)

@@ -43,12 +43,12 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 18_190,
-    "tokens of the package": 164_800,
-    "files of the package": 129,
-    "lines of code of studies and report": 4_152,
-    "lines of tests": 18_890,
-    "lines of verification, benchmarks, interop and the scripts of docs": 5_300,
+    "lines of code of the package": 18_280,
+    "tokens of the package": 165_950,
+    "files of the package": 126,
+    "lines of code of studies and report": 4_156,
+    "lines of tests": 19_030,
+    "lines of verification, benchmarks, interop and the scripts of docs": 6_085,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,

@@ -18,7 +18,7 @@ from tuple_env import TupleEnv
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.tasks import ParallelTask
-from swarm_logistics_env.tasks.parallel_policies import Env
+from swarm_logistics_env.tasks.parallel_wrappers import Env
 
 Cell = tuple[int, int]  # column, row
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 import gymnasium
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.tasks.parallel_policies import Env, Value
+from swarm_logistics_env.tasks.parallel_wrappers import Env, Value
 
 
 class TupleEnv(Env):  # type: ignore[misc]  # PettingZoo's is untyped

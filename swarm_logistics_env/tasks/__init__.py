@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from swarm_logistics_env.policies.files import StableBaselinesModel
 
-from .failing_robots import FailingRobots, RobotFault
 from .parallel_policies import RandomActions, SumOfInfos, SumOfRewards
 from .parallel_task import ParallelTask
+from .parallel_wrappers import ChangingAgents, FailingRobots, PaddedAgents, RobotFault
 from .task import Case, Outcome, Run, Task
 
 __all__ = [
     "Case",
+    "ChangingAgents",
     "FailingRobots",
     "Outcome",
+    "PaddedAgents",
     "ParallelTask",
     "RandomActions",
     "RobotFault",

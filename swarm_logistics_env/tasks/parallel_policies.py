@@ -7,19 +7,15 @@ import inspect
 import math
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from pettingzoo import ParallelEnv
 
 from swarm_logistics_env import streams
 from swarm_logistics_env.errors import PolicyError, StudyError
 
-# An observation, an action or an info: PettingZoo leaves their types to each environment.
-Value: TypeAlias = Any
-Env: TypeAlias = ParallelEnv[str, Value, Value]
+from .parallel_wrappers import Env, Value
 
 
 class RandomActions:

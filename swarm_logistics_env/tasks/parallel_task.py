@@ -20,13 +20,10 @@ from swarm_logistics_env.policies.policy import function_digest, without_prose
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 from swarm_logistics_env.records import Record
 
-from .failing_robots import FAILURE_MODES, REMOVED, FailingRobots, RobotFault, failing_rows
 from .parallel_policies import (
-    Env,
     Gain,
     RandomActions,
     SumOfRewards,
-    Value,
     agent_actions,
     agents_by_row,
     in_words,
@@ -34,14 +31,23 @@ from .parallel_policies import (
     observation_rows,
     performance_of,
 )
+from .parallel_wrappers import (
+    FAILURE_MODES,
+    REMOVED,
+    Env,
+    FailingRobots,
+    RobotFault,
+    Value,
+    failing_rows,
+)
 from .task import Case, Fields, Outcome, TaskScenario
 
 # These files decide what a run in somebody else's environment gives.
 ENVIRONMENT_SOURCES = (
     "streams.py",
-    "tasks/failing_robots.py",
     "tasks/parallel_policies.py",
     "tasks/parallel_task.py",
+    "tasks/parallel_wrappers.py",
 )
 _codes: dict[str, str] = {}  # of tasks by their settings: one process answers once
 

@@ -1,0 +1,186 @@
+"""Four learners of other people's code, three trainings each: `make interop`.
+
+What results/interop has already is not trained again. One training more of a row, run by hand with
+`--seed 3`, is shown beside the row's prediction interval when this is called again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning, robustness, shown
+from swarm_logistics_env import policies, spi
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, images
+from swarm_logistics_env.train.evaluation import performances
+
+ROOT = RESULTS.parents[1]
+TRAININGS = range(3)
+BEST = 2  # learners that learn in the paper's world too
+REFERENCES = ("swarm-dt", "ppo-delivery")
+
+
+class Learner(NamedTuple):
+    """Where a learner lives, and what a run costs.
+
+    Attributes:
+        venv: its virtual environment in .venvs.
+        module: its script.
+        minutes: of one core, for a training in each world and its row, as measured.
+    """
+
+    venv: str
+    module: str
+    minutes: dict[str, float]
+
+
+LEARNERS = {
+    "sb3-ppo": Learner("dev", "interop.sb3_ppo", {"small": 3, "paper": 10}),
+    "torchrl-ppo": Learner("torchrl", "interop.torchrl_ppo", {"small": 6, "paper": 15}),
+    "benchmarl-ippo": Learner("benchmarl", "interop.benchmarl_ppo", {"small": 6, "paper": 15}),
+    "benchmarl-mappo": Learner("benchmarl", "interop.benchmarl_ppo", {"small": 6, "paper": 15}),
+}
+
+
+def main() -> None:
+    """Say how long it takes, train what is missing, and write the table and the picture."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--processes", type=int, default=1, help="trainings at once")
+    asked = parser.parse_args()
+    small = missing("small", LEARNERS)
+    slowest = max(each.minutes["paper"] for each in LEARNERS.values())
+    minutes = sum(LEARNERS[name].minutes["small"] for name, _ in small)
+    minutes += slowest * max(0, BEST * len(TRAININGS) - len(first(rows("paper"))))
+    print(f"at most {minutes / 60:.1f} core-hours; what is done is kept, so it may be stopped")
+    train("small", small, asked.processes)
+    reached = {name: np.mean([row["P"] for row in first(rows("small", name))]) for name in LEARNERS}
+    best = sorted(reached, key=lambda name: -reached[name])[:BEST]
+    train("paper", missing("paper", best), asked.processes)
+    beside = references()
+    text = table(beside)
+    (RESULTS / "table.md").write_text(text, encoding="utf-8")
+    picture, _ = images(lambda canvas: draw(canvas, beside), 5.2)
+    (RESULTS / "learners.svg").write_text(picture, encoding="utf-8")
+    print(text)
+
+
+def rows(world: str, learner: str | None = None) -> list[dict[str, Any]]:
+    """Return the rows of whole trainings that are there, by learner and seed."""
+    found = [json.loads(path.read_text("utf-8")) for path in RESULTS.glob(f"*-{world}-*.json")]
+    names, whole = LEARNERS if learner is None else (learner,), Learning("", world, 0).agent_steps
+    return sorted(
+        (row for row in found if row["learner"] in names and row["agent_steps"] == whole),
+        key=lambda row: (row["learner"], row["seed"]),
+    )
+
+
+def first(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the rows that the table is about, without trainings that were run by hand."""
+    return [row for row in found if row["seed"] in TRAININGS]
+
+
+def missing(world: str, learners: Any) -> list[tuple[str, int]]:
+    """Return learner and seed of the trainings that have no row yet."""
+    done = {(row["learner"], row["seed"]) for row in rows(world)}
+    return [each for each in product(learners, TRAININGS) if each not in done]
+
+
+def train(world: str, runs: list[tuple[str, int]], processes: int) -> None:
+    """Train each in a process of its own, with its library's Python."""
+
+    def one(run: tuple[str, int]) -> None:
+        name, seed = run
+        python = ROOT / ".venvs" / LEARNERS[name].venv / "bin" / "python"
+        command = [str(python) if python.exists() else sys.executable, "-m", LEARNERS[name].module]
+        command += ["--learner", name, "--world", world, "--seed", str(seed)]
+        subprocess.run(command, cwd=ROOT, check=True)
+
+    with ThreadPoolExecutor(processes) as pool:
+        list(pool.map(one, runs))
+
+
+def references() -> dict[str, dict[str, list[float]]]:
+    """Return P of the shipped policies on the same seeds, by world; some may not be there."""
+    path = RESULTS / "references.json"
+    found: dict[str, dict[str, list[float]]] = {}
+    if path.exists():
+        found = json.loads(path.read_text("utf-8"))
+    for world, name in product(WORLDS, REFERENCES):
+        if name not in found.setdefault(world, {}):
+            try:
+                policy = policies.load(name)
+            except PolicyError:
+                continue
+            found[world][name] = performances(policy, WORLDS[world], [()], SEEDS)[0].tolist()
+    path.write_text(json.dumps(found) + "\n", encoding="utf-8")
+    return found
+
+
+def table(beside: dict[str, dict[str, list[float]]]) -> str:
+    """Return the rows as Markdown: P and R over trainings and seeds, each with its interval."""
+    head = ["learner", "world", "agent-steps", "CPU minutes", "P", "P of each training"]
+    head += ["clear of Swarm D-T", *(f"R, {mode}, m = {FAULTY}" for mode in MODES)]
+    lines = [head, ["---"] * len(head)]
+    for world, name in product(WORLDS, LEARNERS):
+        found = rows(world, name)
+        if kept := first(found):
+            p = [row["P"] for row in kept]
+            lines.append([
+                name, world, f"{kept[0]['agent_steps']:,}",
+                f"{np.mean([row['cpu_minutes'] for row in kept]):.1f}",
+                shown(*spi.mean_interval(p)), each_training(found),
+                f"{sum(is_clear(each, beside[world]['swarm-dt']) for each in p)} of {len(p)}",
+                *(robustness(p, [row["P_F"][mode] for row in kept], world) for mode in MODES),
+            ])  # fmt: skip
+    for world, name in product(WORLDS, REFERENCES):
+        if name in beside[world]:
+            p_of = shown(*spi.mean_interval(beside[world][name]))
+            lines.append([name, world, *[""] * 2, p_of, *[""] * (len(head) - 5)])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def each_training(found: list[dict[str, Any]]) -> str:
+    """Return mean P of each training; one more stands beside the interval predicted for it."""
+    kept = [float(np.mean(row["P"])) for row in first(found)]
+    words = ", ".join(f"{mean:.1f}" for mean in kept)
+    for row in found:
+        if row["seed"] not in TRAININGS:
+            words += f"; seed {row['seed']}: {np.mean(row['P']):.1f}, predicted "
+            words += shown(*spi.prediction_interval(kept))
+    return words
+
+
+def is_clear(p: list[float], reference: list[float]) -> bool:
+    """Return whether a training delivers clearly more than a reference on the same seeds."""
+    return spi.relative_change(reference, p).verdict == "supported"
+
+
+def draw(canvas: Any, beside: dict[str, dict[str, list[float]]]) -> None:
+    """Draw P over agent-steps of every training, a panel for each world."""
+    for world, axes in zip(WORLDS, canvas.subplots(len(WORLDS))):
+        for (name, colour), seed in product(zip(LEARNERS, COLOURS), TRAININGS):
+            path = RESULTS / f"{name}-{world}-{seed}.csv"
+            if path.exists():
+                points = list(csv.DictReader(path.read_text("utf-8").splitlines()))
+                steps = [float(point["agent_steps"]) / 1e6 for point in points]
+                p = [float(point["P"]) for point in points]
+                axes.plot(steps, p, color=colour, label=name if seed == 0 else None)
+        for (name, delivered), line in zip(beside[world].items(), LINES[1:]):
+            axes.axhline(np.mean(delivered), color=INK, linestyle=line, linewidth=1, label=name)
+        axes.set(
+            title=f"{world} world", xlabel="million agent-steps", ylabel="P [items]", ylim=(0, None)
+        )
+        axes.legend(fontsize=7, ncols=2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,258 @@
+"""What all learners share: worlds, rewards, PPO's settings, the curve, the policy file and the row.
+
+Each learner writes results/interop/NAME.csv, its curve, NAME.safetensors, a policy file for
+`swarm-logistics judge`, and NAME.json, its row; NAME is "LEARNER-WORLD-SEED".
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import distributions
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Fault, Scenario, spi, swarm_logistics_v0
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.motion import INPUTS, OUTPUTS
+from swarm_logistics_env.policies.files import write_policy
+from swarm_logistics_env.policies.learned import LearnedPolicy, Network, PolicyCard
+from swarm_logistics_env.records import becoming
+from swarm_logistics_env.train.evaluation import performances, versions
+from swarm_logistics_env.wrappers import MotionFrame
+
+RESULTS = Path(__file__).parents[1] / "results" / "interop"
+
+# Scenario and rewards of the preset `delivery`, without its further worlds.
+WORLDS = {
+    "small": Scenario(
+        n_robots=10,
+        warehouse_width=6.0,
+        warehouse_height=5.0,
+        delivery_width=1.5,
+        n_items=8,
+        duration=200.0,
+        restock=True,
+    ),
+    "paper": Scenario(restock=True),
+}
+REWARDS = {
+    "own_delivery": 0.5, "delivery": 0.5, "lift_requested": 0.3,
+    "approach": 0.1, "stocking": 0.15, "contact": -0.05,
+}  # fmt: skip
+AGENT_STEPS = {"small": 2_000_000, "paper": 4_000_000}
+N_WORLDS = {"small": 12, "paper": 5}
+
+SEEDS = range(700_000, 700_020)  # of the row: no training and no curve has them
+CURVE_SEEDS = range(600_000, 600_004)
+POINTS = 16  # of a curve
+MODES = ("FM1", "FM2", "FM3", "FM4")  # that the recipe `robust` trains with
+FAULTY = 3  # robots that fail
+
+Tensors = Mapping[str, NDArray[np.float32]]
+LIBRARIES = ("torchrl", "benchmarl")
+
+
+class Settings(NamedTuple):
+    """Of PPO, the same for all; one network, of which every robot is a row.
+
+    Attributes:
+        n_steps: control steps between updates, in every world.
+        n_minibatches: parts of the batch of all robots' steps.
+        learning_rate: at the start; it falls linearly to 0.
+        deviation: of the outputs' noise at the start; it is learned, the same for all states.
+        along: the first output of an untrained network, which therefore drives ahead.
+    """
+
+    hidden: tuple[int, ...] = (128, 64)
+    n_steps: int = 128
+    n_minibatches: int = 32
+    epochs: int = 4
+    learning_rate: float = 1e-3
+    gamma: float = 0.99
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    max_grad_norm: float = 0.5
+    deviation: float = 0.5
+    along: float = 0.8
+
+
+SETTINGS = Settings()
+
+
+def make_env(scenario: Scenario) -> MotionFrame:
+    """Return a world to learn in: rows of 93 inputs, 3 outputs within -1 and 1, shaped rewards."""
+    return MotionFrame(swarm_logistics_v0.parallel_env(scenario, rewards=REWARDS))
+
+
+def drive_ahead(parts: Sequence[torch.nn.Parameter]) -> None:
+    """Let an untrained network drive ahead whatever it reads.
+
+    Args:
+        parts: weight and bias of each layer from the inputs to the outputs, in turn.
+    """
+    with torch.no_grad():
+        parts[-2].mul_(0.01)
+        parts[-1].zero_()
+        parts[-1][0] = SETTINGS.along
+
+
+def tensors_of(parts: Sequence[torch.Tensor], deviations: torch.Tensor) -> Tensors:
+    """Return the tensors of a policy file, float32.
+
+    Args:
+        parts: as `drive_ahead`; of the last layer the first three outputs count.
+        deviations: of the outputs' noise, (3,).
+    """
+    named = {
+        f"layers.{place // 2}.{'bias' if place % 2 else 'weight'}": part
+        for place, part in enumerate(parts)
+    }
+    for name in list(named)[-2:]:
+        named[name] = named[name][: len(OUTPUTS)]
+    arrays = {**named, "deviations": deviations}
+    return {name: part.detach().numpy().copy() for name, part in arrays.items()}
+
+
+class Learning:
+    """One learner in one world at one seed.
+
+    Args:
+        learner: what NAME begins with.
+        world: a key of `WORLDS`.
+        seed: of the training; a whole number of at least 0.
+        agent_steps: decisions of single robots to learn from; None: those of the world.
+
+    Raises:
+        SetupError: there is no such world.
+    """
+
+    def __init__(self, learner: str, world: str, seed: int, agent_steps: int | None = None) -> None:
+        if world not in WORLDS:
+            raise SetupError(f"world = {world!r}: should be one of {', '.join(WORLDS)}")
+        self.learner, self.world, self.seed = learner, world, seed
+        self.scenario, self.n_worlds = WORLDS[world], N_WORLDS[world]
+        self.rows = self.n_worlds * self.scenario.n_robots
+        batch = self.rows * SETTINGS.n_steps
+        self.updates = max(1, (agent_steps or AGENT_STEPS[world]) // batch)
+        self.agent_steps = self.updates * batch
+        self.name = f"{learner}-{world}-{seed}"
+        self._curve: list[dict[str, float]] = []
+        self._seconds, self._since = 0.0, time.process_time()
+
+    def left(self, agent_steps: int) -> float:
+        """Return the share of the training that is left, 1 to 0: the learning rate's factor."""
+        return max(0.0, 1.0 - agent_steps / self.agent_steps)
+
+    def tell(self, agent_steps: int, tensors: Callable[[], Tensors]) -> None:
+        """Add a point to the curve where one is due, and write it; costs nothing elsewhere.
+
+        The processor's time counts without what the points cost.
+        """
+        if agent_steps < len(self._curve) * self.agent_steps / POINTS:
+            return
+        self._seconds += time.process_time() - self._since
+        p = self._played(tensors(), [()], CURVE_SEEDS)[0].mean()
+        minutes = round(self._seconds / 60, 2)
+        self._curve.append({"agent_steps": agent_steps, "cpu_minutes": minutes, "P": float(p)})
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        with (
+            becoming(RESULTS / f"{self.name}.csv", SetupError) as part,
+            part.open("w", newline="", encoding="utf-8") as file,
+        ):
+            writer = csv.DictWriter(file, self._curve[0])
+            writer.writeheader()
+            writer.writerows(self._curve)
+        print(f"{self.name}: {agent_steps:,} agent-steps, {minutes} CPU minutes, P {p:.1f}")
+        self._since = time.process_time()
+
+    def end(self, tensors: Tensors) -> dict[str, Any]:
+        """Measure the row, write it with the policy file, print it and return it."""
+        self.tell(self.agent_steps, lambda: tensors)
+        write_policy(RESULTS / f"{self.name}.safetensors", self._card(), tensors)
+        kinds = [(), *((Fault(mode, FAULTY),) for mode in MODES)]
+        p_o, *p_f = self._played(tensors, kinds, SEEDS).tolist()
+        row = {
+            "learner": self.learner,
+            "world": self.world,
+            "seed": self.seed,
+            "agent_steps": self.agent_steps,
+            "cpu_minutes": self._curve[-1]["cpu_minutes"],
+            "P": p_o,
+            "P_F": dict(zip(MODES, p_f)),
+            "settings": SETTINGS._asdict(),
+            "versions": self._card().versions,
+        }
+        with becoming(RESULTS / f"{self.name}.json", SetupError) as part:
+            part.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
+        r = ", ".join(f"{mode} {robustness(p_o, p, self.world)}" for mode, p in row["P_F"].items())
+        print(
+            f"{self.name}: {self.agent_steps:,} agent-steps, {row['cpu_minutes']} CPU minutes, "
+            f"P {shown(*spi.mean_interval(p_o))} on {len(SEEDS)} new seeds; "
+            f"R with {FAULTY} of {self.scenario.n_robots} robots: {r}"
+        )
+        return row
+
+    def _played(
+        self, tensors: Tensors, kinds: Sequence[Sequence[Fault]], seeds: range
+    ) -> NDArray[np.float64]:
+        policy = LearnedPolicy(self._card(), tensors)
+        return performances(policy, self.scenario, kinds, seeds)
+
+    def _card(self) -> PolicyCard:
+        libraries = {each.name: each.version for each in distributions() if each.name in LIBRARIES}
+        return PolicyCard(
+            name=self.name,
+            about=f"{self.learner} from nothing in the {self.world} world, see interop/.",
+            network=Network(inputs=INPUTS, hidden=SETTINGS.hidden, exploration=1.0),
+            versions=versions() | libraries,
+            scenario=self.scenario.model_dump(mode="json", exclude_defaults=True)
+            | {"heading_drift": self.scenario.heading_drift},
+            seed=self.seed,
+            agent_steps=self.agent_steps,
+        )
+
+
+def robustness(p_o: Sequence[Any], p_f: Sequence[Any], world: str = "small") -> str:
+    """Return R with its interval, in words; "-" where nothing was delivered.
+
+    Args:
+        p_o, p_f: deliveries without and with faults, (seeds,) or (trainings, seeds).
+    """
+    if not np.any(p_o):
+        return "-"
+    r = spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY)
+    return shown(r.value, r.low, r.high, 2)
+
+
+def shown(value: float, low: float | None, high: float | None, decimals: int = 1) -> str:
+    """Return a value with its limits, where there are any."""
+    if low is None or high is None:
+        return f"{value:.{decimals}f}"
+    return f"{value:.{decimals}f} [{low:.{decimals}f}, {high:.{decimals}f}]"
+
+
+def main(learn: Callable[[Learning], Tensors], learners: Sequence[str]) -> None:
+    """Read the command line, learn, and write and print the row.
+
+    Args:
+        learn: trains as it is asked, tells of it on the way, and returns what was learned.
+        learners: the names that it may have; the first one where none is asked for.
+    """
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--learner", choices=learners, default=learners[0])
+    parser.add_argument("--world", choices=list(WORLDS), default="small")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--agent-steps", type=int)
+    asked = parser.parse_args()
+    torch.set_num_threads(1)
+    torch.manual_seed(asked.seed)
+    learning = Learning(asked.learner, asked.world, asked.seed, asked.agent_steps)
+    learning.end(learn(learning))

@@ -1,0 +1,309 @@
+"""Wrappers for any PettingZoo parallel environment: agents that stay, swarms that change, faults.
+
+They know nothing of this package's world. Of the package they use `errors` (ValueErrors), `streams`
+(numpy generators by key) and `records` (a frozen record): whoever copies this file replaces these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from gymnasium import Space
+from gymnasium.wrappers.utils import create_zero_array
+from pettingzoo import ParallelEnv
+from pettingzoo.utils.wrappers import BaseParallelWrapper
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+
+from swarm_logistics_env import streams
+from swarm_logistics_env.errors import FaultError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.records import Record
+
+# An observation, an action or an info: PettingZoo leaves their types to each environment.
+Value: TypeAlias = Any
+Env: TypeAlias = ParallelEnv[str, Value, Value]
+
+
+class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
+    """Keeps all possible agents until the end of every episode, as many trainers require.
+
+    An agent that is not in this episode, or has left it, stays: it observes zeros (or what its
+    space has nearest to them), its reward is 0, its action is ignored, and its infos say "active"
+    0 instead of 1. In the last step those are active who took it, so that what they observe at the
+    end is kept. All agents end together, when the environment has none left: truncated if any of
+    the last ones was, else terminated.
+
+    Args:
+        env: any parallel environment.
+
+    Example:
+        >>> from pettingzoo.sisl import pursuit_v5
+        >>> env = PaddedAgents(pursuit_v5.parallel_env())
+        >>> observations, infos = env.reset(seed=0)
+        >>> list(observations) == list(infos) == env.possible_agents
+        True
+    """
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Value] | None = None
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """Begin an episode; observations and infos of all possible agents."""
+        observations, infos = self.env.reset(seed=seed, options=options)
+        self.agents = list(self.possible_agents)
+        return self._padded(self.env.agents, observations, infos)
+
+    def step(self, actions: dict[str, Value]) -> tuple[dict[str, Value], ...]:
+        """Step with the actions of the agents that are there; all possible agents are answered."""
+        there = list(self.env.agents)
+        observations, rewards, _, truncations, infos = self.env.step(
+            {agent: action for agent, action in actions.items() if agent in there}
+        )
+        is_over = not self.env.agents
+        is_cut = is_over and any(truncations.values())
+        last = there if is_over else self.env.agents
+        observations, infos = self._padded(last, observations, infos)
+        agents, self.agents = self.agents, [] if is_over else self.agents
+        return (
+            observations,
+            {agent: rewards.get(agent, 0.0) for agent in agents},
+            dict.fromkeys(agents, is_over and not is_cut),
+            dict.fromkeys(agents, is_cut),
+            infos,
+        )
+
+    def _padded(
+        self, there: Sequence[str], observations: dict[str, Value], infos: dict[str, Value]
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        active = {agent: agent in there for agent in self.possible_agents}
+        return {
+            agent: observations[agent]
+            if is_active
+            else create_zero_array(self.observation_space(agent))
+            for agent, is_active in active.items()
+        }, {
+            agent: {**infos.get(agent, {}), "active": int(is_active)}
+            for agent, is_active in active.items()
+        }
+
+
+class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
+    """Plays each episode with a number of agents that is drawn for it.
+
+    `possible_agents` and the spaces are those of the largest environment. An episode without a seed
+    follows from the one before.
+
+    Args:
+        make_env: number of agents -> parallel environment; called once for each number.
+        sizes: the numbers of agents, all as likely; one that stands there twice is twice as likely.
+
+    Raises:
+        SetupError: there are no sizes, or an environment has an agent that the largest one lacks
+            or whose spaces differ there.
+
+    Example:
+        >>> from pettingzoo.sisl import pursuit_v5
+        >>> env = ChangingAgents(lambda n: pursuit_v5.parallel_env(n_pursuers=n), [2, 4])
+        >>> observations, infos = env.reset(seed=0)
+        >>> len(observations) in (2, 4), len(env.possible_agents)
+        (True, 4)
+    """
+
+    def __init__(self, make_env: Callable[[int], Env], sizes: Sequence[int]) -> None:
+        if not sizes:
+            raise SetupError("sizes: should be one number of agents or more")
+        self._sizes = list(sizes)
+        self._envs = {size: make_env(size) for size in sorted(set(sizes))}
+        self._largest = self._envs[max(sizes)]
+        super().__init__(self._largest)
+        self.possible_agents = list(self._largest.possible_agents)
+        self._next = int(np.random.default_rng().integers(2**31))
+        for size, env in self._envs.items():
+            for agent in env.possible_agents:
+                if agent not in self.possible_agents or any(
+                    getattr(env, space)(agent) != getattr(self._largest, space)(agent)
+                    for space in ("observation_space", "action_space")
+                ):
+                    raise SetupError(
+                        f"make_env({size}) has {agent}: should be, with the same spaces, among "
+                        f"the agents of make_env({max(sizes)})"
+                    )
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Value] | None = None
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """Begin an episode; the seed also decides how many agents it has."""
+        seed = self._next if seed is None else seed
+        self._next = seed + 1
+        place = streams.generator(seed, "number of agents").integers(len(self._sizes))
+        self.env = self._envs[self._sizes[int(place)]]
+        observations, infos = self.env.reset(seed=seed, options=options)
+        return observations, infos
+
+    def observation_space(self, agent: str) -> Space[Value]:
+        """Return the space of what an agent observes, in episodes of every size."""
+        space: Space[Value] = self._largest.observation_space(agent)
+        return space
+
+    def action_space(self, agent: str) -> Space[Value]:
+        """Return the space of an agent's actions, in episodes of every size."""
+        space: Space[Value] = self._largest.action_space(agent)
+        return space
+
+    def close(self) -> None:
+        """Close the environments of all sizes."""
+        for env in self._envs.values():
+            env.close()
+
+
+REMOVED = "removed"
+FAILURE_MODES = {
+    "silent": "its actions are replaced by the task's no-op",
+    "frozen": "repeats the last action from before its failure, or its first one",
+    "blind": "observes zeros",
+    "noisy": "observes with Gaussian noise added, of the task's standard deviation",
+    REMOVED: "is not there, from the start",
+}
+
+
+class RobotFault(Record):
+    """Some robots that fail in one way.
+
+    Args:
+        mode: a key of `FAILURE_MODES`.
+        robots: how many; which ones follows from the seed. The sets of one seed are nested.
+        onset: when they fail [s].
+        duration: for how long [s]; None: for good.
+    """
+
+    error_type: ClassVar[type[SwarmLogisticsError]] = FaultError
+
+    mode: str
+    robots: PositiveInt
+    onset: NonNegativeFloat = 0.0
+    duration: PositiveFloat | None = None
+
+    def active(self, time: float) -> bool:
+        """Return whether the robots fail at a time [s]."""
+        return self.onset <= time < self.onset + (self.duration or np.inf)
+
+
+def failing_rows(seed: int, n_robots: int, n_failing: int) -> tuple[int, ...]:
+    """Return which of `n_robots` robots fail; those of fewer failures are among them."""
+    order = streams.generator(seed, "failing robots").permutation(n_robots)
+    return tuple(sorted(int(row) for row in order[:n_failing]))
+
+
+class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
+    """Lets robots fail: replaces their actions, or changes what they observe.
+
+    Args:
+        env: any parallel environment.
+        faults: of any mode but "removed": an environment can only start without a robot.
+        failures: for each mode what it needs: the no-op action of "silent", the standard deviation
+            of "noisy" in the observations' own units, None for the others.
+        period: length of a step [s].
+        rows: number of each agent in the whole swarm, by name; None: its place in
+            `possible_agents`.
+
+    Attributes:
+        given: what the environment itself let each agent observe, before any failure changed it.
+
+    Raises:
+        FaultError: a fault's mode is not among `failures`, or more robots fail than there are.
+        SetupError: "noisy" meets observations that are no floats.
+
+    Example:
+        >>> from pettingzoo.sisl import pursuit_v5
+        >>> faults = [RobotFault(mode="blind", robots=1)]
+        >>> env = FailingRobots(pursuit_v5.parallel_env(), faults, {"blind": None})
+        >>> observations, infos = env.reset(seed=0)
+    """
+
+    def __init__(
+        self,
+        env: Env,
+        faults: Iterable[RobotFault],
+        failures: Mapping[str, Value],
+        period: float = 1.0,
+        rows: Mapping[str, int] | None = None,
+    ) -> None:
+        super().__init__(env)
+        self._faults = tuple(faults)
+        self._failures, self._period = failures, period
+        self._rows = rows or {agent: row for row, agent in enumerate(env.possible_agents)}
+        self._seed = -1
+        for fault in self._faults:
+            if fault.mode == REMOVED or fault.mode not in failures:
+                known = ", ".join(sorted(set(failures) - {REMOVED}))
+                raise FaultError(f"fault mode {fault.mode!r}: should be one of {known}")
+            if fault.robots > len(self._rows):
+                raise FaultError(f"{fault.robots} robots fail of {len(self._rows)}")
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Value] | None = None
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """Begin an episode; the seed also decides which robots fail. None: the next seed."""
+        self._seed = self._seed + 1 if seed is None else seed
+        self._steps = 0
+        self._last: dict[str, Value] = {}
+        self._noise: dict[str, np.random.Generator] = {}
+        size = max(self._rows.values()) + 1
+        self._failing = [
+            (fault, set(failing_rows(self._seed, size, fault.robots))) for fault in self._faults
+        ]
+        observations, infos = self.env.reset(seed=seed, options=options)
+        return self._observed(observations), infos
+
+    def step(self, actions: dict[str, Value]) -> tuple[dict[str, Value], ...]:
+        """Step with the actions that failing robots execute; observations as they sense them."""
+        executed = {agent: self._executed(agent, action) for agent, action in actions.items()}
+        observations, *others = self.env.step(executed)
+        self._steps += 1
+        return self._observed(observations), *others
+
+    def _modes(self, agent: str) -> set[str]:
+        time, row = self._steps * self._period, self._rows[agent]
+        return {fault.mode for fault, rows in self._failing if row in rows and fault.active(time)}
+
+    def _executed(self, agent: str, action: Value) -> Value:
+        modes = self._modes(agent)
+        if "silent" in modes:
+            action = self._failures["silent"]
+        elif "frozen" in modes:
+            action = self._last.get(agent, action)
+        self._last[agent] = action
+        return action
+
+    def _observed(self, observations: dict[str, Value]) -> dict[str, Value]:
+        self.given = observations
+        return {agent: self._sensed(agent, value) for agent, value in observations.items()}
+
+    def _sensed(self, agent: str, value: Value) -> Value:
+        modes = self._modes(agent)
+        if "blind" in modes:
+            return _each(value, lambda part: np.zeros_like(part)[()])
+        if "noisy" in modes:
+            if agent not in self._noise:
+                self._noise[agent] = streams.generator(self._seed, "noisy robot", self._rows[agent])
+            return _each(value, lambda part: self._with_noise(agent, part))
+        return value
+
+    def _with_noise(self, agent: str, part: Value) -> Value:
+        clean = np.asarray(part)
+        if not np.issubdtype(clean.dtype, np.floating):
+            raise SetupError(
+                f"noisy: {agent} observes {clean.dtype}: should be floats; leave 'noisy' out of "
+                "the task's failures"
+            )
+        noise = self._noise[agent].normal(0.0, self._failures["noisy"], clean.shape)
+        return (clean + noise).astype(clean.dtype)
+
+
+def _each(value: Value, change: Value) -> Value:
+    """Return an observation with each array or number in it changed."""
+    if isinstance(value, dict):
+        return {name: _each(part, change) for name, part in value.items()}
+    if isinstance(value, tuple):
+        return tuple(_each(part, change) for part in value)
+    return change(value)
