@@ -126,14 +126,15 @@ def decide_homing_stock(
         push_y *= AVOID_GAIN
         item = requested_in_view(sensed, own)
         speed, gripper = 1.0, -1.0
-        if sensed[row.CARRYING] > 0.5 and own[known.STUCK] > STUCK:
+        stands = is_inside and sensed[row.CARRYING_REQUESTED] > 0.5  # to deliver
+        if sensed[row.CARRYING] > 0.5 and own[known.STUCK] > STUCK and not stands:
             gripper = 0.0
             angle = random_heading(keys[robot], random_headings[robot])
             x, y = math.cos(angle) + PULL * home_x, math.sin(angle) + PULL * home_y
             x, y = freest_direction(sensed, own, x + push_x, y + push_y)
         elif sensed[row.CARRYING_REQUESTED] > 0.5:
             gripper = 1.0 if not is_inside or own[known.FAILED] < 0.5 else -1.0
-            speed = 0.0 if is_inside and gripper > 0.0 else 1.0
+            speed = 0.0 if stands and gripper > 0.0 else 1.0
             if not is_inside and sure > 0.0:
                 x, y = home_x, home_y
             elif not is_inside:
