@@ -82,7 +82,7 @@ def findings(page: str) -> str:
         *_paper(block_of(page, "paper")),
     ]
     lines = [f"* {one}" for one in told]
-    note = f"95 % intervals over {seeds} seeds (30 for times), of networks over trainings as well."
+    note = f"95 % intervals over {seeds} seeds (10 for times), of networks over trainings as well."
     return "\n".join([*lines, "", note])
 
 
