@@ -6,6 +6,7 @@ that page.
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -200,7 +201,10 @@ def draw(rows: Rows, path: Path) -> None:
                     continue
                 colour = "#d55e00" if name.startswith(_LEARNED) else "#0072b2"
                 marker = "s" if name.startswith(_LEARNED) else "o"
-                axes.plot([one.low, one.high], [place, place], color=colour, linewidth=2.2)
+                if math.isinf(one.high - one.low):  # no limit: dotted from side to side
+                    axes.axhline(place, color=colour, linewidth=1.4, linestyle=":")
+                else:
+                    axes.plot([one.low, one.high], [place, place], color=colour, linewidth=2.2)
                 axes.plot([one.value], [place], marker, color=colour, markersize=5.5)
             axes.set_ylim(0.4, len(names) + 0.6)
             axes.spines[["top", "right", "left"]].set_visible(False)
