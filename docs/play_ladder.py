@@ -63,20 +63,22 @@ def _before(rungs: Sequence[str]) -> list[str]:
 
 def leans_block(found: StudyResults) -> str:
     """Return a row for each world: P of every policy."""
-    policies = [*found.policies]
-    least = found.plan.specification.ablations[0].policy.title
-    rows = []
-    for name in _tables(found):
-        cells = _cells(found, name)
-        rows.append((name, *(_p_and_stalls(cells[one]) for one in (least, *policies))))
+    worlds = {name: _cells(found, name) for name in _tables(found)}
+    for fault in found.plan.specification.faults:
+        ours = [c for c in found.cells if c.table == fault.title]
+        worlds[fault.title] = {c.policy: c for c in ours if c.arm.setting.name in fault.modes}
+    rows = [
+        (name, *(_p_and_stalls(cells[one]) for one in found.policies))
+        for name, cells in worlds.items()
+    ]
     seeds = found.plan.seeds
     text = (
         f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {len(seeds)} seeds from "
         f"{seeds[0]:,} on, of each training. {section.SATURATED}: in at least one run every item "
         "was delivered. Stalled: so many of the runs delivered less than a quarter of the median."
     )
-    head = ("", *(f"`{one}`" for one in (least, *policies)))
-    shares = _shares(_cells(found, _tables(found)[0]))
+    head = ("", *(f"`{one}`" for one in found.policies))
+    shares = _shares(next(iter(worlds.values())))
     return "\n".join([table(head, rows), "", text, shares])
 
 
