@@ -192,7 +192,7 @@ def costs_block(found: Mapping[str, Any]) -> str:
 
 ENTRANTS = (
     "swarm-dt", "swarm-dt-follow", "homing", "homing-stock", "central", "central-stock",
-    "ppo-delivery@all", "ppo-robust@all",
+    "ppo-delivery@all", "ppo-robust@all", "ppo-indicator@all",
 )  # fmt: skip
 
 

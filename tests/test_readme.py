@@ -36,7 +36,7 @@ def test_every_block_of_code_runs_as_written(capsys: pytest.CaptureFixture[str])
     delivered = re.findall(r"^(\S+) +(\d+) items", capsys.readouterr().out, flags=re.MULTILINE)
     rows = re.findall(r"^\| `(\S+)`.*? \| (\d+) \| (\d+) \| (\d+) \|$", README, flags=re.MULTILINE)
     assert delivered == [(name, count) for name, *counts in rows for count in counts]
-    assert len(rows) == 4
+    assert len(rows) == 5
     names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
     assert all(names["truncations"].values())
