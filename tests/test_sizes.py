@@ -48,7 +48,7 @@ MOST = {
     "files of the package": 126,
     "lines of code of studies and report": 4_156,
     "lines of tests": 19_030,
-    "lines of verification, benchmarks, interop and the scripts of docs": 6_093,
+    "lines of verification, benchmarks, interop and the scripts of docs": 6_095,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
