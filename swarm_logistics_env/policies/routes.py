@@ -49,28 +49,31 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
     It sweeps over the grid in four orders until no cell gets cheaper; in the open few are enough.
     """
     rows, columns = cost.shape
-    far = np.where(goal, 0.0, np.inf)
+    # A border that no way leads through spares the sweeps a check of every neighbour.
+    far = np.full((rows + 2, columns + 2), np.inf)
+    far[1:-1, 1:-1] = np.where(goal, 0.0, np.inf)
     while True:
         has_changed = False
         for order in range(4):
             for i in range(rows):
-                row = i if order % 2 == 0 else rows - 1 - i
+                row = i + 1 if order % 2 == 0 else rows - i
                 for j in range(columns):
-                    column = j if order < 2 else columns - 1 - j
-                    best = far[row, column]
-                    for down in range(-1, 2):
-                        for right in range(-1, 2):
-                            r, c = row + down, column + right
-                            if r < 0 or c < 0 or r >= rows or c >= columns:
-                                continue
-                            length = 1.4142135623730951 if down != 0 and right != 0 else 1.0
-                            through = far[r, c] + length * cost[row, column]
-                            best = min(best, through)
+                    column = j + 1 if order < 2 else columns - j
+                    straight = min(
+                        min(far[row - 1, column], far[row + 1, column]),
+                        min(far[row, column - 1], far[row, column + 1]),
+                    )
+                    aslant = min(
+                        min(far[row - 1, column - 1], far[row - 1, column + 1]),
+                        min(far[row + 1, column - 1], far[row + 1, column + 1]),
+                    )
+                    step = cost[row - 1, column - 1]
+                    best = min(straight + step, aslant + 1.4142135623730951 * step)
                     if best < far[row, column] - 1e-9:
                         far[row, column] = best
                         has_changed = True
         if not has_changed:
-            return far
+            return far[1:-1, 1:-1].copy()
 
 
 @kernel
