@@ -77,9 +77,10 @@ _PANELS |= {f"R, {mode}, m = 2": f"R, {mode}\n{what}" for mode, what in _MODES.i
 
 def findings(page: str) -> str:
     """Return what the tables show, as a list: the numbers stand beside their intervals."""
-    policies = block_of(page, "policies")
-    (seeds,) = re.findall(r"^(\d+) seeds from ", policies, flags=re.MULTILINE)
-    rows = rows_of(policies)
+    rows = rows_of(block_of(page, "policies"))
+    seeds, times, slow = (
+        _seeds(block_of(page, name)) for name in ("policies", "clearing", "leans")
+    )
     told = [
         *_clearing(block_of(page, "clearing")),
         *_learned(rows),
@@ -89,8 +90,16 @@ def findings(page: str) -> str:
         *_paper(block_of(page, "paper")),
     ]
     lines = [f"* {one}" for one in told]
-    note = f"95 % intervals over {seeds} seeds (10 for times), of networks over trainings too."
+    note = (
+        f"95 % intervals: {seeds} seeds ({times} for times, {slow} for slow lifting), of networks "
+        "over trainings too."
+    )
     return "\n".join([*lines, "", note])
+
+
+def _seeds(block: str) -> int:
+    (found,) = re.findall(r"(\d+) seeds from ", block)
+    return int(found)
 
 
 def _clearing(block: str) -> Iterator[str]:

@@ -1,0 +1,124 @@
+"""What the recipe of `ppo-robust` owes to its parts: `python docs/play_ablations.py`.
+
+Trains the recipe at half of its agent-steps, whole and without one part at a time, three times
+each (two hours of one core), plays all of them, and writes a table into docs/training.md. What is
+trained and played is kept in results/ablations, and the same command goes on after an interruption.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+from tables import rewritten, table
+
+from swarm_logistics_env.motion.frame import INPUTS
+from swarm_logistics_env.report import section
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.train.trainer import train
+from swarm_logistics_env.train.training import load_training
+
+ROOT = Path(__file__).parents[1]
+PAGE, OUT = ROOT / "docs" / "training.md", ROOT / "results" / "ablations"
+AGENT_STEPS, TRAININGS = 16_000_000, 3
+SEEDS, FIRST_SEED = 10, 430_000
+FAULT_INPUTS = ("failed", "stuck", "cannot_deliver", "cannot_lift", "delivering_in_vain")
+MEMORY = (
+    *FAULT_INPUTS, "requested_recently_held", "home_along", "home_aside", "home_certainty",
+    "kept_home_along", "kept_home_aside", "kept_home_distance",
+)  # fmt: skip
+WITHOUT: dict[str, tuple[str, ...]] = {
+    "whole": (), "without-memory": MEMORY, "without-fault-inputs": FAULT_INPUTS,
+    "without-stocking": (),
+}  # fmt: skip
+
+
+class WithoutInputs(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
+    """Keeps the weights of some inputs at zero, in the network that decides and in the critic."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        super().__init__()
+        self._columns = [INPUTS.index(name) for name in names]
+
+    def _on_training_start(self) -> None:
+        networks = self.model.policy.mlp_extractor
+        for first in (networks.policy_net[0], networks.value_net[0]):
+            mask = torch.ones_like(first.weight)
+            mask[:, self._columns] = 0.0
+            with torch.no_grad():
+                first.weight.mul_(mask)
+            # With a gradient of zero, Adam leaves a weight where it is.
+            first.weight.register_hook(mask.mul)
+
+    def _on_step(self) -> bool:
+        return True
+
+
+def train_one(name: str, seed: int) -> None:
+    """Train one variant from one seed, or go on with it, into OUT/NAME@SEED.safetensors."""
+    recipe = load_training("robust")
+    paid = {"stocking": 0.0} if name == "without-stocking" else {}
+    training = recipe.replace(
+        name=f"{name}-{seed}",
+        agent_steps=AGENT_STEPS,
+        seed=seed,
+        threads=1,
+        rewards=recipe.rewards | paid,
+        scores=recipe.scores.replace(seeds=0),
+    )
+    path = train(training, OUT / training.name, callbacks=[WithoutInputs(WITHOUT[name])])
+    shutil.copyfile(path, OUT / f"{name}@{seed}.safetensors")
+
+
+def study() -> Study:
+    """Return the study of all variants: every training over the same seeds."""
+    return Study(
+        name="ablations",
+        policies=[f"{OUT / name}@all.safetensors" for name in WITHOUT],
+        seeds=SEEDS,
+        first_seed=FIRST_SEED,
+        scenario=Scenario(restock=True),
+        faults=[
+            {"modes": ["FM1", "FM2", "FM3", "FM4"], "robots": [3]},
+            {"modes": ["dead"], "robots": [2], "onsets": [250.0], "title": "dies after 250 s"},
+        ],
+        out=OUT / "study",
+    )
+
+
+def block(found: StudyResults) -> str:
+    """Return a row for each variant: P without a fault and in every condition."""
+    arms = list(dict.fromkeys(cell.arm.setting for cell in found.cells))
+    cells = {(cell.policy, cell.arm.setting): cell for cell in found.cells}
+    rows = [(one, *(section.mean_p(cells[one, arm]) for arm in arms)) for one in found.policies]
+    text = (
+        f"P, items delivered in 500 s by 25 robots where items come back; {SEEDS} seeds from "
+        f"{FIRST_SEED:,} on, of each training. Three trainings are too few for a verdict."
+    )
+    return "\n".join([table(("", *map(str, arms)), rows), "", text])
+
+
+def main() -> None:
+    """Train what is missing, a training a core, then play all and write the table."""
+    cores = len(os.sched_getaffinity(0))
+    jobs = [(name, seed) for seed in range(TRAININGS) for name in WITHOUT]
+    spawned = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(cores, mp_context=spawned) as pool:
+        for done in [pool.submit(train_one, *job) for job in jobs]:
+            done.result()
+    ours = study()
+    ours.run(processes=cores)
+    text = rewritten(PAGE.read_text(encoding="utf-8"), {"ablations": block(ours.findings())})
+    PAGE.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
