@@ -43,7 +43,7 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 18_280,
+    "lines of code of the package": 18_281,
     "tokens of the package": 166_030,
     "files of the package": 126,
     "lines of code of studies and report": 4_156,
