@@ -231,7 +231,7 @@ def _title(policy: str, faults: Sequence[Fault]) -> str:
     return f"{_short(policy)}, {', '.join(counts) or 'no fault'}"
 
 
-LISTED = ("policies", "faults", "studies", "scenario")
+LISTED = ("policies", "trainings", "faults", "studies", "scenario")
 
 
 def list_command(
@@ -243,7 +243,7 @@ def list_command(
         bool, typer.Option("--json", help="Of a scenario: JSON, which --scenario reads.")
     ] = False,
 ) -> None:
-    """List policies, faults (failure modes), studies, or every condition of a scenario."""
+    """List policies, trainings, failure modes, studies, or the conditions of a scenario."""
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.presets import PRESETS
 
@@ -266,6 +266,12 @@ def list_command(
     elif what == "policies":
         line = "Your own is package.module:Class, or the path of a file that `train` wrote."
         show_table("Policies", ("name", "kind", "about"), known_policies(), line)
+    elif what == "trainings":
+        from swarm_logistics_env.train.training import load_training, preset_names
+
+        presets = [(name, load_training(name)) for name in preset_names()]
+        trained = ((name, f"{one.agent_steps / 1e6:g}", one.about) for name, one in presets)
+        show_table("Trainings", ("name", "million agent-steps", "about"), trained)
     elif what == "faults":
         rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
         line = (

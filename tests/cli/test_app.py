@@ -15,6 +15,7 @@ from swarm_logistics_env.cli.terminal import show
 from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.train import preset_names
+from swarm_logistics_env.train.training import preset_names
 from swarm_logistics_env.warehouse import FAILURE_MODES
 
 SMALL = [
@@ -58,7 +59,7 @@ SMALL = [
         (["study", "run", "quick", "--out", "x", "--shard", "0/2"], "i/n with i from 1 to n"),
         (["study", "run", "quick", "--out", "x", "--engine", "slurm"], "no engine 'slurm'"),
         (["study", "compare", "nowhere", "nowhere", "--fail-if", "R"], "should be [possibly]"),
-        (["list", "robots"], "list robots: should be policies, faults, studies"),
+        (["list", "robots"], "list robots: should be policies, trainings, faults, studies"),
         (["study", "plan", "quick", "--policy", "nobody"], "'nobody'"),
         (["study", "report", "nowhere"], "no study in nowhere"),
         (["fly"], "fly"),
@@ -196,7 +197,11 @@ def test_scenario_faults_studies_policies_and_presets_are_listed(
     preset = ["list", "scenario", "--preset", "paper_scalability", "--json"]
     assert app.run(preset) == 0
     assert Scenario.from_json(capsys.readouterr().out) == Scenario.preset("paper_scalability")
-    for what, names in (("faults", FAILURE_MODES), ("studies", PRESETS)):
+    for what, names in (
+        ("faults", FAILURE_MODES),
+        ("studies", PRESETS),
+        ("trainings", preset_names()),
+    ):
         assert app.run(["list", what]) == 0
         printed = capsys.readouterr().out
         assert all(f"| {name} | " in printed for name in names)
