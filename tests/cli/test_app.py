@@ -15,7 +15,6 @@ from swarm_logistics_env.cli.terminal import show
 from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.train import preset_names
-from swarm_logistics_env.train.training import preset_names
 from swarm_logistics_env.warehouse import FAILURE_MODES
 
 SMALL = [
@@ -199,8 +198,8 @@ def test_scenario_faults_studies_policies_and_presets_are_listed(
     assert Scenario.from_json(capsys.readouterr().out) == Scenario.preset("paper_scalability")
     for what, names in (
         ("faults", FAILURE_MODES),
-        ("studies", PRESETS),
         ("trainings", preset_names()),
+        ("studies", PRESETS),
     ):
         assert app.run(["list", what]) == 0
         printed = capsys.readouterr().out
