@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
@@ -19,9 +20,8 @@ from .inputs import (
     positive_mean,
     same_seeds,
 )
-from .ratio import MIN_SEEDS, Term, paired_ratio, unpaired_ratio
+from .ratio import MIN_SEEDS, Term, over_trainings, paired_ratio, ratio_of_samples, welch
 from .summaries import at_stake, pairing_correlation
-from .trainings import LEAST_TRAININGS, ratio_over_trainings
 
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
@@ -161,6 +161,9 @@ class Estimate:
 # The two differences of two seeds are close to each other by chance so often, counts being whole
 # numbers, that their spread says nothing.
 LEAST_SEEDS = 3
+# With three trainings an interval is 4.3 standard errors wide on each side, and one of three that
+# is lucky turns it: such few are shown, and decide nothing.
+LEAST_TRAININGS = 5
 
 
 class Options(TypedDict, total=False):
@@ -248,7 +251,7 @@ def _tested(
     asking = {"offset": offset, "threshold": threshold, "confidence": asked.confidence}
     skewness, correlation, stakes = None, None, (0.0, 0.0)
     if asked.n_trainings is not None:
-        test = ratio_over_trainings(terms, paired=paired, **asking)
+        test = ratio_of_samples(terms, partial(over_trainings, paired=paired), **asking)
     elif paired:
         correlation = pairing_correlation(terms[0].sample, terms[1].sample)
         num = np.asarray(sum(term.in_num * term.sample for term in terms))
@@ -260,7 +263,7 @@ def _tested(
         if not test.degenerate and n_seeds >= LEAST_SEEDS:
             skewness = _skewness(num - null * den)
     else:
-        test = unpaired_ratio(terms, **asking)
+        test = ratio_of_samples(terms, welch, **asking)
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
     leaning = float(test.value) - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
