@@ -192,7 +192,7 @@ def judge(
     indicator: str,
     terms: Mapping[str, tuple[ArrayLike, float, float]],
     *,
-    offset: float,
+    offset: float = 0.0,
     threshold: float = 0.0,
     confidence: float = 0.95,
     paired: bool = True,
@@ -304,20 +304,11 @@ def _checked(
     paired: bool,
     identical: bool,
 ) -> dict[str, Term]:
-    weighted = {
-        name: Term(performance(name, sample, or_trainings=True), in_num, in_den)
-        for name, (sample, in_num, in_den) in terms.items()
-    }
+    samples = {name: performance(name, p, or_trainings=True) for name, (p, *_) in terms.items()}
     # A policy that is not trained is the same beside every training.
-    most = max((len(term.sample) for term in weighted.values() if term.sample.ndim == 2), default=0)
+    most = max((len(p) for p in samples.values() if p.ndim == 2), default=0)
     if most:
-        weighted = {
-            name: term._replace(sample=np.tile(term.sample, (most, 1)))
-            if term.sample.ndim == 1
-            else term
-            for name, term in weighted.items()
-        }
-    samples = {name: term.sample for name, term in weighted.items()}
+        samples = {n: p if p.ndim == 2 else np.tile(p, (most, 1)) for n, p in samples.items()}
     if paired:
         same_seeds(**samples)
     for name in saturated:
@@ -332,7 +323,7 @@ def _checked(
                 )
     *_, (reference_name, reference) = samples.items()
     positive_mean(reference_name, reference)
-    return weighted
+    return {name: Term(samples[name], *weights) for name, (_, *weights) in terms.items()}
 
 
 def _skewness(difference: Numbers) -> float:
