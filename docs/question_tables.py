@@ -178,7 +178,6 @@ def _by_seed(found: StudyResults, test: Verdict, arm: Arm) -> NDArray[np.float64
 def deliveries_after(found: StudyResults, arm: Arm) -> NDArray[np.float64]:
     """Return the deliveries of every seed after the repair, shape (n_seeds,)."""
     times = found.times_of(arm)
-    assert times is not None  # the study has been played
     return np.array([np.count_nonzero(run > REPAIRED_AT) for run in times], dtype=np.float64)
 
 

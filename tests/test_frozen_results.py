@@ -16,7 +16,7 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.results import StudyResults, frame_of_verdicts, judge
+from swarm_logistics_env.studies.results import VERDICT_COLUMNS, StudyResults, frame, judge
 from swarm_logistics_env.tasks import Outcome
 
 FROZEN = Path(__file__).parent / "frozen"
@@ -60,7 +60,7 @@ def conditions(study: Study) -> Iterator[tuple[str, str]]:
 
 def verdicts(results: StudyResults) -> list[dict[str, Any]]:
     """Return the words and numbers of every comparison, to nine digits."""
-    rows = frame_of_verdicts(results.verdicts).to_dict("records")
+    rows = frame(results.verdicts, VERDICT_COLUMNS).to_dict("records")
     return [
         {name: row[name] for name in WORDS}
         | {name: None if row[name] != row[name] else float(f"{row[name]:.9g}") for name in NUMBERS}

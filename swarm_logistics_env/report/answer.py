@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import zip_longest
 
 from swarm_logistics_env import spi
@@ -143,10 +144,10 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     """
     numbered = [(number, test) for number, test in enumerate(results.verdicts)]
     lines: list[Line] = []
-    for alike in (_one, _one_mode, _one_factor, _one_indicator):
+    for shared in range(4):
         lines = [
             _line([test for _, test in here], tuple(n for n, _ in here))
-            for here in grouped(numbered, lambda one: alike(*one)).values()  # noqa: B023
+            for here in grouped(numbered, partial(_alike, shared)).values()
         ]
         if most is None or len(lines) <= most:
             break
@@ -171,22 +172,20 @@ def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
     yield from (line for line in lines if line not in undefined)
 
 
-def _one(number: int, test: Verdict) -> tuple[object, ...]:
-    return (number,)
+def _alike(shared: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
+    """Return what the questions of a line have in common.
 
-
-def _one_mode(number: int, test: Verdict) -> tuple[object, ...]:
-    return _one_factor(number, test) if test.compared.changed.setting.kind == "fault" else (number,)
-
-
-def _one_factor(_: int, test: Verdict) -> tuple[object, ...]:
-    setting = test.compared.changed.setting
-    return (*_one_indicator(_, test), setting.name, setting.onset, test.compared.threshold)
-
-
-def _one_indicator(_: int, test: Verdict) -> tuple[object, ...]:
-    compared = test.compared
-    return compared.policy, compared.table, compared.indicator
+    Args:
+        shared: 0: a line has one question; 1: those of one failure mode; 2: those of any one
+            factor; 3: those of an indicator in a table.
+        numbered: a verdict, and its place among those of the study.
+    """
+    number, test = numbered
+    compared, after = test.compared, test.after
+    if shared == 0 or (shared == 1 and after.kind != "fault"):
+        return (number,)
+    indicator = compared.policy, compared.table, compared.indicator
+    return indicator if shared == 3 else (*indicator, after.name, after.onset, compared.threshold)
 
 
 def _line(tests: Sequence[Verdict], numbers: tuple[int, ...]) -> Line:

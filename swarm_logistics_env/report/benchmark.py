@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
@@ -106,27 +104,8 @@ def _held_out(results: StudyResults) -> dict[Arm, Cell]:
     }
 
 
-class Place(NamedTuple):
-    """An entry's place among others by mean score.
-
-    Attributes:
-        name: of the entry.
-        score: mean, with its interval over trainings and seeds.
-        rank: 1: the best.
-        best, worst: limits of the ranks in 95 % of resamples of trainings and seeds.
-        stability: share of resamples in which it has this rank.
-    """
-
-    name: str
-    score: Interval
-    rank: int
-    best: int
-    worst: int
-    stability: float
-
-
-def places(entries: Mapping[str, NDArray[np.float64]]) -> tuple[Place, ...]:
-    """Return the entries in the order of their scores, and how stable that order is.
+def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
+    """Return the table of entries by score, and how stable that order is.
 
     Seeds are resampled for all entries together, as they are played over the same ones, trainings
     for each entry by itself. Only a single training has no spread over trainings.
@@ -144,36 +123,17 @@ def places(entries: Mapping[str, NDArray[np.float64]]) -> tuple[Place, ...]:
             drawn[number, place] = one[rng.integers(len(one), size=len(one))][:, seeds].mean()
     found = _ranks(np.array([[one.mean() for one in scores.values()]]))[0]
     ranks = _ranks(drawn)
-    limits = np.percentile(ranks, (2.5, 97.5), axis=0, method="nearest").astype(int)
-    rows = [
-        Place(
-            name,
-            spi.mean_interval(entries[name]),
-            int(found[place]),
-            int(limits[0, place]),
-            int(limits[1, place]),
-            float((ranks[:, place] == found[place]).mean()),
-        )
-        for place, name in enumerate(scores)
-    ]
-    return tuple(sorted(rows, key=lambda one: one.rank))
-
-
-def _ranks(scores: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return 1 + how many entries score higher, of every row."""
-    return np.asarray(1 + (scores[:, None, :] > scores[:, :, None]).sum(axis=2))
-
-
-def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
-    """Return the table of entries by score."""
+    best, worst = np.percentile(ranks, (2.5, 97.5), axis=0, method="nearest").astype(int)
+    same = (ranks == found).mean(axis=0)
+    names = list(entries)
     rows = tuple(
         (
-            one.name,
-            bracketed(one.score, 1),
-            f"{one.rank} [{one.best}, {one.worst}]",
-            f"{one.stability:.0%}",
+            names[one],
+            bracketed(spi.mean_interval(entries[names[one]]), 1),
+            f"{found[one]} [{best[one]}, {worst[one]}]",
+            f"{same[one]:.0%}",
         )
-        for one in places(entries)
+        for one in np.argsort(found, kind="stable")
     )
     return Section(
         "Benchmark of robustness: entries by score",
@@ -184,3 +144,8 @@ def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
             f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
         ),
     )
+
+
+def _ranks(scores: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return 1 + how many entries score higher, of every row."""
+    return np.asarray(1 + (scores[:, None, :] > scores[:, :, None]).sum(axis=2))

@@ -8,7 +8,7 @@ from functools import partial
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
 from swarm_logistics_env.studies.comparison import Comparison
 from swarm_logistics_env.studies.measures import RateCurve, mid_run_faults, rate_curves, window_of
-from swarm_logistics_env.studies.results import StudyResults, frame_of_verdicts
+from swarm_logistics_env.studies.results import VERDICT_COLUMNS, StudyResults, frame
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 
 from . import drawing
@@ -43,7 +43,7 @@ def forest_figure(results: StudyResults, found: Answer) -> Figure:
     return Figure(
         "answer",
         f"{found.asked} Every question with its 95 % interval. {_MARKS}.{_capped(tests)}",
-        frame_of_verdicts(tests)[_COLUMNS],
+        frame(tests, VERDICT_COLUMNS)[_COLUMNS],
         0.9 + 0.27 * len(rows),
         partial(drawing.forest, rows=rows),
     )
@@ -61,7 +61,7 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
         yield Figure(
             slug(*(definition.symbol for definition in _definitions(tests)), *names),
             caption + _capped(tests),
-            frame_of_verdicts(tests)[_COLUMNS],
+            frame(tests, VERDICT_COLUMNS)[_COLUMNS],
             0.5 + 2.5 * len(panels),
             partial(drawing.intervals, panels=panels),
         )

@@ -13,7 +13,7 @@ from swarm_logistics_env.studies.measures import (
     agreements,
     resiliences,
 )
-from swarm_logistics_env.studies.presets import Reference, load_reference
+from swarm_logistics_env.studies.presets import Reference
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
@@ -29,13 +29,8 @@ def tables(results: StudyResults) -> Iterator[Section]:
 
     Each has a table of P and the first indicator, then one of each further indicator.
     """
-    for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
-        rows = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
-        tests = [
-            test
-            for test in results.verdicts
-            if (test.compared.policy, test.compared.table) == (policy, table)
-        ]
+    tests = grouped(results.verdicts, lambda test: (test.compared.policy, test.compared.table))
+    for place, rows in grouped(results.cells, lambda cell: (cell.policy, cell.table)).items():
         published = any(cell.published is not None for cell in rows)
         setting: CellColumn = ("", lambda cell: cell.words)
         columns = [setting]
@@ -43,14 +38,15 @@ def tables(results: StudyResults) -> Iterator[Section]:
             columns.append(("P paper", _published))
         columns.append(("P ours [95 %]" if published else "P [95 %]", section.mean_p))
         columns.append(("one run [95 %]", _one_run))
-        title = f"{policy}: {table}"
-        for indicator, asked in grouped(tests, lambda test: test.compared.indicator).items():
+        whole = title = ": ".join(place)
+        asked_here = tests.get(place, ())
+        for indicator, asked in grouped(asked_here, lambda test: test.compared.indicator).items():
             answers = _answers(indicator, asked, published=published)
             yield Section.table(title, rows, [*columns, *answers])
             # P is printed once: the tables of further indicators hold what was asked alone.
             changed = {test.compared.changed for test in asked}
             rows = [cell for cell in rows if cell.arm in changed]
-            columns, title = [setting], f"{policy}: {table}, continued"
+            columns, title = [setting], f"{whole}, continued"
     yield from map(_agreement, agreements(results))
     yield from _sentences(results)
     yield from _times_to_clear(results)
@@ -94,11 +90,10 @@ def _claimed(test: Verdict) -> str:
 
 def _sentences(results: StudyResults) -> Iterator[Section]:
     """Yield what the reference's text says beside what each policy does."""
-    reference = load_reference(results.plan.specification.reference)
-    for policy in results.policies if reference else ():
-        tests = [test for test in results.verdicts if test.compared.policy == policy]
-        said = sentences(reference, tests) if reference else []
-        if said and reference:
+    if (reference := results.reference) is None:
+        return
+    for policy, tests in grouped(results.verdicts, lambda test: test.compared.policy).items():
+        if said := sentences(reference, tests):
             columns = ("the text", "claim", "ours [95 %]", "verdict")
             yield Section(f"{policy}: what the text says", columns, tuple(said), (reference.whose,))
 

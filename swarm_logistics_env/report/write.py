@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from swarm_logistics_env.errors import StudyError, how_to_install
 from swarm_logistics_env.records import becoming, plain
 from swarm_logistics_env.spi.estimate import SIGNS
-from swarm_logistics_env.studies.results import StudyResults, frame_of_cells, frame_of_verdicts
+from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, StudyResults, frame
 from swarm_logistics_env.studies.runs import write_csv
 
 from .document import Document, document
@@ -43,8 +43,8 @@ def write_report(
     pictures, page = directory / "figures", directory / "report.html"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
-        write_csv(paths[1], frame_of_cells(results.cells))
-        write_csv(paths[2], frame_of_verdicts(results.verdicts))
+        write_csv(paths[1], frame(results.cells, CELL_COLUMNS))
+        write_csv(paths[2], frame(results.verdicts, VERDICT_COLUMNS))
         write_text(paths[3], latex_tables((whole.answer.section, *whole.summary)))
         for figure in whole.figures():
             write_csv(pictures / f"{figure.name}.csv", figure.data)

@@ -43,7 +43,6 @@ def scalability(
     return judge(
         "S",
         {"p_nm": (p_nm, gain, 0.0), "p_n": (p_n, -gain, 1.0)},
-        offset=0.0,
         **options,
     )
 
@@ -80,7 +79,6 @@ def fault_tolerance(
     return judge(
         "FT",
         {"p_f": (p_f, 1.0, 0.0), "p_s": (p_s, -1.0, 0.0), "p_o": (p_o, 0.0, 1.0)},
-        offset=0.0,
         **options,
     )
 
@@ -113,10 +111,7 @@ def robustness(
         raise IndicatorError(f"m = {faulty}: should be at most n = {robots} robots")
     return judge(
         "R",
-        {
-            "p_f": (p_f, 1.0, 0.0),
-            "p_o": (p_o, -1.0, 1.0),
-        },
+        {"p_f": (p_f, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)},
         offset=faulty / robots,
         **options,
     )
@@ -170,7 +165,6 @@ def relative_change(p_o: ArrayLike, p_new: ArrayLike, **options: Unpack[Options]
     return judge(
         "change",
         {"p_new": (p_new, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)},
-        offset=0.0,
         **options,
     )
 
@@ -245,9 +239,7 @@ class Definition:
         if self.compares == "size":
             return None
         original, changed, *removed = self.performances.values()
-        if removed:
-            return f"{changed} within {100 * margin:.3g} % of {original} from {removed[0]}"
-        return f"{changed} within {100 * margin:.3g} % of {original}"
+        return f"{changed} within {100 * margin:.3g} % of {' from '.join([original, *removed])}"
 
 
 DEFINITIONS: dict[str, Definition] = {

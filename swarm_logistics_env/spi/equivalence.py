@@ -128,7 +128,6 @@ def equivalence(
         return judge(
             "change",
             terms,
-            offset=0.0,
             threshold=threshold,
             confidence=1.0 - 2.0 * alpha,
             paired=paired,

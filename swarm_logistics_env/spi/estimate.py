@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
@@ -19,9 +20,8 @@ from .inputs import (
     positive_mean,
     same_seeds,
 )
-from .ratio import MIN_SEEDS, Term, paired_ratio, unpaired_ratio
+from .ratio import MIN_SEEDS, Term, over_trainings, paired_ratio, ratio_of_samples, welch
 from .summaries import at_stake, pairing_correlation
-from .trainings import LEAST_TRAININGS, ratio_over_trainings
 
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
@@ -161,6 +161,9 @@ class Estimate:
 # The two differences of two seeds are close to each other by chance so often, counts being whole
 # numbers, that their spread says nothing.
 LEAST_SEEDS = 3
+# With three trainings an interval is 4.3 standard errors wide on each side, and one of three that
+# is lucky turns it: such few are shown, and decide nothing.
+LEAST_TRAININGS = 5
 
 
 class Options(TypedDict, total=False):
@@ -189,7 +192,7 @@ def judge(
     indicator: str,
     terms: Mapping[str, tuple[ArrayLike, float, float]],
     *,
-    offset: float,
+    offset: float = 0.0,
     threshold: float = 0.0,
     confidence: float = 0.95,
     paired: bool = True,
@@ -248,7 +251,7 @@ def _tested(
     asking = {"offset": offset, "threshold": threshold, "confidence": asked.confidence}
     skewness, correlation, stakes = None, None, (0.0, 0.0)
     if asked.n_trainings is not None:
-        test = ratio_over_trainings(terms, paired=paired, **asking)
+        test = ratio_of_samples(terms, partial(over_trainings, paired=paired), **asking)
     elif paired:
         correlation = pairing_correlation(terms[0].sample, terms[1].sample)
         num = np.asarray(sum(term.in_num * term.sample for term in terms))
@@ -260,7 +263,7 @@ def _tested(
         if not test.degenerate and n_seeds >= LEAST_SEEDS:
             skewness = _skewness(num - null * den)
     else:
-        test = unpaired_ratio(terms, **asking)
+        test = ratio_of_samples(terms, welch, **asking)
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
     leaning = float(test.value) - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
@@ -301,20 +304,11 @@ def _checked(
     paired: bool,
     identical: bool,
 ) -> dict[str, Term]:
-    weighted = {
-        name: Term(performance(name, sample, or_trainings=True), in_num, in_den)
-        for name, (sample, in_num, in_den) in terms.items()
-    }
+    samples = {name: performance(name, p, or_trainings=True) for name, (p, *_) in terms.items()}
     # A policy that is not trained is the same beside every training.
-    most = max((len(term.sample) for term in weighted.values() if term.sample.ndim == 2), default=0)
+    most = max((len(p) for p in samples.values() if p.ndim == 2), default=0)
     if most:
-        weighted = {
-            name: term._replace(sample=np.tile(term.sample, (most, 1)))
-            if term.sample.ndim == 1
-            else term
-            for name, term in weighted.items()
-        }
-    samples = {name: term.sample for name, term in weighted.items()}
+        samples = {n: p if p.ndim == 2 else np.tile(p, (most, 1)) for n, p in samples.items()}
     if paired:
         same_seeds(**samples)
     for name in saturated:
@@ -329,7 +323,7 @@ def _checked(
                 )
     *_, (reference_name, reference) = samples.items()
     positive_mean(reference_name, reference)
-    return weighted
+    return {name: Term(samples[name], *weights) for name, (_, *weights) in terms.items()}
 
 
 def _skewness(difference: Numbers) -> float:

@@ -49,7 +49,6 @@ def resilience_index(
             "faulty": (after_onset("faulty", faulty), 1.0, 0.0),
             "reference": (after_onset("reference", reference), 0.0, 1.0),
         },
-        offset=0.0,
         **options,
     )
 

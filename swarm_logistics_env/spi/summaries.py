@@ -93,8 +93,7 @@ def median_interval(times: ArrayLike, confidence: float = 0.95) -> Interval:
     if known.ndim != 1 or not known.size or not (known >= 0.0).all():
         raise IndicatorError(f"times: should be a sequence of times from 0 on, got {times!r}")
     ascending, n = np.sort(known), known.size
-    middle = ascending[(n - 1) // 2], ascending[n // 2]
-    value = float(middle[0] if middle[0] == middle[1] else sum(middle) / 2)
+    value = float(np.median(known))
     # The k-th time from either end is a limit where at most so few are expected beyond it.
     k = int(np.count_nonzero(bdtr(np.arange(n // 2), n, 0.5) <= (1.0 - confidence) / 2))
     if not k:

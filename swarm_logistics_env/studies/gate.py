@@ -70,8 +70,8 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     matches = list[tuple[str, Cell, Cell]]()
     unmatched, notes = list[tuple[str, str, tuple[str, ...]]](), list[str]()
     for study, judged, other, others, known in (
-        ("old", before, "new", after, {*partners.values()}),
-        ("new", after, "old", before, {*partners}),
+        ("old", before, "new", after, partners.values()),
+        ("new", after, "old", before, partners.keys()),
     ):
         for label in (label for label in judged if label not in known):
             problem = f"policy {label!r} of the {study} study has no match: the {other} study "
@@ -96,9 +96,8 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     seeds = None
     if old.plan.paired and new.plan.paired:
         seeds = tuple(sorted({*old.plan.seeds} & {*new.plan.seeds}))
-    for study, results in (("old", old), ("new", new)) if seeds else ():
-        extra = [seed for seed in results.plan.seeds if seed not in (seeds or ())]
-        if seeds and extra:
+    for study, results in (("old", old), ("new", new)):
+        if seeds and (extra := sorted({*results.plan.seeds} - {*seeds})):
             notes.append(
                 f"Only in the {study} study, and left out: seeds {seeds_in_words(extra)}. "
                 f"Runs are paired over the shared seeds, {seeds_in_words(seeds)}."
@@ -132,8 +131,8 @@ def _name(policy: str, cell: Cell) -> str:
 
 SUBJECTS = "|".join(DEFINITIONS)
 _GATE = re.compile(
-    rf"(?P<possibly>possibly\s+)?(?P<subject>{SUBJECTS})\s*(?P<sign>[<>])\s*(?P<number>\S+)"
-    r"(\s+at\s+(?P<at>.+))?"
+    rf"(?P<possibly>possibly\s+)?(?P<subject>{SUBJECTS})\s*(?P<sign>[<>])\s*"
+    r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)(\s+at\s+(?P<at>.+))?"
 )
 
 
@@ -169,19 +168,13 @@ class Gate:
                 f"gate {text!r}: should be [possibly] {SUBJECTS} <|> NUMBER [at TEXT], "
                 'e.g. "R < 0" or "possibly change < -0.1 at N = 25"'
             )
-        try:
-            number = float(match["number"])
-        except ValueError:
-            number = float("nan")
-        if not abs(number) < float("inf"):
-            raise StudyError(f"gate {text!r}: {match['number']} should be a number")
         return cls(
             text.strip(),
             match["possibly"] is not None,
             match["subject"],
             match["sign"] == "<",
-            number,
-            (match["at"] or "").strip(),
+            float(match["number"]),
+            match["at"] or "",
         )
 
     def holds_for(self, value: float) -> bool:

@@ -201,10 +201,7 @@ def _split(
     arms_of: Callable[[Sequence[Trial]], _Arms],
 ) -> Iterator[tuple[str, _Arms]]:
     """Yield a table for each group of rows that have the same fixed values and differ in an arm."""
-    groups: dict[_Fixed, list[Trial]] = {}
-    for row in rows:
-        groups.setdefault(fixed(row), []).append(row)
-    tables = {key: arms_of(group) for key, group in groups.items()}
+    tables = {key: arms_of(group) for key, group in grouped(rows, fixed).items()}
     tables = {key: arms for key, arms in tables.items() if len(arms) > 1}
     for key, arms in tables.items():
         told = ", ".join(f"{name} = {value:g}" for name, value in key)

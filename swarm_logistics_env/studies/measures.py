@@ -61,10 +61,10 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
     for comparison in mid_run_faults(results):
         m, n = comparison.changed.setting.value, comparison.n_robots
-        faulty, whole = map(results.outcomes_of, (comparison.changed, comparison.original))
-        removed = results.outcomes_of(comparison.removed) if comparison.removed else None
-        if faulty is None or whole is None or (comparison.removed and removed is None):
+        whole, *third, faulty = map(results.outcomes_of, comparison.arms)
+        if not (whole and faulty and all(third)):
             continue
+        removed = third[0] if third else None
         onset, paired = comparison.changed.setting.onset, results.plan.paired
         indices = (
             _index(faulty, removed, onset, 1.0, paired=paired) if removed else None,
@@ -120,14 +120,13 @@ def _null(results: StudyResults, comparison: Comparison) -> tuple[Times, Times]:
         StudyError: why there can be no times to come back.
     """
     null = results.plan.nulls.get((comparison.policy, comparison.table))
-    original = results.times_of(comparison.original)
-    other = results.times_of(null) if null else None
-    if null is None or original is None or other is None:
+    other = results.times_of(null) if null else ()
+    if null is None or not other:
         raise StudyError("the runs of the no-fault null are missing")
     arms = (*comparison.arms, null)
-    if any(outcome.all_delivered for arm in arms for outcome in results.outcomes_of(arm) or ()):
+    if any(outcome.all_delivered for arm in arms for outcome in results.outcomes_of(arm)):
         raise StudyError("the items ran out, and the rate with them: use restock")
-    return original, other
+    return results.times_of(comparison.original), other
 
 
 def _repair_curve(comparison: Comparison, times: Times, reference: Times) -> RepairCurve:
@@ -177,7 +176,7 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
     }
     curves = []
     for runs, arm in arms.items():
-        times = results.times_of(arm) if arm else None
+        times = results.times_of(arm) if arm else ()
         if times:
             counts = [
                 np.searchsorted(one, seconds, side="right")

@@ -75,18 +75,17 @@ class StudyResults:
         found = self.outcomes.get((arm.case.key, seed))
         return None if found is None or found.error is not None else found
 
-    def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...] | None:
-        """Return an arm's outcomes by seed, or None if one failed, is missing or has no times."""
+    def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...]:
+        """Return an arm's outcomes by seed; none if one failed, is missing or has no times."""
         found = [self.outcome(arm, seed) for seed in self.plan.seeds]
         complete = tuple(one for one in found if one is not None and one.untimed is None)
         # Unpaired results need not be equally many everywhere.
         is_whole = len(complete) == len(found) or not self.plan.paired
-        return complete if complete and is_whole else None
+        return complete if is_whole else ()
 
-    def times_of(self, arm: Arm) -> Times | None:
-        """Return an arm's delivery times [s] seed by seed; None as `outcomes_of`."""
-        outcomes = self.outcomes_of(arm)
-        return None if outcomes is None else tuple(outcome.delivery_times for outcome in outcomes)
+    def times_of(self, arm: Arm) -> Times:
+        """Return an arm's delivery times [s] seed by seed; none as `outcomes_of`."""
+        return tuple(outcome.delivery_times for outcome in self.outcomes_of(arm))
 
 
 def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -> StudyResults:
@@ -101,7 +100,7 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
     reference = load_reference(plan.specification.reference)
     looks = declared.looks if declared else plan.specification.looks
     exploratory = declared is not None and not declared.covers(plan)
-    verdicts: Sequence[Verdict] = ()
+    verdicts: Iterable[Verdict] = ()
     if plan.specification.until_clear:
         found = standing(plan, outcomes)
         plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
@@ -117,29 +116,23 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         )
         for policy, table, arm in plan.cells
     )
-    by_table: dict[tuple[str, str], dict[Arm, Cell]] = {}
-    for one in cells:
-        by_table.setdefault((one.policy, one.table), {})[one.arm] = one
-    verdicts = verdicts or [
-        *under_holm(
-            [
-                judge_one(
-                    each, by_table[each.policy, each.table], paired=plan.paired, margin=margin
-                )
-                for each in plan.comparisons
-            ]
-        )
-    ]
-    return StudyResults(
+    results = StudyResults(
         plan,
         reference,
         cells,
-        tuple(_beside(reference, one) for one in verdicts),
+        (),
         exploratory=exploratory,
         outcomes=outcomes,
         looks=looks,
         late_margin=declared is not None and declared.margin != margin,
     )
+    verdicts = verdicts or under_holm(
+        [
+            judge_one(each, results.cells_of(each), paired=plan.paired, margin=margin)
+            for each in plan.comparisons
+        ]
+    )
+    return replace(results, verdicts=tuple(_beside(reference, one) for one in verdicts))
 
 
 def _beside(reference: Reference | None, verdict: Verdict) -> Verdict:
@@ -227,17 +220,8 @@ VERDICT_COLUMNS: Columns = {
 }
 
 
-def frame_of_cells(cells: Iterable[Cell]) -> pd.DataFrame:
-    """Return cells as a table with the columns of `CELL_COLUMNS`, for CSV and for users."""
-    return _frame(list(cells), CELL_COLUMNS)
-
-
-def frame_of_verdicts(verdicts: Iterable[Verdict]) -> pd.DataFrame:
-    """Return verdicts as a table with the columns of `VERDICT_COLUMNS`, for CSV and for users."""
-    return _frame(list(verdicts), VERDICT_COLUMNS)
-
-
-def _frame(rows: Sequence[Cell | Verdict], columns: Columns) -> pd.DataFrame:
+def frame(rows: Sequence[Cell] | Sequence[Verdict], columns: Columns) -> pd.DataFrame:
+    """Return cells or verdicts as a table with these columns, for CSV and for users."""
     import pandas as pd
 
     return pd.DataFrame(

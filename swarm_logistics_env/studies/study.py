@@ -18,7 +18,7 @@ from .importing import imported_plan
 from .plan import Plan, Shard, make_plan
 from .play import Engine, Tally, engine_named, play
 from .presets import load_preset
-from .results import StudyResults, frame_of_cells, frame_of_verdicts, judge
+from .results import CELL_COLUMNS, VERDICT_COLUMNS, StudyResults, frame, judge
 from .runs import FILE_NAME, Runs
 from .specification import Specification, read_study_file
 from .until_clear import standing
@@ -245,11 +245,11 @@ class Study:
 
     def performance(self) -> pd.DataFrame:
         """Return one row per policy and condition: mean P and its intervals (`CELL_COLUMNS`)."""
-        return frame_of_cells(self.findings().cells)
+        return frame(self.findings().cells, CELL_COLUMNS)
 
     def indicators(self) -> pd.DataFrame:
         """Return one row per comparison: indicator, interval, verdicts (`VERDICT_COLUMNS`)."""
-        return frame_of_verdicts(self.findings().verdicts)
+        return frame(self.findings().verdicts, VERDICT_COLUMNS)
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
         """Write the report into a directory, see `report.write`; return the paths of its files.

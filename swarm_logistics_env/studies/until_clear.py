@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.equivalence import ALPHA
+from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.tasks.task import Case, Run
 
 from .comparison import CONFIDENCE, Arm, Comparison
@@ -136,39 +137,25 @@ class _Family:
         return complete
 
     def _stop_clear_ones(self, look: int, n_seeds: int) -> None:
-        p_values: dict[Comparison, float] = {}
+        """Note p on the scale on which 0.05 decides, and stop by Holm's steps, smallest p first."""
+        tested = list[tuple[float, Comparison, Estimate]]()
         for comparison in list(self._open):
             estimate = self._found[comparison].estimate
-            if estimate is None:
-                continue
-            if estimate.identical:  # nothing to test, at any number of seeds
+            if estimate and estimate.identical:  # nothing to test, at any number of seeds
                 self._stop(comparison, n_seeds)
-            elif estimate.p_value is not None:
-                p_values[comparison] = estimate.p_value
-        for comparison in sorted(p_values, key=lambda c: p_values[c]):
-            level = self._level(look)
-            if not p_values[comparison] < level:
-                break
-            self._settle(comparison, p_values[comparison], level)
-            self._stop(comparison, n_seeds)
-        for comparison in self._open:
-            if comparison in p_values:
-                self._settle(comparison, p_values[comparison], self._level(look))
-
-    def _level(self, look: int) -> float:
-        return self._runs.alpha(look, (1 - CONFIDENCE) / len(self._open))
-
-    def _settle(self, comparison: Comparison, p: float, level: float) -> None:
-        """Note p on the scale on which 0.05 decides, and the verdict under Holm."""
-        one = self._found[comparison]
-        decided = one.estimate is not None and p < level
-        self._found[comparison] = replace(
-            one,
-            p_holm=min(1.0, p * (1 - CONFIDENCE) / level),
-            verdict_holm=one.estimate.verdict_for(p)
-            if one.estimate and decided
-            else "inconclusive",
-        )
+            elif estimate and estimate.p_value is not None:
+                tested.append((estimate.p_value, comparison, estimate))
+        for p, comparison, estimate in sorted(tested, key=lambda one: one[0]):
+            # Once one stays open the level stays as it is, and every larger p is above it.
+            level = self._runs.alpha(look, (1 - CONFIDENCE) / len(self._open))
+            is_clear = p < level
+            self._found[comparison] = replace(
+                self._found[comparison],
+                p_holm=min(1.0, p * (1 - CONFIDENCE) / level),
+                verdict_holm=estimate.verdict_for(p) if is_clear else "inconclusive",
+            )
+            if is_clear:
+                self._stop(comparison, n_seeds)
 
     def _stop(self, comparison: Comparison, n_seeds: int) -> None:
         self._open.remove(comparison)

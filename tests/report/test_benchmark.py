@@ -69,14 +69,14 @@ def test_both_failures_hold_for_the_same_robots(results: StudyResults) -> None:
 def test_ranks_are_as_stable_as_the_scores_allow() -> None:
     rng = np.random.default_rng(0)
     clear = {"low": rng.normal(10, 1, 15), "high": rng.normal(50, 1, (5, 15))}
-    high, low = benchmark.places(clear)
-    assert (high.name, high.rank, high.best, high.worst, high.stability) == ("high", 1, 1, 1, 1.0)
-    assert (low.rank, low.best, low.worst) == (2, 2, 2)
+    high, low = benchmark.leaderboard(clear).rows
+    assert (high[0], *high[2:]) == ("high", "1 [1, 1]", "100%")
+    assert (low[0], *low[2:]) == ("low", "2 [2, 2]", "100%")
 
     # Seeds agree, trainings do not: one lucky training is no lead.
     spread = np.repeat(rng.normal(50, 20, 5)[:, None], 15, axis=1)
     shaky = {"one": spread, "other": np.full((5, 15), spread.mean() - 1.0)}
-    first, _ = benchmark.places(shaky)
-    assert (first.best, first.worst) == (1, 2)
-    assert first.stability < 0.9
-    assert benchmark.places(shaky) == benchmark.places(shaky)
+    first, _ = benchmark.leaderboard(shaky).rows
+    assert first[2] == "1 [1, 2]"
+    assert int(first[3].rstrip("%")) < 90
+    assert benchmark.leaderboard(shaky) == benchmark.leaderboard(shaky)

@@ -17,8 +17,7 @@ from swarm_logistics_env.studies.results import (
     CELL_COLUMNS,
     VERDICT_COLUMNS,
     StudyResults,
-    frame_of_cells,
-    frame_of_verdicts,
+    frame,
     judge,
 )
 from swarm_logistics_env.studies.verdict import Cell
@@ -160,7 +159,7 @@ def test_two_seeds_and_a_cap_everywhere_give_no_verdict() -> None:
 def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     found = judge(Study.preset("paper", seeds=2).plan(), {})
     assert {cell.problem for cell in found.cells} == {"2 of 2 runs missing"}
-    cells, tests = frame_of_cells(found.cells), frame_of_verdicts(found.verdicts)
+    cells, tests = frame(found.cells, CELL_COLUMNS), frame(found.verdicts, VERDICT_COLUMNS)
     for table, columns in ((cells, CELL_COLUMNS), (tests, VERDICT_COLUMNS)):
         assert list(table) == list(columns)
         numbers = {name for name in columns if table[name].dtype == np.dtype(float)}
