@@ -63,7 +63,7 @@ def _wanted(
 
 
 def space_of(recording: Recording) -> pymunk.Space:
-    """Return a space with the walls and items of a recording."""
+    """Return a space with the walls, the items and the unladen robots of a recording."""
     scenario = recording.scenario
     space = pymunk.Space()
     space.iterations, space.collision_slop = 16, 0.001
@@ -76,23 +76,13 @@ def space_of(recording: Recording) -> pymunk.Space:
         item = pymunk.Circle(space.static_body, scenario.item_radius, (x, y))
         item.filter = pymunk.ShapeFilter(categories=4)
         space.add(item)
-    return space
-
-
-def robots_in(
-    space: pymunk.Space, scenario: Scenario, places: NDArray[np.float64]
-) -> list[pymunk.Body]:
-    """Put unladen robots at `places` (N, 2) [m]."""
-    unladen = pymunk.ShapeFilter(categories=1, mask=1 | 2)
-    robots = []
-    for x, y in places.tolist():
+    for x, y in recording.start.tolist():
         robot = pymunk.Body(scenario.robot_mass, float("inf"))
         robot.position = (x, y)
         shape = pymunk.Circle(robot, scenario.robot_radius)
-        shape.filter = unladen
+        shape.filter = pymunk.ShapeFilter(categories=1, mask=1 | 2)
         space.add(robot, shape)
-        robots.append(robot)
-    return robots
+    return space
 
 
 class _Batch:
@@ -122,7 +112,6 @@ class ForceFloor:
         fields = batch.BodyFields
         self._wanted = np.ascontiguousarray(recording.wanted_velocity)
         self._space = space_of(recording)
-        robots_in(self._space, scenario, recording.start)
         self._state = _Batch(n + 1, 4, fields.POSITION | fields.VELOCITY)
         self._velocity = _Batch(n + 1, 2, fields.VELOCITY)
         self._force = _Batch(n + 1, 2, fields.FORCE)

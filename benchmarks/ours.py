@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
@@ -11,12 +12,21 @@ import numpy as np
 from benchmarks.floor import ForceFloor, Recording, record
 from benchmarks.results import Contestant
 from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 FLOOR, ARRAYS = "force floor", "env.step_arrays"
-_STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
-_WORLDS, _STEPS_OF_WORLDS = 8, 1000
 SENSES = "all sensors, logistics, timers"
+_STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
+_MANY, _WORLDS = (1_000, 10_000), 8
+
+
+def contestants() -> list[Contestant]:
+    """Return everything of this package that is timed."""
+    one, two = (vec_env(threads) for threads in (1, 2))
+    two.base = one.name
+    many = itertools.chain.from_iterable(map(many_robots, _MANY))
+    return [*paths(record(Scenario(restock=True), _STEPS)), one, two, *many]
 
 
 def paths(recording: Recording) -> Iterator[Contestant]:
@@ -77,30 +87,28 @@ def many_robots(n_robots: int) -> Iterator[Contestant]:
 
 def vec_env(threads: int) -> Contestant:
     """Return several worlds behind stable-baselines3's VecEnv."""
-    from swarm_logistics_env.adapters import SwarmVecEnv
-
     env = SwarmVecEnv(Scenario(restock=True), n_worlds=_WORLDS, threads=threads, seed=0)
     env.reset()
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (20, env.num_envs, 4)).astype(np.float32)
-
-    def run() -> None:
-        for step in range(_STEPS_OF_WORLDS):
-            env.step(actions[step % len(actions)])
-
+    given = [actions[step % len(actions)] for step in range(_STEPS)]
     return Contestant(
         f"SwarmVecEnv, {threads} thread{'s' if threads > 1 else ''}",
         f"{_WORLDS} worlds: {SENSES}, rewards, resets; wall time",
-        run,
-        env.num_envs * _STEPS_OF_WORLDS,
-        _STEPS_OF_WORLDS,
+        lambda: _timed(env.step, given, time.perf_counter),
+        env.num_envs * _STEPS,
+        _STEPS,
         ARRAYS,
-        uses_wall=True,
+        timed_by="wall",
     )
 
 
-def _timed(step: Callable[[Any], object], given: Iterable[Any]) -> float:
-    began = time.process_time()
+def _timed(
+    step: Callable[[Any], object],
+    given: Iterable[Any],
+    clock: Callable[[], float] = time.process_time,
+) -> float:
+    began = clock()
     for each in given:
         step(each)
-    return time.process_time() - began
+    return clock() - began

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import statistics
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -14,8 +14,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
+import pandas as pd
+
+_SHOWN = ("agent_steps_per_second", "microseconds_per_step", "cost_to_base", "base", "includes")
 
 
 @dataclass
@@ -25,40 +26,23 @@ class Contestant:
     Attributes:
         name: as the table has it.
         includes: what one of its steps includes.
-        run: takes its steps once; returns the seconds they took, or None if this times the run.
+        run: takes its steps once; returns the seconds they took.
         agent_steps: how many steps of one agent a run takes.
         control_steps: how many steps of everything a run takes.
         base: the contestant whose cost its own is divided by, or None.
-        uses_wall: timed by the clock, not by processor time, as several threads must be.
+        timed_by: "processor", as on a machine that does other things too the clock counts them;
+            "wall" where several threads work.
         seconds: of each run so far.
     """
 
     name: str
     includes: str
-    run: Callable[[], float | None]
+    run: Callable[[], float]
     agent_steps: int
     control_steps: int
     base: str | None = None
-    uses_wall: bool = False
+    timed_by: str = "processor"
     seconds: list[float] = field(default_factory=list)
-
-    def take_turn(self) -> None:
-        """Run once and note what it took."""
-        # Processor time: on a machine that does other things too, the clock counts them.
-        clock = time.perf_counter if self.uses_wall else time.process_time
-        began = clock()
-        took = self.run()
-        self.seconds.append(clock() - began if took is None else took)
-
-    @property
-    def microseconds(self) -> float:
-        """Median cost of a control step [us]."""
-        return statistics.median(self.seconds) / self.control_steps * 1e6
-
-    @property
-    def rate(self) -> float:
-        """Median agent-steps per second."""
-        return self.agent_steps / statistics.median(self.seconds)
 
     def ratio_to(self, base: Contestant) -> float:
         """Return the median, over turns, of its cost per agent-step as a multiple of `base`'s."""
@@ -71,12 +55,37 @@ def in_turns(contestants: Sequence[Contestant], repeats: int) -> None:
     """Run everybody once per repeat, so that whatever slows the machine slows all of them."""
     for _ in range(repeats):
         for contestant in contestants:
-            contestant.take_turn()
+            contestant.seconds.append(contestant.run())
 
 
-def machine() -> dict[str, Any]:
-    """Return where and with what the figures came about."""
-    return {
+def rows(contestants: Sequence[Contestant]) -> list[dict[str, Any]]:
+    """Return a row of each contestant, every repeat included."""
+    known = {one.name: one for one in contestants}
+    return [
+        {
+            "name": one.name,
+            "includes": one.includes,
+            "agent_steps_per_second": one.agent_steps / statistics.median(one.seconds),
+            "microseconds_per_step": statistics.median(one.seconds) / one.control_steps * 1e6,
+            "base": one.base,
+            "cost_to_base": one.ratio_to(known[one.base]) if one.base else None,
+            "timed_by": one.timed_by,
+            "agent_steps": one.agent_steps,
+            "seconds": one.seconds,
+        }
+        for one in contestants
+    ]
+
+
+def shown(found: Sequence[Mapping[str, Any]]) -> str:
+    """Return the rows as a table; cost: per agent-step, less is better."""
+    table = pd.DataFrame(found).set_index("name")[list(_SHOWN)]
+    return table.to_string(float_format="{:,.2f}".format, na_rep="")
+
+
+def save(folder: Path, found: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) -> None:
+    """Write benchmark.json: the rows, and where and with what they came about."""
+    machine = {
         "processor": _processor(),
         "cores": os.cpu_count(),
         "load": os.getloadavg()[0],
@@ -84,67 +93,13 @@ def machine() -> dict[str, Any]:
         **{name: version(name) for name in ("numpy", "numba", "pymunk")},
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-
-
-def show(console: Console, contestants: Sequence[Contestant], title: str) -> None:
-    """Print one row per contestant."""
-    table = Table(title=title)
-    for column in ("", "agent-steps per s", "us per step", "cost", "a step includes"):
-        left = column in ("", "a step includes")
-        table.add_column(column, justify="left" if left else "right")
-    for contestant in contestants:
-        table.add_row(
-            contestant.name,
-            f"{contestant.rate:,.0f}",
-            f"{contestant.microseconds:,.0f}",
-            _cost(contestant, contestants),
-            contestant.includes,
-        )
-    console.print(table)
-
-
-def as_json(contestants: Sequence[Contestant], **more: Any) -> dict[str, Any]:
-    """Return everything, every repeat included."""
-    return {
-        "machine": machine(),
-        "contestants": [
-            {
-                "name": contestant.name,
-                "includes": contestant.includes,
-                "agent_steps_per_second": contestant.rate,
-                "microseconds_per_step": contestant.microseconds,
-                "base": contestant.base,
-                "cost_to_base": _ratio(contestant, contestants),
-                "timed_by": "wall" if contestant.uses_wall else "processor",
-                "agent_steps": contestant.agent_steps,
-                "seconds": contestant.seconds,
-            }
-            for contestant in contestants
-        ],
-        **more,
-    }
-
-
-def save(folder: Path, found: Mapping[str, Any]) -> None:
-    """Write benchmark.json."""
+    record = {"machine": machine, "contestants": found, "seconds": seconds}
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "benchmark.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-
-
-def _ratio(contestant: Contestant, contestants: Sequence[Contestant]) -> float | None:
-    bases = {other.name: other for other in contestants}
-    return contestant.ratio_to(bases[contestant.base]) if contestant.base else None
-
-
-def _cost(contestant: Contestant, contestants: Sequence[Contestant]) -> str:
-    ratio = _ratio(contestant, contestants)
-    return "" if ratio is None else f"{ratio:.2f} x {contestant.base}"
+    (folder / "benchmark.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
 def _processor() -> str:
     cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+    text = cpuinfo.read_text(encoding="utf-8") if cpuinfo.exists() else ""
+    found = re.search(r"^model name\s*: (.*)", text, re.MULTILINE)
+    return found[1] if found else platform.processor() or platform.machine()
