@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,13 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.warehouse import FailureMode
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.warehouse.logistics import IDLE, LIFTING
-from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+from swarm_logistics_env.warehouse.state import (
+    CARRIED,
+    DELIVERED,
+    NOBODY,
+    STORED,
+    WarehouseState,
+)
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
 JAM = 1.0  # [s] of overlap without a break make a jam
@@ -23,9 +29,11 @@ class BrokenPromiseError(AssertionError):
 
 
 class Watch:
-    """Looks at one world after its reset and after every step.
+    """Looks at one world, which has been reset, now and after every step.
 
     Attributes:
+        depth: how deep each robot (row) stands in every robot, obstacle, wall and item now [m], in
+            this order; -inf: it may not or need not touch it.
         deepest: the greatest overlap seen between bodies [m].
 
     Raises:
@@ -35,13 +43,10 @@ class Watch:
     def __init__(self, world: Warehouse) -> None:
         self.world = world
         self.deepest = 0.0
-        self._count: Count | None = None
-        self._speed = 0.0
         self._dock = world.scenario.dock_capacity
-        self._modes: tuple[tuple[str, ...], ...] = ()
-        self._before: dict[str, NDArray[Any]] = {}
         self._jammed = np.zeros((0, 0))
         self._covered = np.zeros(len(world.state.item_position), np.bool_)
+        self._remember()
 
     def look(self) -> None:
         """Check everything."""
@@ -52,27 +57,22 @@ class Watch:
         self._timers()
         self._capabilities()
         self._rows()
-        state = self.world.state
-        self._count, self._modes = counted(self.world), state.failure_modes
-        self._speed = float(self.world.scenario.max_speed)
-        self._before = {
-            name: getattr(state, name).copy()
-            for name in ("robot_item", "robot_present", "robot_position", "robot_heading",
-                         "item_position", "item_status")
-        }  # fmt: skip
-        self._before["kind"] = state.robots.handling[:, 0].copy()
+        self._remember()
+
+    def _remember(self) -> None:
+        self._before, self._scenario = copy.deepcopy(self.world.state), self.world.scenario
 
     def faults_changed(self) -> None:
         """Note that faults were set: what was repaired may come back within the next step.
 
         A robot that was removed stands above nothing when that step begins.
         """
-        now = self.world.state.failure_modes
-        self._modes = tuple(
-            tuple(name for name in before if name in after)
-            for before, after in zip(self._modes, now)
+        now, before = self.world.state, self._before
+        before.failure_modes = tuple(
+            tuple(name for name in then if name in after)
+            for then, after in zip(before.failure_modes, now.failure_modes)
         )
-        self._before["robot_item"][~self.world.state.robot_present] = NOBODY
+        before.robot_item[~now.robot_present] = NOBODY
 
     def _demand(self, holds: bool, words: str) -> None:
         # Every comparison is written so that NaN fails it.
@@ -80,13 +80,21 @@ class Watch:
             raise BrokenPromiseError(f"at step {self.world.state.step} {words}")
 
     def _items(self) -> None:
-        world, state, scenario = self.world, self.world.state, self.world.scenario
-        problem = wrong_item(world) or wrong_count(world, self._count)
-        self._demand(problem is None, str(problem))
-        counts = [int(np.count_nonzero(state.item_status == s)) for s in (0, 1, 2)]
-        self._demand(sum(counts) == scenario.n_items, f"{counts} items are there in all")
-        carried = state.robot_item[state.robot_item != NOBODY]
+        state, scenario = self.world.state, self.world.scenario
+        status, carrier = state.item_status, state.item_carrier
+        self._demand(len(status) == scenario.n_items, f"there are {len(status)} items")
+        known = np.isin(status, (STORED, CARRIED, DELIVERED))
+        self._demand(bool(known.all()), "an item is neither stored nor carried nor delivered")
+        self._demand(bool(np.isfinite(state.item_position).all()), "an item is nowhere")
+        carriers = np.flatnonzero(state.robot_item != NOBODY)
+        carried = state.robot_item[carriers]
         self._demand(len(set(carried.tolist())) == len(carried), "two robots carry one item")
+        hands = np.full(len(status), NOBODY)
+        hands[carried] = carriers
+        self._demand(bool((hands == carrier).all()), f"items {carried} are not noted as carried")
+        is_carried = (status == CARRIED) == (hands != NOBODY)
+        self._demand(bool(is_carried.all()), "an item is carried by nobody, or is not and is")
+        self._deliveries()
         if state.requested == NOBODY:
             self._demand(bool((state.item_status == DELIVERED).all()), "nothing is asked for")
         else:
@@ -104,6 +112,20 @@ class Watch:
         far = np.array([scenario.warehouse_width, scenario.warehouse_height])
         here = state.item_position[state.item_status == STORED]
         self._demand(bool(((here > 0.0) & (here < far)).all()), "an item lies outside")
+
+    def _deliveries(self) -> None:
+        state, before = self.world.state, self._before
+        news = state.delivered - before.delivered
+        self._demand(news >= 0, f"{-news} deliveries were taken back")
+        noted = len(state.delivered_by)
+        self._demand(noted == state.delivered, f"{noted} noted for {state.delivered} deliveries")
+        gone, left = (int((s.item_status == DELIVERED).sum()) for s in (state, before))
+        # If `restock` changed during the step, either value may have held.
+        restocks = self.world.scenario.restock, self._scenario.restock
+        self._demand(
+            gone in {left + (0 if restock else news) for restock in restocks},
+            f"{gone} items have left for {state.delivered} deliveries",
+        )
 
     def _bodies(self) -> None:
         scenario, state = self.world.scenario, self.world.state
@@ -129,8 +151,10 @@ class Watch:
             ]
         )
         depth[~here] = -np.inf
+        self.depth = depth
         # The speed of the last step is that before or after a change.
-        closing = 2.0 * max(self._speed, scenario.max_speed) * scenario.physics_period
+        fastest = max(self._scenario.max_speed, scenario.max_speed)
+        closing = 2.0 * fastest * scenario.physics_period
         deepest = float(depth.max(initial=-np.inf))
         self._demand(
             deepest <= closing + SUSTAINED,
@@ -160,10 +184,9 @@ class Watch:
         self._demand(len(set(lifted.tolist())) == len(lifted), "two robots lift one item")
         is_stored = state.item_status[lifted] == STORED
         self._demand(bool(is_stored.all()), "an item is being lifted and is not stored")
-        if self._before:
-            stood = (self._before["kind"] != IDLE) & state.robot_present
-            turned = stood & (state.robot_heading != self._before["robot_heading"])
-            self._demand(not turned.any(), "a robot turns while it handles an item")
+        stood = (self._before.robots.handling[:, 0] != IDLE) & state.robot_present
+        turned = stood & (state.robot_heading != self._before.robot_heading)
+        self._demand(not turned.any(), "a robot turns while it handles an item")
 
     def _cover(self) -> None:
         """Note which items are no obstacles: (I,), by the rule and not by what the world says.
@@ -172,32 +195,26 @@ class Watch:
         another; until a step begins with no laden robot above.
         """
         state, before = self.world.state, self._before
-        stored = state.item_status == STORED
-        if before:
-            self._covered &= self._above(before, before["robot_item"] != NOBODY).any(axis=0)
-            took = (state.robot_item != before["robot_item"]) & (state.robot_item != NOBODY)
-            # Those too that delivered at once what they took.
-            for robot in state.delivered_by[self._count.delivered if self._count else 0 :]:
-                took[robot] |= before["robot_item"][robot] == NOBODY
-            put = (before["item_status"] != STORED) | (
-                state.item_position != before["item_position"]
-            ).any(axis=1)
-            self._covered |= put | self._above(
-                {"robot_position": state.robot_position, "item_position": state.item_position}, took
-            ).any(axis=0)
-            if (before["robot_present"] & ~state.robot_present).any():
-                # It is no longer known where they were when they took something.
-                self._covered |= state.item_covered == 1
-        self._covered &= stored
+        self._covered &= self._above(before, before.robot_item != NOBODY)
+        took = (state.robot_item != before.robot_item) & (state.robot_item != NOBODY)
+        # Those too that delivered at once what they took.
+        for robot in state.delivered_by[before.delivered :]:
+            took[robot] |= before.robot_item[robot] == NOBODY
+        put = (before.item_status != STORED) | (state.item_position != before.item_position).any(1)
+        self._covered |= put | self._above(state, took)
+        if (before.robot_present & ~state.robot_present).any():
+            # It is no longer known where they were when they took something.
+            self._covered |= state.item_covered == 1
+        self._covered &= state.item_status == STORED
         self._demand(
             bool((self._covered == state.item_covered).all()), "an item is covered, or is not"
         )
 
-    def _above(self, at: dict[str, NDArray[Any]], laden: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return which of the robots that are `laden` stand above which items, (N, I)."""
-        away = np.linalg.norm(at["robot_position"][:, None] - at["item_position"][None], axis=2)
+    def _above(self, state: WarehouseState, laden: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which items have a robot that is `laden` above them, (I,)."""
+        away = np.linalg.norm(state.robot_position[:, None] - state.item_position[None], axis=2)
         reach = self.world.scenario.robot_radius + self.world.scenario.item_radius
-        above: NDArray[np.bool_] = laden[:, None] & (away < reach)
+        above: NDArray[np.bool_] = (laden[:, None] & (away < reach)).any(axis=0)
         return above
 
     def _timers(self) -> None:
@@ -215,9 +232,8 @@ class Watch:
             modes = [failure_mode(name) for name in names]
             self._exercised(robot, modes)
             # What held before and after a step held throughout it.
-            if self._modes:
-                lasting = [failure_mode(name) for name in names if name in self._modes[robot]]
-                self._did(robot, lasting)
+            then = self._before.failure_modes[robot]
+            self._did(robot, [failure_mode(name) for name in names if name in then])
         tells = state.robot_present & state.sends & ~np.isnan(state.robot_told)
         gaps = state.robot_position[:, None] - state.robot_position[None]
         squares = (gaps**2).sum(axis=2)
@@ -256,22 +272,22 @@ class Watch:
 
     def _did(self, robot: int, modes: list[FailureMode]) -> None:
         state, before = self.world.state, self._before
-        took = state.robot_item[robot] not in (before["robot_item"][robot], NOBODY)
+        took = state.robot_item[robot] not in (before.robot_item[robot], NOBODY)
         if not all(mode.lifts for mode in modes):
             self._demand(not took, f"robot {robot} lifts item {state.robot_item[robot]}")
-        news = state.delivered_by[self._count.delivered if self._count else 0 :]
+        news = state.delivered_by[before.delivered :]
         if not all(mode.delivers for mode in modes):
             self._demand(robot not in news, f"robot {robot} delivers in a mode that does not")
         if any(mode.speed == 0.0 for mode in modes):
-            turned = state.robot_heading[robot] != before["robot_heading"][robot]
+            turned = state.robot_heading[robot] != before.robot_heading[robot]
             self._demand(not turned or not state.robot_present[robot], f"robot {robot} turns")
         jammed = not all(mode.releases_inside for mode in modes)
         if jammed and state.robot_in_delivery[robot] and state.robot_present[robot]:
-            held = before["robot_item"][robot]
+            held = before.robot_item[robot]
             kept = held in (NOBODY, state.robot_item[robot])
             self._demand(kept, f"robot {robot}, jammed inside, lets item {held} go")
         if not all(mode.obeys for mode in modes) and state.robot_present[robot]:
-            held = before["robot_item"][robot]
+            held = before.robot_item[robot]
             lost = held != NOBODY and state.robot_item[robot] != held
             # What cannot move may be above the delivery area's border when its item is asked for.
             self._demand(
@@ -289,56 +305,3 @@ class Watch:
         flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
         most = self.world.scenario.n_requests
         self._demand(bool((flags.sum(axis=1) <= most).all()), "a robot sees too many requests")
-
-
-class Count(NamedTuple):
-    """Deliveries so far, items that left with them, and whether items come back now."""
-
-    delivered: int
-    gone: int
-    restock: bool
-
-
-def counted(world: Warehouse) -> Count:
-    """Return what is counted now."""
-    gone = int(np.count_nonzero(world.state.item_status == DELIVERED))
-    return Count(world.state.delivered, gone, world.scenario.restock)
-
-
-def wrong_item(world: Warehouse) -> str | None:
-    """Return in words which item is not stored, carried or delivered as it should be."""
-    state = world.state
-    if len(state.item_status) != world.scenario.n_items:
-        return f"there are {len(state.item_status)} items: should be {world.scenario.n_items}"
-    for item, status in enumerate(state.item_status.tolist()):
-        hands = np.flatnonzero(state.robot_item == item).tolist()
-        noted = int(state.item_carrier[item])
-        if status not in (STORED, CARRIED, DELIVERED):
-            return f"item {item} has status {status}: should be stored, carried or delivered"
-        expected = [noted] if status == CARRIED else []
-        if hands != expected or (status == CARRIED) != (noted != NOBODY):
-            return (
-                f"item {item} of status {status} and carrier {noted} is in the hands of robots "
-                f"{hands}: should be {expected}"
-            )
-        if hands and not state.robot_present[hands[0]]:
-            return f"item {item} is carried by robot {hands[0]}, who is not there"
-        if not np.isfinite(state.item_position[item]).all():
-            return f"item {item} is at {state.item_position[item]}: should be finite"
-    return None
-
-
-def wrong_count(world: Warehouse, before: Count | None) -> str | None:
-    """Return in words what is wrong with the deliveries since `before`, None: since the reset."""
-    state, now = world.state, counted(world)
-    before = before or Count(0, 0, now.restock)
-    if now.delivered < before.delivered:
-        return f"{now.delivered} items are delivered, but {before.delivered} were a step before"
-    if len(state.delivered_by) != now.delivered:
-        return f"{len(state.delivered_by)} robots are noted for {now.delivered} deliveries"
-    # If `restock` changed during the step, either value may have held.
-    news = now.delivered - before.delivered
-    expected = {before.gone + (0 if restock else news) for restock in (now.restock, before.restock)}
-    if now.gone not in expected:
-        return f"{now.gone} items have left for {now.delivered} deliveries"
-    return None

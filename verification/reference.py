@@ -1,7 +1,7 @@
 """A slow reference of what faults leave, what is told, what is paid and how episodes end.
 
 In plain Python from what the documentation says, robot by robot and in whole numbers of half
-control periods, so that it shares no rounding, no array and no shortcut with the package.
+control periods, so that it shares no rounding and no shortcut with the package.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from swarm_logistics_env.warehouse import FailureMode
 from swarm_logistics_env.warehouse.failure_modes import LOST_AS_A_WHOLE, failure_mode
 from swarm_logistics_env.warehouse.faults import failed_robots
 from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.warehouse.state import WarehouseState as State
 
 
 @dataclass
@@ -47,43 +48,6 @@ class Planned:
         return failure_mode(self.mode)
 
 
-@dataclass(frozen=True)
-class Moment:
-    """What is true after a step, robot by robot, as far as rewards and roles ask."""
-
-    step: int
-    present: list[bool]
-    x: list[float]
-    y: list[float]
-    holds: list[int]
-    in_area: list[bool]
-    item_x: list[float]
-    item_y: list[float]
-    carriers: list[int]
-    requested: int
-    delivered_by: list[int]
-    contact: list[bool]
-    delivers: list[bool]
-    heard: list[float]
-
-    @classmethod
-    def of(cls, world: Warehouse) -> Moment:
-        """Return the moment that a world is in."""
-        s = world.state
-        (x, y), (item_x, item_y) = s.robot_position.T.tolist(), s.item_position.T.tolist()
-        return cls(
-            s.step, s.robot_present.tolist(), x, y, s.robot_item.tolist(),
-            s.robot_in_delivery.tolist(), item_x, item_y, s.item_carrier.tolist(), s.requested,
-            list(s.delivered_by), s.robot_contact.tolist(), s.delivers.tolist(),
-            s.robot_heard.tolist(),
-        )  # fmt: skip
-
-    @property
-    def carrier(self) -> int:
-        """The robot that carries the requested item, or NOBODY."""
-        return NOBODY if self.requested == NOBODY else self.carriers[self.requested]
-
-
 class Faults:
     """What planned faults leave the robots of one world, step by step."""
 
@@ -103,21 +67,21 @@ class Faults:
                 like = Fault("FM1", one.robots)
                 one.struck = failed_robots(like, self._seed, self._scenario.n_robots).tolist()
 
-    def expected(self, world: Warehouse, before: Moment) -> list[dict[str, Any]]:
+    def expected(self, world: Warehouse, before: State) -> list[dict[str, Any]]:
         """Return of each robot what it can do now, its modes and whether it is there."""
-        now, modes = Moment.of(world), world.state.failure_modes
+        now = world.state
         left = [self._sound(robot) for robot in range(self._scenario.n_robots)]
         for number, one in enumerate(self._planned):
             if not one.holds(now.step):
                 continue
             if one.struck is None:
-                is_whole = now.present == before.present
+                is_whole = now.robot_present.tolist() == before.robot_present.tolist()
                 views = [able["view_range"] for able in left]
                 # Who is removed in this very step no longer stands where it was struck.
                 chosen = world._occurrences[number].robots.tolist()
                 one.struck = self._in_role(one, now, views) if is_whole else chosen
             for robot in one.struck:
-                if one.breaks is None or self._is_broken(one, robot, modes[robot], now.step):
+                if one.breaks is None or self._is_broken(one, robot, now):
                     self._take(one, left[robot], now.step)
         for robot, able in enumerate(left):
             self.gone[robot] |= not able.pop("there")
@@ -162,36 +126,37 @@ class Faults:
         able["modes"] = (*able["modes"], one.mode)
         able["there"] = able["there"] and lost.present
 
-    def _is_broken(self, one: Planned, robot: int, told: tuple[str, ...], step: int) -> bool:
+    def _is_broken(self, one: Planned, robot: int, now: State) -> bool:
         """Return whether an intermittent fault holds, which the robot's own stream decides."""
+        told = now.failure_modes[robot]
         others = [
             other.mode
             for other in self._planned
-            if other is not one and other.holds(step) and robot in (other.struck or ())
+            if other is not one and other.holds(now.step) and robot in (other.struck or ())
         ]
         return told.count(one.mode) > others.count(one.mode)
 
-    def _in_role(self, one: Planned, now: Moment, views: list[float]) -> list[int]:
+    def _in_role(self, one: Planned, now: State, views: list[float]) -> list[int]:
         """Return the robots that a fault by role strikes: those in it, then those nearest."""
         asked, carrier = now.requested, now.carrier
 
         def away(robot: int) -> float:
             if asked == NOBODY:
                 return 0.0
-            return math.hypot(now.x[robot] - now.item_x[asked], now.y[robot] - now.item_y[asked])
+            return math.dist(now.robot_position[robot], now.item_position[asked])
 
         def role(robot: int) -> str:
             if robot == carrier:
                 return "carrier"
             if carrier != NOBODY and away(robot) <= views[carrier]:
                 return "neighbour"
-            if now.in_area[robot]:
+            if now.robot_in_delivery[robot]:
                 return "in_area"
-            return "searching" if now.holds[robot] == NOBODY else "shuffling"
+            return "searching" if now.robot_item[robot] == NOBODY else "shuffling"
 
         ranked = sorted(
-            range(len(now.x)),
-            key=lambda r: (not now.present[r], role(r) != one.role, away(r), r),
+            range(now.n_robots),
+            key=lambda r: (not now.robot_present[r], role(r) != one.role, away(r), r),
         )
         assert isinstance(one.robots, int)
         return sorted(ranked[: one.robots])
@@ -206,18 +171,19 @@ class Radio:
         self._own: list[list[float]] = []  # by step and robot, before delays and lies
         self._given = [[[0.0] * scenario.message_size] * scenario.n_robots]
 
-    def told(self, now: Moment, before: Moment, able: list[dict[str, Any]]) -> list[float]:
+    def told(self, now: State, before: State, able: list[dict[str, Any]]) -> list[float]:
         """Return the timer that each robot tells [s], NaN: none; to be asked once a step."""
         s, told = self._scenario, []
         limit, period = s.timer_limit - 1e-9, s.control_period
         self._own.append([])
         for robot, one in enumerate(able):
-            if now.in_area[robot]:
+            if now.robot_in_delivery[robot]:
                 self._last_inside[robot] = now.step
             timer = math.nan
             if one["present"] and robot in self._last_inside:
                 timer = (now.step - self._last_inside[robot]) * period
-            heard = before.heard[robot] + period if s.is_gossip and one["present"] else math.nan
+            passes_on = s.is_gossip and one["present"]
+            heard = before.robot_heard[robot] + period if passes_on else math.nan
             known = [value for value in (timer, heard) if value < limit]
             self._own[-1].append(min(known, default=math.nan))
             then = now.step - one["radio_delay"]
@@ -244,43 +210,45 @@ class Radio:
 
 
 def rewards(
-    weights: Mapping[str, float], scenario: Scenario, before: Moment, now: Moment
+    weights: Mapping[str, float], scenario: Scenario, before: State, now: State
 ) -> list[float]:
     """Return what a step pays each robot that was there as it began."""
     period, edge, total = scenario.control_period, scenario.storage_width, []
     new = now.delivered_by[len(before.delivered_by) :]
     was, is_ = before.carrier, now.carrier
-    for robot in range(len(now.x)):
-        inside, inside_before = min(now.x[robot], edge), min(before.x[robot], edge)
+    for robot in range(now.n_robots):
+        x, x_before = (moment.robot_position[robot, 0] for moment in (now, before))
         same_request = not new and is_ == was == robot and now.requested == before.requested
         way = 0.0
-        for item, after in enumerate(now.carriers):
-            who = before.carriers[item] if after == NOBODY else after
-            is_delivered = before.carriers[item] != NOBODY and before.carriers[item] in new
+        for item, after in enumerate(now.item_carrier):
+            who = before.item_carrier[item] if after == NOBODY else after
+            is_delivered = before.item_carrier[item] != NOBODY and before.item_carrier[item] in new
             if who == robot and not is_delivered:
-                way += min(now.item_x[item], edge) - min(before.item_x[item], edge)
+                way += min(now.item_position[item, 0], edge)
+                way -= min(before.item_position[item, 0], edge)
         delivers = now.delivers[robot]
         deeper = 0.0
         if is_ == was == robot and now.requested == before.requested:
-            deeper = 2.0 * (max(now.x[robot], edge) - max(before.x[robot], edge))
+            deeper = 2.0 * (max(x, edge) - max(x_before, edge))
         terms = {
             "delivery": len(new),
             "own_delivery": new.count(robot),
             "lift_requested": 0 if new else ((is_ == robot) - (was == robot)) * delivers,
-            "approach": inside - inside_before if same_request else 0.0,
+            "approach": min(x, edge) - min(x_before, edge) if same_request else 0.0,
             "stocking": way,
-            "contact": period * now.contact[robot],
+            "contact": period * now.robot_contact[robot],
             "blocked_request": (period + deeper) * (is_ == robot and not delivers),
         }  # fmt: skip
         paid = sum(weights.get(name, 0.0) * value for name, value in terms.items())
-        total.append(paid if before.present[robot] else 0.0)
+        total.append(paid if before.robot_present[robot] else 0.0)
     return total
 
 
-def ends(before: Moment, now: Moment, last_step: int) -> tuple[list[bool], list[bool]]:
+def ends(before: State, now: State, last_step: int) -> tuple[list[bool], list[bool]]:
     """Return which robots terminate and which are truncated; none does both."""
     is_all = now.requested == NOBODY
-    terminated = [was and (is_all or not is_) for was, is_ in zip(before.present, now.present)]
+    were, are = before.robot_present.tolist(), now.robot_present.tolist()
+    terminated = [was and (is_all or not is_) for was, is_ in zip(were, are)]
     is_late = now.step >= last_step
-    truncated = [is_late and was and not t for was, t in zip(before.present, terminated)]
+    truncated = [is_late and was and not t for was, t in zip(were, terminated)]
     return terminated, truncated

@@ -9,9 +9,7 @@ Ends with 1 at the first broken promise, naming the world that shows it.
 from __future__ import annotations
 
 import argparse
-import math
 import random
-import resource
 import sys
 import time
 from collections.abc import Callable
@@ -26,7 +24,7 @@ from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.scenario import LONGEST_STRIDE
 from swarm_logistics_env.warehouse import FAILURE_MODES
-from verification.invariants import JAM, SUSTAINED, BrokenPromiseError, Watch
+from verification.invariants import BrokenPromiseError, Watch
 
 Steer = Callable[[Warehouse, NDArray[np.float32]], NDArray[np.float64]]
 
@@ -190,82 +188,6 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
     tally.deepest = max(tally.deepest, watch.deepest)
 
 
-# Swarms driven to one point, to a wall and into a corner: how deep bodies overlap.
-SIZES = (25, 150)
-SECONDS = 15.0
-# The point that all robots drive to [m]; along an axis that is None each stays where it is.
-TARGETS: dict[str, tuple[float, float | None]] = {
-    "point": (5.0, 5.0),
-    "wall": (10.0, None),
-    "corner": (0.0, 0.0),
-}
-MEDIAN = 0.002  # [m], the most that the deepest overlap of a step may be, half of the time
-
-
-@dataclass(frozen=True)
-class Overlaps:
-    """Overlaps of a jam [m].
-
-    Attributes:
-        median: the median over all steps of the deepest overlap.
-        lasting: the deepest overlap that lasted longer than `JAM` seconds without a break.
-        robots, walls: the deepest overlap of two robots, and of a robot with a wall.
-    """
-
-    median: float
-    lasting: float
-    robots: float
-    walls: float
-
-    def problem(self, scenario: Scenario) -> str | None:
-        """Return what is beyond its bound, or None.
-
-        The peak may be what is closed in one substep at top speed.
-        """
-        closing = scenario.max_speed * scenario.physics_period
-        bounds = {"median": MEDIAN, "lasting": SUSTAINED, "robots": 2 * closing, "walls": closing}
-        for name, bound in bounds.items():
-            value = getattr(self, name)
-            if not value <= bound + 1e-6:
-                return f"{name} overlap {1000 * value:.1f} mm: should be {1000 * bound:g} at most"
-        return None
-
-
-def overlaps(n_robots: int, target: str, seed: int) -> Overlaps:
-    """Drive `n_robots` to a target of `TARGETS` at top speed and measure."""
-    world = Warehouse(Scenario(n_robots=n_robots, n_items=1))
-    world.reset(seed)
-    depths: list[float] = []
-    robots = walls = lasting = 0.0
-    since = np.zeros((n_robots, n_robots + 4))
-    for _ in range(math.ceil(SECONDS / world.scenario.control_period)):
-        world.step(_straight_to(world, *TARGETS[target]))
-        depth = _depths(world)
-        depths.append(float(depth.max()))
-        robots = max(robots, float(depth[:, :n_robots].max()))
-        walls = max(walls, float(depth[:, n_robots:].max()))
-        since = np.where(depth > SUSTAINED, since + world.scenario.control_period, 0.0)
-        lasting = max(lasting, float(depth[since > JAM].max(initial=0.0)))
-    return Overlaps(float(np.median(depths)), lasting, robots, walls)
-
-
-def _straight_to(world: Warehouse, x: float, y: float | None) -> NDArray[np.float64]:
-    at = world.state.robot_position
-    angle = np.arctan2((at[:, 1] if y is None else y) - at[:, 1], x - at[:, 0])
-    angle -= world.state.robot_heading
-    zeros = np.zeros_like(angle)
-    return np.column_stack([np.cos(angle), np.sin(angle), zeros, zeros])
-
-
-def _depths(world: Warehouse) -> NDArray[np.float64]:
-    """Return how far every robot (row) overlaps every other and the four walls [m], (N, N + 4)."""
-    at, scenario = world.state.robot_position, world.scenario
-    gaps = np.linalg.norm(at[:, None] - at[None], axis=2) - 2.0 * scenario.robot_radius
-    np.fill_diagonal(gaps, np.inf)
-    far = np.array([scenario.warehouse_width, scenario.warehouse_height])
-    return -np.hstack([gaps, np.hstack([at, far - at]) - scenario.robot_radius])
-
-
 def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
     if source.random() < 0.5:
         try:
@@ -283,13 +205,14 @@ def _steered(name: str, scenario: Scenario, seed: int) -> Steer:
         return lambda world, _: rng.uniform(-1.5, 1.5, (world.state.n_robots, width))
     if name == "crowd":
         target = rng.uniform([0, 0], [scenario.warehouse_width, scenario.warehouse_height])
-        return lambda world, _: _towards(world, target, width)
+        return lambda world, _: towards(world, target, width)
     policy = policies.load(name)
     start(policy, scenario, seed)
     return lambda world, rows: decide(policy, rows, world.state)
 
 
-def _towards(world: Warehouse, target: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+def towards(world: Warehouse, target: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    """Return commands (N, width) that drive all to a place (2,), or each to its own (N, 2)."""
     away = target - world.state.robot_position
     angle = np.arctan2(away[:, 1], away[:, 0]) - world.state.robot_heading
     commands = np.zeros((len(away), width))
@@ -297,11 +220,6 @@ def _towards(world: Warehouse, target: NDArray[np.float64], width: int) -> NDArr
     commands[:, 2] = np.clip(angle, -1.0, 1.0)
     commands[:, 3] = 1.0
     return commands
-
-
-def peak_memory() -> int:
-    """Return the most memory that this process has held [KiB on Linux]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def main() -> int:
@@ -324,7 +242,7 @@ def main() -> int:
             return 1
         if time.monotonic() - said > 60.0:
             said = time.monotonic()
-            print(f"{tally}, peak {peak_memory()} KiB", flush=True)
+            print(tally, flush=True)
         if time.monotonic() > until:
             break
     print(f"no promise broken: {tally}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import pickle
 import random
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,8 +22,9 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import REWARD_TERMS
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import ROLES
+from swarm_logistics_env.warehouse.state import WarehouseState
 from verification.invariants import Watch
-from verification.reference import Faults, Moment, Planned, Radio, ends, rewards
+from verification.reference import Faults, Planned, Radio, ends, rewards
 
 EXAMPLES = 2000 if settings().max_examples >= 2000 else 40
 STEPS = 36  # a radio that is late by 2 s is late by 20 of these
@@ -104,10 +106,11 @@ def play(case: Case, last: int) -> list[int]:
     env.reset_arrays(case.number)
     world, rng = env.warehouse, random.Random(source)
     watch, faults = Watch(world), Faults(scenario, case.number, case.planned)
-    radio, before = Radio(scenario), Moment.of(world)
+    radio, before = Radio(scenario), deepcopy(world.state)
     copy: Warehouse | None = None
     able = check_able(world, faults, before)
-    deaf = replace(before, heard=[math.nan] * scenario.n_robots)  # nobody has heard anything yet
+    deaf = deepcopy(before)
+    deaf.robot_heard[:] = math.nan  # nobody has heard anything yet
     assert_told(world, radio.told(before, deaf, able))
     watch.look()
     found = []
@@ -124,7 +127,7 @@ def play(case: Case, last: int) -> list[int]:
         rows, paid, terminated, truncated = env.step_arrays(commands)
         if copy is not None:
             assert np.array_equal(copy.step(commands), rows)
-        now = Moment.of(world)
+        now = deepcopy(world.state)
         assert world.state.robot_message.tolist() == radio.messages(commands, able)
         able = check_able(world, faults, before)
         assert_told(world, radio.told(now, before, able))
@@ -134,9 +137,9 @@ def play(case: Case, last: int) -> list[int]:
         wanted = ends(before, now, min(last, STEPS))
         assert (terminated.tolist(), truncated.tolist()) == wanted
         over = np.logical_or(*wanted)
-        left = [f"robot_{r}" for r in np.flatnonzero(np.array(before.present) & ~over)]
+        left = [f"robot_{r}" for r in np.flatnonzero(np.array(before.robot_present) & ~over)]
         assert env.agents == left
-        assert {f"robot_{r}" for r in np.flatnonzero(before.present)} == set(agents)
+        assert {f"robot_{r}" for r in np.flatnonzero(before.robot_present)} == set(agents)
         assert env.state_space.contains(env.state())
         watch.look()
         if len(now.delivered_by) > len(before.delivered_by):
@@ -145,7 +148,7 @@ def play(case: Case, last: int) -> list[int]:
     return found
 
 
-def check_able(world: Warehouse, faults: Faults, before: Moment) -> list[dict[str, Any]]:
+def check_able(world: Warehouse, faults: Faults, before: WarehouseState) -> list[dict[str, Any]]:
     expected, state = faults.expected(world, before), world.state
     for robot, able in enumerate(expected):
         for name, value in able.items():
