@@ -3,8 +3,8 @@
     python -m verification.trajectories            # compare with the record
     python -m verification.trajectories --record   # write the record anew: a change of behaviour
 
-The record holds the digests of the machine that first wrote it and, for each other platform, the
-trajectories that differ there. Its key "stories" is the former name of golden trajectories.
+The record says on which machine it was written. Its key "stories" is the former name of golden
+trajectories.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -205,27 +205,15 @@ def _bytes(value: Any) -> bytes:
 
 def here() -> dict[str, str]:
     """Return what may decide a bit on this machine."""
-    about = {"platform": platform_name(), "python": platform.python_version()}
-    about["libc"] = " ".join(platform.libc_ver())
+    about = {"platform": f"{platform.system()}-{platform.machine()}"}
+    about |= {"python": platform.python_version(), "libc": " ".join(platform.libc_ver())}
     return about | {name: version(name) for name in DECIDING}
-
-
-def platform_name() -> str:
-    """Return the name under which the record keeps what differs on this platform."""
-    return f"{platform.system()}-{platform.machine()}"
 
 
 def read_record() -> dict[str, Any]:
     """Return the record as it is stored."""
     record: dict[str, Any] = json.loads(RECORD.read_text(encoding="utf-8"))
     return record
-
-
-def expected(record: dict[str, Any], name: str) -> Digests:
-    """Return the recorded digests of a golden trajectory on this platform."""
-    differs = record["differs"].get(platform_name(), {})
-    found: Digests = differs.get(name, record["stories"][name])
-    return found
 
 
 def parting(recorded: Digests, played: Digests) -> str | None:
@@ -241,51 +229,33 @@ def parting(recorded: Digests, played: Digests) -> str | None:
     return None
 
 
-def differences(names: Iterable[str] | None = None) -> dict[str, str]:
-    """Return the golden trajectories that this machine plays differently, and where they part."""
-    record = read_record()
-    found = {}
-    for name in names or GOLDEN:
-        words = parting(expected(record, name), digests(GOLDEN[name]))
-        if words:
-            found[name] = words
-    return found
-
-
-def explained(found: dict[str, str]) -> str:
-    """Return differences as text, with what is other than on the machine of the record."""
-    recorded, now = read_record()["recorded_on"], here()
+def explained(played: dict[str, Digests]) -> str | None:
+    """Return which trajectories are not as recorded, where they part and on what machine."""
+    record, now = read_record(), here()
+    partings = {name: parting(record["stories"][name], noted) for name, noted in played.items()}
+    lines = [f"{name}: {words}" for name, words in partings.items() if words]
+    if not lines:
+        return None
+    recorded = record["recorded_on"]
     other = [f"{what}: {recorded[what]} there, {now[what]} here"
              for what in now if recorded.get(what) != now[what]]  # fmt: skip
     why = "; ".join(other) or "the same platform and versions, so the code has changed it"
-    lines = [f"{name}: {words}" for name, words in found.items()]
-    return "\n".join([f"{len(found)} golden trajectories are not as recorded ({why})", *lines])
-
-
-def record() -> None:
-    """Write the record: all of it on its own platform, elsewhere what differs there."""
-    played = {name: digests(golden) for name, golden in GOLDEN.items()}
-    stored: dict[str, Any] = {"recorded_on": here(), "stories": {}, "differs": {}}
-    if RECORD.exists():
-        stored = read_record()
-    if stored["recorded_on"]["platform"] == platform_name():
-        stored |= {"recorded_on": here(), "stories": played}
-    else:
-        differs = {n: d for n, d in played.items() if d != stored["stories"].get(n)}
-        stored["differs"][platform_name()] = differs
-    RECORD.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+    return "\n".join([f"{len(lines)} golden trajectories are not as recorded ({why})", *lines])
 
 
 def main() -> int:
     """Compare or record, as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--record", action="store_true", help="write the record anew")
-    if parser.parse_args().record:
-        record()
+    asked = parser.parse_args()
+    played = {name: digests(golden) for name, golden in GOLDEN.items()}
+    if asked.record:
+        record = {"recorded_on": here(), "stories": played}
+        RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
         print(f"{len(GOLDEN)} golden trajectories written to {RECORD.name}")
         return 0
-    found = differences()
-    print(explained(found) if found else f"all {len(GOLDEN)} golden trajectories are as recorded")
+    found = explained(played)
+    print(found or f"all {len(GOLDEN)} golden trajectories are as recorded")
     return 1 if found else 0
 
 
