@@ -1,0 +1,131 @@
+"""What one value passes on its way: an episode into the paper's table, a policy's text into a run.
+
+    python -m verification.trace
+
+A hop is a function of ours that receives the value and returns or forwards it, alone or in a list,
+tuple or dict; one that only reads it is none. A container is a type or table that holds it.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import swarm_logistics_env
+from swarm_logistics_env.episode import Episode
+from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.report.section import Section
+from swarm_logistics_env.report.tables import tables
+from swarm_logistics_env.report.write import section_markdown
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.verdict import Cell
+from swarm_logistics_env.tasks.task import Outcome, Run
+
+PACKAGE = str(Path(swarm_logistics_env.__file__).parent)
+SMALL: dict[str, Any] = {
+    "policies": ["swarm-dt"],
+    "seeds": 1,
+    "scenario": {"duration": 2.0},
+    "sizes": [{"values": [2, 3]}],
+}
+
+
+def _holds(value: object, kinds: tuple[type, ...]) -> str | None:
+    """Return the name of the kind that a value is or has among its elements."""
+    if isinstance(value, dict):
+        value = tuple(value.values())
+    for one in value if isinstance(value, list | tuple) else (value,):
+        for each in one if isinstance(one, tuple) else (one,):
+            if isinstance(each, kinds):
+                return next(kind.__name__ for kind in kinds if isinstance(each, kind))
+    return None
+
+
+class Trace:
+    """Notes the functions of the package that hand on a value of some kinds.
+
+    Attributes:
+        hops: their names, in the order in which they were entered.
+        containers: names of the kinds that were met.
+    """
+
+    def __init__(self, *kinds: type) -> None:
+        self.containers: dict[str, None] = {}
+        self._kinds = kinds
+        self._entered: list[list[bool]] = []  # of each frame: whether one below it hands it on
+        self._found: dict[str, int] = {}
+        self._number = 0
+
+    @property
+    def hops(self) -> list[str]:
+        return sorted(self._found, key=lambda name: self._found[name])
+
+    def of(self, action: Callable[[], object]) -> None:
+        """Note what happens during a call."""
+        sys.setprofile(self._note)
+        try:
+            action()
+        finally:
+            sys.setprofile(None)
+
+    def _note(self, frame: FrameType, event: str, argument: object) -> None:
+        code = frame.f_code
+        if event not in ("call", "return") or not code.co_filename.startswith(PACKAGE):
+            return
+        self._number += 1
+        if event == "call":
+            self._entered.append([False])
+            return
+        (below,) = self._entered.pop() if self._entered else [False]
+        given = [frame.f_locals.get(n) for n in code.co_varnames[: code.co_argcount]]
+        own = code.co_varnames[:1] in (("self",), ("cls",))
+        received = [kind for value in given[own:] if (kind := _holds(value, self._kinds))]
+        returned = _holds(argument, self._kinds)
+        self.containers |= dict.fromkeys(filter(None, [*received, returned]))
+        is_hop = returned is not None or bool(received and below)
+        if is_hop and not code.co_name.startswith(("<", "__")):
+            name = f"{Path(code.co_filename).stem}.{code.co_qualname}"
+            self._found.setdefault(name, self._number)
+        if self._entered and (is_hop or received or below):
+            self._entered[-1][0] = True
+
+
+def episode_to_table(out: Path) -> Trace:
+    """Trace an episode into a cell of the table that the report prints."""
+    trace = Trace(Episode, Outcome, Cell, Section)
+    study = Study(out=out, **SMALL)
+    study.run()  # compiled, and kept away from what is traced
+    traced = Study(out=out.with_name("traced"), **SMALL)
+    trace.of(traced.run)
+    trace.of(lambda: [section_markdown(one) for one in tables(traced.findings())])
+    trace.containers["the table `runs` of the store"] = None
+    return trace
+
+
+def text_to_policy() -> Trace:
+    """Trace a policy's text into the policy that plays a run, as a worker does."""
+    trace = Trace(PolicySpec, Run, Policy)
+    trace.of(lambda: [run.play() for run in Study(**SMALL).plan().runs[:1]])
+    return trace
+
+
+def main() -> None:
+    """Print both."""
+    with tempfile.TemporaryDirectory() as folder:
+        traces = {
+            "An episode to a cell of the paper's table": episode_to_table(Path(folder) / "study"),
+            "A policy's text to a running policy": text_to_policy(),
+        }
+    for title, trace in traces.items():
+        print(f"{title}: {len(trace.hops)} hops, {len(trace.containers)} containers")
+        print("  hops:", *trace.hops, sep="\n    ")
+        print("  containers:", ", ".join(trace.containers))
+
+
+if __name__ == "__main__":
+    main()
