@@ -13,7 +13,7 @@ from swarm_logistics_env.errors import CommandError, PolicyError
 from swarm_logistics_env.policies.policy import Policy, decide, start
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.fault_text import FaultLike
+from swarm_logistics_env.warehouse.faults import FaultLike
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
-from swarm_logistics_env.warehouse.fault_text import text_of
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from .app import PresetOption, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
 from .study_commands import (

@@ -14,7 +14,7 @@ from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
+from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults
 
 from .requests import (
     OPTIONS,

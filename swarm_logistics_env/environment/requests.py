@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swarm_logistics_env.errors import CommandError, SetupError, suggest
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.fault_text import checked_faults
-from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
+from swarm_logistics_env.warehouse.faults import GRACE, checked_faults, failed_robots
 
 
 def as_array(given: ArrayLike, name: str) -> NDArray[Any]:

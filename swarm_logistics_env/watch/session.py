@@ -13,8 +13,7 @@ from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults, failed_robots
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
