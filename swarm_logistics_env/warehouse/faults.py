@@ -10,7 +10,7 @@ import math
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Self, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ class Fault(Record):
         2
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = FaultError
+    error_type = FaultError
 
     mode: str
     robots: PositiveInt | tuple[NonNegativeInt, ...] = 1
@@ -110,10 +110,9 @@ class Fault(Record):
         if self.factor is not None and found.factor is None:
             able = ", ".join(name for name, mode in FAILURE_MODES.items() if mode.factor)
             raise ValueError(f"{self.mode} takes no factor; modes that do: {able}")
-        if self.mode == "removed" and self.duration is not None:
-            raise ValueError("a removed robot does not come back: duration should be None")
-        if self.mode == "removed" and self.intermittent is not None:
-            raise ValueError("a removed robot does not come back: intermittent should be None")
+        for name in ("duration", "intermittent"):
+            if self.mode == "removed" and getattr(self, name) is not None:
+                raise ValueError(f"a removed robot does not come back: {name} should be None")
         if isinstance(self.robots, tuple) and not self.robots:
             raise ValueError("robots = (): should name at least one robot")
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):

@@ -97,12 +97,6 @@ class WarehouseState:
     delivers = Quantity[np.bool_]("able", "delivers")
     sends = Quantity[np.bool_]("able", "sends")
     hears = Quantity[np.bool_]("able", "hears")
-    honest = Quantity[np.bool_]("able", "honest")
-    obeys = Quantity[np.bool_]("able", "obeys")
-    releases_inside = Quantity[np.bool_]("able", "releases_inside")
-    rangers_refresh = Quantity[np.bool_]("able", "rangers_refresh")
-    ranger_bias = Quantity[np.float64]("able", "ranger_bias")
-    radio_delay = Quantity[np.int64]("able", "radio_delay")
 
     item_position = Quantity[np.float64]("items", "position")
     item_status = Quantity[np.int64]("items", "status")
