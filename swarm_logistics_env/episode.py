@@ -13,7 +13,7 @@ from swarm_logistics_env.errors import CommandError, PolicyError
 from swarm_logistics_env.policies.policy import Policy, decide, start
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.fault_text import FaultLike
+from swarm_logistics_env.warehouse.faults import FaultLike
 
 
 @dataclass(frozen=True)
@@ -71,18 +71,13 @@ class Play:
     ) -> None:
         self.world = Warehouse(scenario)
         self._policy, self.seed = policy, seed
-        self._observations = self.world.reset(seed, faults)
+        self.world.reset(seed, faults)
         start(policy, scenario, seed if policy_seed is None else policy_seed)
 
     @property
     def is_over(self) -> bool:
         """Whether the time is up or everything is delivered."""
         return self.world.is_over_time or self.world.all_delivered
-
-    def sensed(self, robot: int) -> NDArray[np.float32]:
-        """Return the observation row (D,) that `robot` acts on next."""
-        row: NDArray[np.float32] = self._observations[robot]
-        return row
 
     def step(self) -> None:
         """Take one control period, or do nothing once the episode is over.
@@ -92,9 +87,9 @@ class Play:
         """
         if self.is_over:
             return
-        commands = decide(self._policy, self._observations, self.world.state)
+        commands = decide(self._policy, self.world.observe(), self.world.state)
         try:
-            self._observations = self.world.step(commands)
+            self.world.step(commands)
         except CommandError as error:
             raise PolicyError(
                 f"{type(self._policy).__name__} at {self.world.state.time:g} s: {error}"

@@ -58,7 +58,8 @@ def suggest(name: str, known: Iterable[str]) -> str:
     of what is known.
     """
     names = sorted(known)
-    likeness = {near: _likeness(name, near) for near in difflib.get_close_matches(name, names, n=6)}
+    close = difflib.get_close_matches(name, names, n=6)
+    likeness = {near: difflib.SequenceMatcher(None, near, name).ratio() for near in close}
     meant = sorted(near for near in likeness if likeness[near] == max(likeness.values()))
     if not meant and name:
         meant = [known for known in names if name.casefold() in known.casefold()]
@@ -66,7 +67,3 @@ def suggest(name: str, known: Iterable[str]) -> str:
         *others, last = map(repr, meant)
         return f"; did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
     return f"; known: {', '.join(names)}"
-
-
-def _likeness(name: str, known: str) -> float:
-    return difflib.SequenceMatcher(None, known, name).ratio()

@@ -36,7 +36,6 @@ def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path
     Raises:
         The `error_type`: the file cannot be written; names it and the reason.
     """
-    path = Path(path)
     is_plain = path.is_file() or not path.exists()
     whole = path.resolve()  # a link stays a link
     part = whole.with_name(f".{path.stem[:80]}.part{path.suffix}") if is_plain else path

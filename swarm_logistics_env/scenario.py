@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import (
     Field,
@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from swarm_logistics_env.errors import ScenarioError, SwarmLogisticsError, suggest
+from swarm_logistics_env.errors import ScenarioError, suggest
 from swarm_logistics_env.records import Record
 
 # Discs may cover this part of the floor; random sequential addition ends at 0.547.
@@ -83,7 +83,7 @@ class Scenario(Record):
             or items that do not fit, a delivery area that leaves no storage).
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = ScenarioError
+    error_type = ScenarioError
 
     n_robots: PositiveInt = Field(25, description="swarm size N [robots]; source: paper")
     n_items: PositiveInt = Field(60, description="items in storage at the start; source: paper")

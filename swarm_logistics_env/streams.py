@@ -46,10 +46,7 @@ def row_keys(seed: int, purpose: str, n_rows: int) -> NDArray[np.uint64]:
     Row i's key does not depend on `n_rows`.
     """
     rows = np.arange(1, n_rows + 1, dtype=np.uint64)
-    return _mixed(rows * np.uint64(0x9E3779B97F4A7C15) + np.uint64(key(seed, purpose)))
-
-
-def _mixed(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    value = rows * np.uint64(0x9E3779B97F4A7C15) + np.uint64(key(seed, purpose))
     # The output function of SplitMix64 (Steele, Lea, Flood 2014); `uniform` in kernels is its twin.
     value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     value = (value ^ (value >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .central_env import CentralEnv
 
@@ -12,11 +12,10 @@ if TYPE_CHECKING:
 __all__ = ["CentralEnv", "LogDeliveries", "SwarmVecEnv", "SwarmVecNormalize"]
 
 
-def __getattr__(name: str) -> type[LogDeliveries | SwarmVecEnv | SwarmVecNormalize]:
+def __getattr__(name: str) -> Any:
     # These load stable-baselines3 and torch, so they are imported when somebody asks for them.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from . import sb3
 
-    found: type[LogDeliveries | SwarmVecEnv | SwarmVecNormalize] = getattr(sb3, name)
-    return found
+    return getattr(sb3, name)

@@ -12,12 +12,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.environment.requests import checked_count, checked_seed
+from swarm_logistics_env.environment.requests import checked_count
 from swarm_logistics_env.errors import SetupError, how_to_install
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
+from swarm_logistics_env.wrappers.wrapper import layers_of
 
-from .worlds import RowsStep, World, Worlds, layers_of, maker
+from .worlds import RowsStep, World, Worlds, maker
 
 try:
     from stable_baselines3.common.callbacks import BaseCallback
@@ -141,7 +142,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         """
         if seed is None:
             seed = int(np.random.default_rng().integers(2**63))
-        seed = checked_seed(seed)
         self._seeds = [key(seed, "world", world) >> 1 for world in self._worlds.world_of.tolist()]
         return list(self._seeds)
 
@@ -251,8 +251,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
     def get_images(self) -> list[NDArray[np.uint8]]:
         """Return a picture (H, W, 3) of each world; all have the size of the largest."""
-        pictures = [env.render() for env in self.worlds]
-        shown = [picture for picture in pictures if picture is not None]
+        shown = [p for env in self.worlds if (p := env.render()) is not None]
         height, width = np.max([picture.shape[:2] for picture in shown], axis=0)
         return [
             np.pad(p, ((0, height - p.shape[0]), (0, width - p.shape[1]), (0, 0))) for p in shown

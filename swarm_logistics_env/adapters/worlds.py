@@ -15,7 +15,7 @@ from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
-from swarm_logistics_env.wrappers import Wrapper
+from swarm_logistics_env.wrappers.wrapper import Wrapper, layers_of
 
 World: TypeAlias = SwarmLogisticsEnv | Wrapper
 
@@ -130,12 +130,9 @@ class Worlds:
     def step(self) -> RowsStep:
         """Take one control period in every world, with the commands that were given."""
         # New arrays, because the caller may still hold those of the step before.
-        outcome = RowsStep(
-            self.blank(),
-            np.zeros(self.n_rows, np.float32),
-            np.zeros(self.n_rows, np.bool_),
-            np.zeros(self.n_rows, np.bool_),
-        )
+        terminated, truncated = np.zeros((2, self.n_rows), np.bool_)
+        rewards = np.zeros(self.n_rows, np.float32)
+        outcome = RowsStep(self.blank(), rewards, terminated, truncated)
         self.told = []
         if self._shared_out:
             outcome = self._step_together(outcome)
@@ -197,14 +194,6 @@ class Worlds:
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self.__dict__.update(saved)
         self._begin_work()
-
-
-def layers_of(env: World) -> list[Any]:
-    """Return the wrappers, outermost first, and the environment."""
-    layers: list[Any] = [env]
-    while layers[-1] is not env.unwrapped:
-        layers.append(layers[-1].env)
-    return layers
 
 
 def _can_be_shared_out(layers: list[Any]) -> bool:

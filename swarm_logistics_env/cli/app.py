@@ -21,8 +21,7 @@ from rich.markup import escape
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
 from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
-from swarm_logistics_env.warehouse.fault_text import fault_of
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.warehouse.faults import Fault, fault_of
 
 # In the order of use, as the help shows them. A module is imported when its command is called.
 COMMANDS = {
@@ -232,7 +231,7 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
 
 
 def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
-    """Return the faults that `--fault` describes, see `fault_text`.
+    """Return the faults that `--fault` describes, see `faults.fault_of`.
 
     Raises:
         FaultError: a text does not read so, there is no such fault, or the episode ends before.

@@ -24,12 +24,11 @@ from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
 from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.play import engine_named
+from swarm_logistics_env.studies.play import Engine, Tally, engine_named
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
-from swarm_logistics_env.warehouse.fault_text import text_of
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from .app import PresetOption, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
 from .study_commands import (
@@ -148,13 +147,18 @@ def judge_command(
         for option, given in {"--seeds": seeds, "--clearing": clearing}.items():
             if given:
                 raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
-        raise typer.Exit(1 if _play_benchmark(asked, out, minutes, processes, trust_code) else 0)
     if is_policy:
-        failed = _judge_policy(
-            asked, out, seeds or JUDGE_SEEDS, minutes, processes, trust_code,
-            until_clear=until_clear, clearing=clearing, full=full, command=str(context.obj),
-        )  # fmt: skip
-        raise typer.Exit(1 if failed else 0)
+        count = processes or os.cpu_count() or 1
+        engine = engine_named("process" if count > 1 else "local", count)
+        if plays_benchmark:
+            tally, place = _play_benchmark(asked, out, engine, minutes, trust_code)
+        else:
+            tally, place = _judge_policy(
+                asked, out, engine, minutes, trust_code, seeds or JUDGE_SEEDS,
+                until_clear=until_clear, clearing=clearing, full=full, command=str(context.obj),
+            )  # fmt: skip
+        say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", place)
+        raise typer.Exit(1 if tally.failed else 0)
 
     usual = Path("results", "judged", Path(asked).stem)
     directory = out or _free(usual)
@@ -217,17 +221,17 @@ def names_policy(asked: str) -> bool:
 def _judge_policy(
     asked: str,
     out: Path | None,
-    seeds: int,
+    engine: Engine,
     minutes: float | None,
-    processes: int | None,
     trust_code: bool,
+    seeds: int,
     *,
     until_clear: bool,
     clearing: bool,
     full: bool,
     command: str,
-) -> int:
-    """Play the study `scorecard` with a policy until it is clear; return how many runs failed.
+) -> tuple[Tally, Path]:
+    """Play the study `scorecard` with a policy until it is clear; return what, and where it is.
 
     Every run is kept at once, so that the same command goes on after an interruption.
     """
@@ -239,8 +243,6 @@ def _judge_policy(
         until_cleared(study)
     say(f"{study.plan()}, kept in {out}")
     typer.echo()
-    count = processes or os.cpu_count() or 1
-    engine = engine_named("process" if count > 1 else "local", count, None)
     tell_what_a_pilot_shows(study)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
@@ -259,8 +261,7 @@ def _judge_policy(
             f"swarm-logistics judge {shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
             f"--out {shlex.quote(f'{out}-{more}')}",
         )
-    say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", out)
-    return tally.failed
+    return tally, out
 
 
 # Scores of the shipped policies in the benchmark; `docs/play_tables.py` writes it.
@@ -268,9 +269,9 @@ ENTRIES = Path(__file__).parents[1] / "report" / "benchmark_entries.json"
 
 
 def _play_benchmark(
-    asked: str, out: Path | None, minutes: float | None, processes: int | None, trust_code: bool
-) -> int:
-    """Play the benchmark with a policy, or all its trainings; return how many runs failed."""
+    asked: str, out: Path | None, engine: Engine, minutes: float | None, trust_code: bool
+) -> tuple[Tally, Path]:
+    """Play the benchmark with a policy, or all its trainings; return what, and where it is."""
     policy = PolicySpec.of(asked).replace(trusted=trust_code)
     for one in policy.trainings or (policy,):
         one.load()
@@ -278,21 +279,17 @@ def _play_benchmark(
     study = study_of(benchmark.STUDY, out, None, [asked], trust_code)
     say(f"{study.plan()}, kept in {out}")
     typer.echo()
-    count = processes or os.cpu_count() or 1
-    engine = engine_named("process" if count > 1 else "local", count, None)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
     if tally.left or tally.failed:
         show_report(results, out)
-        say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", out)
-        return tally.failed
+        return tally, out
     show(benchmark.table(results))
     entries = {name: np.array(one) for name, one in json.loads(ENTRIES.read_text()).items()}
     entries[policy.title] = benchmark.score(results)
     show(benchmark.leaderboard(entries))
     typer.echo(f"Report: {write_report(results, out, document(results))[0]}")
-    say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", out)
-    return tally.failed
+    return tally, out
 
 
 # P of the shipped policies in the study `scorecard`; `docs/play_tables.py` writes it.
@@ -315,13 +312,11 @@ def _rank(results: StudyResults) -> str | None:
     return f"P of the shipped policies here: {others}{rank}."
 
 
-PolicyArgument = Annotated[
-    str, typer.Argument(metavar="POLICY", help="Name, path of a file, module:Class or my.py:Class.")
-]
-
-
 def attack_command(
-    policy: PolicyArgument,
+    policy: Annotated[
+        str,
+        typer.Argument(metavar="POLICY", help="Name, path of a file, module:Class or my.py:Class."),
+    ],
     robots: Annotated[int, typer.Option(min=1, help="How many robots fail.")] = 2,
     modes: Annotated[
         list[str] | None,
@@ -367,12 +362,7 @@ def attack_command(
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
     rows = [
-        (
-            found.by,
-            _in_words(found.fault),
-            bracketed(found.robustness, 3),
-            str(found.runs),
-        )
+        (found.by, _in_words(found.fault), bracketed(found.robustness, 3), str(found.runs))
         for found in result.found
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)

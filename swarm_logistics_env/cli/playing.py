@@ -281,15 +281,10 @@ def list_command(
         )
         show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
     else:
-        plans = [(name, Study.preset(name).plan()) for name in PRESETS]
-        found = [
-            (
-                name,
-                str(len(plan.seeds)),
-                str(len(plan.runs)),
-                "; ".join(dict.fromkeys(table for _, table, _ in plan.cells)),
-            )
-            for name, plan in plans
-        ]
+        found = []
+        for name in PRESETS:
+            plan = Study.preset(name).plan()
+            tables = "; ".join(dict.fromkeys(table for _, table, _ in plan.cells))
+            found.append((name, str(len(plan.seeds)), str(len(plan.runs)), tables))
         line = "swarm-logistics study plan NAME prints its conditions; study run NAME plays it."
         show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)

@@ -114,14 +114,13 @@ def run_command(
 ) -> None:
     """Play the runs that are missing, then print the answer and write the report."""
     part = Shard.parse(shard) if shard else None
-    looks: dict[str, bool] = {}
     if until_clear:
         seeds = MOST_SEEDS if seeds is None else seeds
         if seeds <= FIRST_LOOK:
             raise StudyError(
                 f"--most {seeds}: should be more than {FIRST_LOOK} seeds, where the first look is"
             )
-        looks = {"until_clear": True}
+    looks = {"until_clear": True} if until_clear else {}
     chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
     if clearing:
         until_cleared(chosen)

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.answer import MOST_LINES, Answer, answer, digest, in_a_sentence
+from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import NOTHING, WORDS, Section, number
 from swarm_logistics_env.report.write import (
@@ -89,17 +89,6 @@ def show_table(
     show(Section(title, tuple(columns), tuple(rows), lines))
 
 
-def show_answer(found: Answer, *, whole: bool = False) -> None:
-    """Print the answer of a study on one screen, or with every line of it."""
-    console = Console(highlight=False)
-    width = console.width if console.is_terminal else _PLAIN_WIDTH
-    lines = digest(found, width, None if whole else MOST_LINES).split("\n")
-    shown = Text("\n".join(map(plain, lines)))
-    for word in _VERDICTS.finditer(shown.plain):
-        shown.stylize(_COLOURS[word[1]], *word.span())
-    console.print(shown, soft_wrap=True)
-
-
 def show_report(
     results: StudyResults, out: Path | None, *, full: bool = False, unfinished: str = ""
 ) -> None:
@@ -115,7 +104,13 @@ def show_report(
     for section in whole.summary if full else ():
         show(section)
     # Printed first: what was found is told even where no file can be written.
-    show_answer(answer(results, most=None) if full else whole.answer, whole=full)
+    console = Console(highlight=False)
+    width = console.width if console.is_terminal else _PLAIN_WIDTH
+    found, most = (answer(results, most=None), None) if full else (whole.answer, MOST_LINES)
+    shown = Text("\n".join(map(plain, digest(found, width, most).split("\n"))))
+    for word in _VERDICTS.finditer(shown.plain):
+        shown.stylize(_COLOURS[word[1]], *word.span())
+    console.print(shown, soft_wrap=True)
     if out:
         typer.echo(f"Report: {write_report(results, out, whole)[0]}")
         if missing := missing_packages():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -37,32 +37,23 @@ def train_command(
     """Train a policy; the same command goes on where it was stopped."""
     changed = {"seed": seed, "agent_steps": steps}
     fields = {name: value for name, value in changed.items() if value is not None}
-    try:
-        path = _train(preset, out, str(context.obj), device, fields)
-    except KeyboardInterrupt:
-        typer.echo("\nStopped. The same command goes on.", err=True)
-        raise typer.Exit(130) from None
-    typer.echo(f"Written: {path}")
-    typer.echo(f"Watch it: swarm-logistics watch --policy {shlex.quote(str(path))}")
-    typer.echo(f"Judge it: swarm-logistics judge {shlex.quote(str(path))}")
-
-
-def _train(
-    asked: str, out: Path | None, command: str, device: str | None, fields: dict[str, Any]
-) -> Path:
-    """Train a preset, or what a TOML file describes, and show it; return the policy file's path."""
-    training = load_training(asked, **fields)
+    training = load_training(preset, **fields)
     try:
         import_module("tensorboard")  # missed before anything is written
         from swarm_logistics_env.train.trainer import train
     except ModuleNotFoundError as error:
         raise TrainingError(f"training needs more ({error}): {how_to_install('train')}") from error
     out = out or Path("results/train", training.name)
-    log = shlex.quote(str(out / "tensorboard"))
-    typer.echo(f"To follow it: tensorboard --logdir {log}")
-    path = train(training, out, command=command, device=device)
+    typer.echo(f"To follow it: tensorboard --logdir {shlex.quote(str(out / 'tensorboard'))}")
+    try:
+        path = train(training, out, command=str(context.obj), device=device)
+    except KeyboardInterrupt:
+        typer.echo("\nStopped. The same command goes on.", err=True)
+        raise typer.Exit(130) from None
     _show_training(path)
-    return path
+    typer.echo(f"Written: {path}")
+    typer.echo(f"Watch it: swarm-logistics watch --policy {shlex.quote(str(path))}")
+    typer.echo(f"Judge it: swarm-logistics judge {shlex.quote(str(path))}")
 
 
 def _show_training(path: Path) -> None:

@@ -14,7 +14,7 @@ from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
+from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults
 
 from .requests import (
     OPTIONS,
@@ -22,7 +22,6 @@ from .requests import (
     check_somebody_is_there,
     checked_count,
     checked_options,
-    checked_seed,
     faults_among,
     scenario_fields,
 )
@@ -147,7 +146,7 @@ class SwarmLogisticsEnv(DictView):
                 f"reset option {str(unknown)!r} is ignored{suggest(str(unknown), OPTIONS)}",
                 stacklevel=3,
             )
-        seed = self.next_seed if seed is None else checked_seed(seed)
+        seed = self.next_seed if seed is None else seed
         scenario = self.scenario_of(seed, options)
         self._spaces.check(scenario, len(self.possible_agents))
         faults = faults_among(options, self.faults)
@@ -264,7 +263,7 @@ class SwarmLogisticsEnv(DictView):
 
     def state(self) -> NDArray[np.float32]:
         """Return the whole warehouse as one vector, see `global_state`; for central critics."""
-        return global_state(self.warehouse, len(self.possible_agents), self._spaces.n_items)
+        return global_state(self.warehouse, len(self.possible_agents), self._spaces.most["n_items"])
 
     @property
     def state_space(self) -> Box:

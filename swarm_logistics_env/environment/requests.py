@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swarm_logistics_env.errors import CommandError, SetupError, suggest
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.fault_text import checked_faults
-from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
+from swarm_logistics_env.warehouse.faults import GRACE, checked_faults, failed_robots
 
 
 def as_array(given: ArrayLike, name: str) -> NDArray[Any]:
@@ -87,12 +86,10 @@ def gathered(
                 raise CommandError(f"command of {agent!r} of shape {row.shape}: should be {wanted}")
     try:
         # To concatenate is several times as fast as an array of arrays; numbers cannot be.
-        given = np.concatenate(rows) if wanted else np.array(rows)
+        given = np.concatenate(rows if wanted else [rows], dtype=np.float64, casting="same_kind")
     except TypeError as error:
         raise CommandError(f"commands should be numbers: {error}") from error
-    if given.dtype.kind not in "fiub":
-        raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
-    return given.reshape(len(rows), *wanted).astype(np.float64)
+    return given.reshape(len(rows), *wanted)
 
 
 def _check_names(
@@ -131,18 +128,6 @@ def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
         if get_close_matches(unknown.casefold(), OPTIONS, cutoff=0.8):
             raise SetupError(f"there is no reset option {unknown!r}{suggest(unknown, OPTIONS)}")
     return dict(options)
-
-
-def checked_seed(seed: int) -> int:
-    """Return the seed as an int.
-
-    Raises:
-        SetupError: it is not an integer.
-    """
-    try:
-        return operator.index(seed)
-    except TypeError:
-        raise SetupError(f"seed = {seed!r}: should be None or an integer") from None
 
 
 def checked_count(name: str, value: int, least: int = 1) -> int:

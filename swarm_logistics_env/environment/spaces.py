@@ -75,6 +75,7 @@ class Spaces:
     Attributes:
         observation: the space of an observation row (D,).
         action: the space of a command (4 + message_size,).
+        most: the largest value in a declared scenario of each field that bounds the state.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -82,13 +83,7 @@ class Spaces:
         self.observation = Box(low, high, dtype=np.float32)
         self.action = Box(-1.0, 1.0, (4 + scenario.message_size,), dtype=np.float32)
         self._own, self._declared = scenario, {scenario}
-        self._most = {name: getattr(scenario, name) for name in _BOUND_THE_STATE}
-
-    @property
-    def n_items(self) -> int:
-        """The largest number of items in a declared scenario."""
-        n_items: int = self._most["n_items"]
-        return n_items
+        self.most = {name: getattr(scenario, name) for name in _BOUND_THE_STATE}
 
     def widen(self, scenario: Scenario) -> None:
         """Widen the spaces for `scenario`.
@@ -105,13 +100,13 @@ class Spaces:
         low = np.minimum(low, self.observation.low)
         high = np.maximum(high, self.observation.high)
         self.observation = Box(low, high, dtype=np.float32)
-        for name, most in self._most.items():
-            self._most[name] = max(most, getattr(scenario, name))
+        for name, most in self.most.items():
+            self.most[name] = max(most, getattr(scenario, name))
         self._declared.add(scenario)
 
     def state(self, n_robots: int) -> Box:
         """Return the space of the state with rows for `n_robots` and the most items."""
-        n_items, width, height, speed, limit, duration = self._most.values()
+        n_items, width, height, speed, limit, duration = self.most.values()
         robot_low = [0, 0, 0, -1, -1, -speed, -speed, 0, 0, 0]
         robot_high = [1, width, height, 1, 1, speed, speed, 1, 1, limit]
         low = [*(robot_low * n_robots), *([0] * len(ITEM_FEATURES) * n_items), 0]
@@ -137,12 +132,8 @@ class Spaces:
             )
         if scenario in self._declared:
             return
-        low, high = bounds(scenario)
-        seen = self.observation
-        is_seen_within = low.shape == seen.shape and bool(
-            (low >= seen.low).all() and (high <= seen.high).all()
-        )
-        is_state_within = all(getattr(scenario, name) <= most for name, most in self._most.items())
+        is_seen_within = all(map(self.observation.contains, bounds(scenario)))
+        is_state_within = all(getattr(scenario, name) <= most for name, most in self.most.items())
         if is_seen_within and is_state_within:
             return
         changed = [

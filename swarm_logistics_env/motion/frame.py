@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
+from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
 from swarm_logistics_env.motion.memory import clear_the_way, stand_to_handle, steer
@@ -75,11 +76,10 @@ class MotionFrame:
         Args:
             bodies: (N, 3) of robots that are not all as the scenario has them (`memory.body_of`).
         """
-        self.keys = keys.copy()
-        self.counts = np.zeros(len(keys), np.int64)
-        self.memory = np.empty((len(keys), known.N_COLUMNS))
-        known.begin_memory(keys, self._bodies(keys) if bodies is None else bodies, self.memory)
-        self.turned = np.zeros(len(keys))
+        n = len(keys)
+        self.keys, self.counts = np.empty(n, np.uint64), np.empty(n, np.int64)
+        self.memory, self.turned = np.empty((n, known.N_COLUMNS)), np.zeros(n)
+        self.begin_rows(np.arange(n), keys, bodies)
 
     def begin_rows(
         self,
@@ -90,14 +90,20 @@ class MotionFrame:
         """Begin an episode in these rows alone."""
         self.keys[rows], self.counts[rows] = keys, 0
         fresh = np.empty((len(rows), known.N_COLUMNS))
-        known.begin_memory(keys, self._bodies(keys) if bodies is None else bodies, fresh)
+        bodies = np.tile(self._body, (len(keys), 1)) if bodies is None else bodies
+        known.begin_memory(keys, bodies, fresh)
         self.memory[rows] = fresh
 
-    def _bodies(self, keys: NDArray[np.uint64]) -> NDArray[np.float64]:
-        return np.tile(self._body, (len(keys), 1))
-
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on."""
+        """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on.
+
+        Raises:
+            PolicyError: there are more or fewer rows than keys at `begin`.
+        """
+        if len(observations) != len(self.keys):
+            raise PolicyError(
+                f"observations of {len(observations)} robots: reset was told {len(self.keys)}"
+            )
         inputs = self._inputs(observations, self.memory, slice(None), self.turned)
         self.counts += 1
         self._rows = observations

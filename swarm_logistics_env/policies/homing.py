@@ -14,12 +14,12 @@ never commands a turn, so it is for robots that can move sideways (the holonomic
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as known
 from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionFrame, random_heading
@@ -66,29 +66,16 @@ class Homing:
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
-        if len(observations) != len(self._frame.keys):
-            raise PolicyError(
-                f"observations of {len(observations)} robots: reset was told "
-                f"{len(self._frame.keys)}"
-            )
         frame = self._frame
         frame.read(observations)
         numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
         commands = np.zeros((len(observations), 4))
-        self._decide(observations, frame, numbers, commands)
+        self._decide(observations, frame.memory, frame.keys, numbers, self._period, commands)
         return frame.command(frame.outputs_for(commands))
 
-    def _decide(
-        self,
-        observations: NDArray[np.float32],
-        frame: MotionFrame,
-        random_headings: NDArray[np.int64],
-        commands: NDArray[np.float64],
-    ) -> None:
-        """Fill the commands (N, 4), in the robots' own frames."""
-        decide_homing(
-            observations, frame.memory, frame.keys, random_headings, self._period, commands
-        )
+    def _decide(self, *arrays: Any) -> None:
+        """Fill the last of what `decide_homing` takes: commands in the robots' own frames."""
+        decide_homing(*arrays)
 
 
 @kernel

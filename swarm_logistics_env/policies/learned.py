@@ -9,7 +9,7 @@ import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from pydantic import (
     field_validator,
 )
 
-from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
+from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
 from swarm_logistics_env.records import Record
@@ -33,7 +33,7 @@ Width = Annotated[int, Field(ge=1, le=4096)]
 
 
 class _Part(Record):
-    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+    error_type = PolicyError
 
 
 class Network(_Part):
@@ -305,11 +305,11 @@ class LearnedPolicy:
         self._step = 0
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return commands (N, 4) for observation rows (N, D)."""
-        if observations.shape[0] != len(self._keys):
-            raise PolicyError(
-                f"observations of {observations.shape[0]} robots: reset was told {len(self._keys)}"
-            )
+        """Return commands (N, 4) for observation rows (N, D).
+
+        Raises:
+            PolicyError: there are more or fewer rows than robots at `reset`.
+        """
         outputs = self._network(self._frame.read(observations))
         if self.card.network.exploration:
             explore(self._keys, self._step, self._deviations, outputs)

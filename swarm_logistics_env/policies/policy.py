@@ -173,7 +173,10 @@ def function_digest(function: object) -> str:
 def _digest(used: dict[str, Path]) -> str:
     digest = hashlib.sha256()
     for name, path in sorted(used.items()):
-        digest.update(name.encode() + b"\0" + _content(path) + b"\0")
+        content = path.read_bytes()
+        if path.suffix == ".py":
+            content = without_prose(content.decode()).encode()
+        digest.update(name.encode() + b"\0" + content + b"\0")
     return digest.hexdigest()[:16] if used else ""
 
 
@@ -191,12 +194,6 @@ def without_prose(source: str) -> str:
         for number, line in lines
         if number not in prose and line.strip() and not line.lstrip().startswith("#")
     )
-
-
-def _content(path: Path) -> bytes:
-    if path.suffix != ".py":
-        return path.read_bytes()
-    return without_prose(path.read_text(encoding="utf-8")).encode()
 
 
 def _follow(name: str, path: Path, packages: set[str], used: dict[str, Path]) -> None:

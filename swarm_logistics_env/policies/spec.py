@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
@@ -121,7 +121,7 @@ class PolicySpec(Record):
         trusted: whether a file may be read that executes the code in it; no file can say so.
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+    error_type = PolicyError
 
     name: str
     parameters: dict[str, JsonValue] = Field(default_factory=dict)
@@ -230,11 +230,9 @@ class PolicySpec(Record):
             return canonical_json({one.name: one.identity(makers) for one in self.trainings})
         found = identity(self.load(makers))
         # A class of one's own need not tell its parameters.
-        return (
-            canonical_json({"given": self.parameters, "policy": found})
-            if self.parameters
-            else found
-        )
+        if not self.parameters:
+            return found
+        return canonical_json({"given": self.parameters, "policy": found})
 
 
 @functools.lru_cache(maxsize=8)

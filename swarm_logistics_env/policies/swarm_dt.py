@@ -12,14 +12,14 @@ timer, moves towards the one that tells the lowest.
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
+from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
@@ -34,7 +34,7 @@ class SwarmDTParameters(Record):
     the drop both once a step; that the one step is 0.06 s and the other 0.02 s is fitted.
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+    error_type = PolicyError
 
     diffusion: NonNegativeFloat = Field(
         1.39, description="of the stored heading [rad^2/s]: U(+-0.5 rad) a step; source: simulator"

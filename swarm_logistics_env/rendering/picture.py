@@ -59,10 +59,6 @@ class Projection:
         width = self.right + self.left
         return width + width % 2
 
-    def length(self, metres: float) -> float:
-        """Return a length in pixels."""
-        return metres * self.scale
-
     def points(self, positions: NDArray[np.float64]) -> list[tuple[float, float]]:
         """Return positions (K, 2) [m] as K pixels, not rounded."""
         pixels = positions * (self.scale, -self.scale) + (self.left, self.bottom)
@@ -81,21 +77,12 @@ class Picture:
 
     Attributes:
         projection: the place of the warehouse on the picture.
+        width, height: of the picture [px], caption included.
     """
 
     def __init__(self, scenario: Scenario, size: int) -> None:
         self._size = size
         self._lay_out(scenario)
-
-    @property
-    def width(self) -> int:
-        """Width of the picture [px]."""
-        return self._canvas.get_width()
-
-    @property
-    def height(self) -> int:
-        """Height of the picture [px], caption included."""
-        return self._canvas.get_height()
 
     def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
         """Return the picture of `state`, which stays as it is until the next call."""
@@ -133,6 +120,7 @@ class Picture:
         )
         height = projection.bottom + margin + self._caption.height + margin // 2
         height += height % 2  # even, as the width
+        self.width, self.height = projection.width, height
         self._canvas = new_canvas(projection.width, height)
         self._background = new_canvas(projection.width, height)
         self._background.blit(background(projection, scenario, height, text_height), (0, 0))
@@ -140,9 +128,9 @@ class Picture:
         left, top = projection.left, projection.top
         self._floor = pygame.Rect(left, top, projection.right - left, projection.bottom - top)
         # Things stay visible in a warehouse that is drawn small.
-        self._robot_radius = max(3.5, projection.length(scenario.robot_radius))
-        self._item_half = max(2.0, 0.8 * projection.length(scenario.item_radius))
-        self._obstacle_radius = max(3.0, projection.length(scenario.obstacle_radius))
+        self._robot_radius = max(3.5, projection.scale * scenario.robot_radius)
+        self._item_half = max(2.0, 0.8 * (projection.scale * scenario.item_radius))
+        self._obstacle_radius = max(3.0, projection.scale * scenario.obstacle_radius)
         self._shape = _shape(scenario)
 
     def _draw_halos(self, state: WarehouseState, scenario: Scenario, robots: list[Point]) -> None:
@@ -208,10 +196,10 @@ def background(
     floor = picture[top:bottom, left:right]
     floor[:] = palette.FLOOR
     for metre in range(1, math.ceil(scenario.warehouse_width)):
-        floor[:, round(projection.length(metre))] = palette.FLOOR_LINE
+        floor[:, round(projection.scale * metre)] = palette.FLOOR_LINE
     for metre in range(1, math.ceil(scenario.warehouse_height)):
-        floor[-round(projection.length(metre))] = palette.FLOOR_LINE
-    edge = round(projection.length(scenario.storage_width))
+        floor[-round(projection.scale * metre)] = palette.FLOOR_LINE
+    edge = round(projection.scale * scenario.storage_width)
     area = floor[:, edge:]
     area[:] = _hatched(area.shape[0], area.shape[1], period=max(6.0, 0.6 * projection.margin))
     area[:, : max(1, wall // 2)] = palette.DELIVERY_WORD
@@ -246,9 +234,9 @@ def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float)
     x_part, y_part = (end[0] - start[0]) / length, (end[1] - start[1]) / length
     tip = (end[0] - gap * x_part, end[1] - gap * y_part)
     base = (tip[0] - 0.8 * head * x_part, tip[1] - 0.8 * head * y_part)
-    draw_line(canvas, palette.LINK, start, base, width)
+    draw_line(canvas, start, base, width)
     step = sprites.heading_step(math.atan2(-y_part, x_part))
-    stamp(canvas, [(sprites.arrowhead(head, step, palette.LINK), tip)])
+    stamp(canvas, [(sprites.arrowhead(head, step), tip)])
 
 
 # The widest texts there may be, so that a picture's size does not change with what happens.
@@ -268,7 +256,7 @@ class Caption:
         self._left, self._top = left, top
         self._width, self._text_height = width, text_height
         self._line = round(1.35 * text_height)
-        self._places = self._flow([self._words(text) for text in _WIDEST])
+        self._places = self._flow([words(text, text_height) for text in _WIDEST])
         self._legend = _legend(text_height)
         self._legend_places = self._flow(self._legend)
         self._failures_line = self._places[-1][1] + 1
@@ -278,7 +266,7 @@ class Caption:
     @staticmethod
     def least_width(text_height: int) -> int:
         """Return the width [px] below which words would be cut."""
-        return max(words(text, text_height, palette.INK).get_width() for text in _WIDEST)
+        return max(words(text, text_height).get_width() for text in _WIDEST)
 
     def draw_legend(self, canvas: pygame.Surface) -> None:
         """Draw what the colours mean, which never changes."""
@@ -288,15 +276,15 @@ class Caption:
     def draw(self, canvas: pygame.Surface, state: WarehouseState, scenario: Scenario) -> None:
         """Write the scores and the failures of `state`."""
         for text, (x, line) in zip(_scores(state, scenario), self._places, strict=True):
-            self._put(canvas, self._words(text), x, line)
+            self._put(canvas, words(text, self._text_height), x, line)
         self._draw_failures(canvas, state)
 
     def _draw_failures(self, canvas: pygame.Surface, state: WarehouseState) -> None:
-        failed = int(state.failed.sum())
-        chips = [self._words(f"failed: {failed}" if failed else "no failures")]
+        failed, text_height = int(state.failed.sum()), self._text_height
+        chips = [words(f"failed: {failed}" if failed else "no failures", text_height)]
         counts = Counter(mode for modes in state.failure_modes for mode in modes)
-        chips += [_failure(mode, count, self._text_height) for mode, count in counts.items()]
-        more, gap = self._words("…"), self._text_height // 2
+        chips += [_failure(mode, count, text_height) for mode, count in counts.items()]
+        more, gap = words("…", text_height), text_height // 2
         x = 0
         for place, chip in enumerate(chips):
             room = 0 if place == len(chips) - 1 else gap + more.get_width()
@@ -320,25 +308,20 @@ class Caption:
             x += width + self._text_height
         return places
 
-    def _words(self, text: str) -> pygame.Surface:
-        return words(text, self._text_height, palette.INK)
-
 
 @lru_cache(maxsize=128)
 def _failure(mode: str, count: int, text_height: int) -> pygame.Surface:
-    name = words(f"{mode} ×{count}", text_height, palette.INK)
+    name = words(f"{mode} ×{count}", text_height)
     if mode not in palette.MARKS:
         return name
-    return _row(
-        [(badge(palette.MARKS[mode], round(0.7 * text_height)),), (name,)], text_height // 5
-    )
+    mark = badge(palette.MARKS[mode], round(0.7 * text_height))
+    return _row([(mark,), (name,)], text_height // 5)
 
 
 def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
     radius = 0.42 * text_height
     load, asked_for = sprites.item(0.45 * radius, False), sprites.item(0.5 * radius, True)
-    entries: list[pygame.Surface] = []
-    for name, pictures in {
+    entries = {
         "searching": (sprites.robot(radius, palette.SEARCHING, 0, False),),
         "shuffling": (sprites.robot(radius, palette.SHUFFLING, 0, False), load),
         "delivering": (sprites.robot(radius, palette.DELIVERING, 0, False), asked_for),
@@ -347,9 +330,11 @@ def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
             sprites.halo(0.6 * radius, 0),
             sprites.robot(0.6 * radius, palette.SEARCHING, 0, False),
         ),
-    }.items():
-        entries.append(_row([pictures, (words(name, text_height, palette.INK),)], text_height // 4))
-    return tuple(entries)
+    }
+    return tuple(
+        _row([pictures, (words(name, text_height),)], text_height // 4)
+        for name, pictures in entries.items()
+    )
 
 
 def _row(stacks: Sequence[tuple[pygame.Surface, ...]], gap: int) -> pygame.Surface:

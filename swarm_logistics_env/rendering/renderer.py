@@ -57,12 +57,7 @@ class Renderer:
         dtype('uint8')
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        mode: RenderMode,
-        size: int = 800,
-    ) -> None:
+    def __init__(self, scenario: Scenario, mode: RenderMode, size: int = 800) -> None:
         if mode not in get_args(RenderMode):
             raise SetupError(f"mode = {mode!r}: should be one of {list(get_args(RenderMode))}")
         if not LEAST_SIZE <= size <= LARGEST_SIZE:

@@ -41,7 +41,7 @@ def stamp(canvas: pygame.Surface, stamps: Iterable[tuple[pygame.Surface, Point]]
     canvas.blits(placed, False)
 
 
-def draw_line(canvas: pygame.Surface, colour: RGB, start: Point, end: Point, width: float) -> None:
+def draw_line(canvas: pygame.Surface, start: Point, end: Point, width: float) -> None:
     """Draw a line of that width [px] as several thin ones, because pygame smooths only those."""
     length = math.hypot(end[0] - start[0], end[1] - start[1])
     if length == 0.0:
@@ -51,7 +51,7 @@ def draw_line(canvas: pygame.Surface, colour: RGB, start: Point, end: Point, wid
     for offset in np.linspace(-half, half, 1 + math.ceil(4.0 * half)).tolist():
         pygame.draw.aaline(
             canvas,
-            colour,
+            palette.LINK,
             (start[0] + offset * x_part, start[1] + offset * y_part),
             (end[0] + offset * x_part, end[1] + offset * y_part),
         )
@@ -71,7 +71,7 @@ _LETTERS = 4  # times as large as they are shown
 
 P = ParamSpec("P")
 Distance = NDArray[np.float64]  # (H, W) [px]
-Layer = tuple[Distance, palette.RGB, float]  # a shape, its colour, its opacity in [0, 1]
+Layer = tuple[Distance, RGB, float]  # a shape, its colour, its opacity in [0, 1]
 
 
 def pixels(reach: float) -> tuple[Distance, Distance]:
@@ -145,7 +145,7 @@ def blank(width: int, height: int) -> pygame.Surface:
 
 
 @_sprite
-def robot(radius: float, colour: palette.RGB, heading: int, is_faulty: bool) -> NDArray[np.uint8]:
+def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[np.uint8]:
     """Return a disc with a nose; a faulty robot's edge is thick.
 
     Args:
@@ -220,11 +220,11 @@ def obstacle(radius: float) -> NDArray[np.uint8]:
 
 
 @_sprite
-def arrowhead(length: float, heading: int, colour: palette.RGB) -> NDArray[np.uint8]:
+def arrowhead(length: float, heading: int) -> NDArray[np.uint8]:
     """Return a triangle of that length [px] with its tip in the middle of the picture."""
     x, y = pixels(1.2 * length)
     turned = -2.0 * math.pi * heading / HEADINGS
-    return painted((wedge(x, y, turned, 0.0, -length, 0.45 * length), colour, 1.0))
+    return painted((wedge(x, y, turned, 0.0, -length, 0.45 * length), palette.LINK, 1.0))
 
 
 def heading_step(angle: float) -> int:
@@ -232,14 +232,8 @@ def heading_step(angle: float) -> int:
     return round(angle * HEADINGS / (2.0 * math.pi)) % HEADINGS
 
 
-def _fast(surface: pygame.Surface) -> pygame.Surface:
-    # The bytes are in the order of the picture's own, which is drawn ten times as fast.
-    pixels = pygame.image.tobytes(surface, "RGBA")
-    return pygame.image.frombytes(pixels, surface.get_size(), "RGBA")
-
-
 @lru_cache(maxsize=512)
-def words(text: str, height: int, colour: palette.RGB) -> pygame.Surface:
+def words(text: str, height: int, colour: RGB = palette.INK) -> pygame.Surface:
     """Return a line of text of that height [px], in the font that pygame brings along."""
     # A font is not kept, because a pygame.quit() elsewhere would make it unusable.
     pygame.font.init()
@@ -247,7 +241,9 @@ def words(text: str, height: int, colour: palette.RGB) -> pygame.Surface:
     large = pygame.font.Font(None, _LETTERS * height).render(text, True, colour)
     width, tall = large.get_size()
     size = max(1, round(width / _LETTERS)), max(1, round(tall / _LETTERS))
-    return _fast(pygame.transform.smoothscale(large, size))
+    small = pygame.transform.smoothscale(large, size)
+    # The bytes are in the order of the picture's own, which is drawn ten times as fast.
+    return pygame.image.frombytes(pygame.image.tobytes(small, "RGBA"), size, "RGBA")
 
 
 @lru_cache(maxsize=256)

@@ -19,7 +19,7 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT, Outcome
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.fault_text import text_of
+from swarm_logistics_env.warehouse.faults import text_of
 
 from .answer import Answer
 from .figures import X_LABELS, indicator_panels

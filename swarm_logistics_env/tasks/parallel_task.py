@@ -9,13 +9,12 @@ from dataclasses import replace
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 from types import MappingProxyType
-from typing import ClassVar
 
 import numpy as np
 from gymnasium.spaces import flatten
 from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
-from swarm_logistics_env.errors import FaultError, StudyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.errors import FaultError, StudyError, suggest
 from swarm_logistics_env.policies.policy import function_digest, without_prose
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 from swarm_logistics_env.records import Record
@@ -70,7 +69,7 @@ class ParallelScenario(Record):
     """What is held fixed during a run: swarm size, duration [s] and the task's parameters."""
 
     model_config = ConfigDict(extra="allow")
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+    error_type = StudyError
 
     n_robots: PositiveInt
     duration: PositiveFloat

@@ -7,7 +7,7 @@ They know nothing of this package's world. Of the package they use `errors` (Val
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import Space
@@ -17,7 +17,7 @@ from pettingzoo.utils.wrappers import BaseParallelWrapper
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from swarm_logistics_env import streams
-from swarm_logistics_env.errors import FaultError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.errors import FaultError, SetupError
 from swarm_logistics_env.records import Record
 
 # An observation, an action or an info: PettingZoo leaves their types to each environment.
@@ -176,7 +176,7 @@ class RobotFault(Record):
         duration: for how long [s]; None: for good.
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = FaultError
+    error_type = FaultError
 
     mode: str
     robots: PositiveInt

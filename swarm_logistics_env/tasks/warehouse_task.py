@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import ClassVar
 
 from swarm_logistics_env.episode import Play, run_episode
-from swarm_logistics_env.errors import ScenarioError, StudyError, SwarmLogisticsError
+from swarm_logistics_env.errors import ScenarioError, StudyError
 from swarm_logistics_env.policies.policy import code_digest
 from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.records import Record
@@ -138,7 +137,7 @@ class RecordedScenario(Record):
         parameters: name and value of whatever else varies.
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+    error_type = StudyError
 
     n_robots: int = 0
     duration: float = 0.0
@@ -153,7 +152,7 @@ class RecordedScenario(Record):
 class RecordedFault(Record):
     """A failure mode of any name, in so many robots from `onset` [s] on."""
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
+    error_type = StudyError
 
     mode: str
     robots: int

@@ -187,30 +187,24 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
 
 def scores_of(results: StudyResults) -> tuple[Score, ...]:
     """Return every P and every indicator of a study with its interval."""
-    scores = [
-        Score(
-            measure="P",
-            condition=_in_words(cell.arm),
-            value=cell.mean.value,
-            low=cell.mean.low,
-            high=cell.mean.high,
-            seeds=cell.n_seeds,
-        )
-        for cell in results.cells
-        if cell.n_seeds
+    found: list[tuple[str, Arm, spi.Interval | spi.Estimate, int]] = [
+        ("P", cell.arm, cell.mean, cell.n_seeds) for cell in results.cells if cell.n_seeds
     ]
-    scores += [
+    for test in results.verdicts:
+        if (estimate := test.estimate) is not None:
+            compared = test.compared
+            found.append((compared.indicator, compared.changed, estimate, estimate.n_seeds))
+    scores = (
         Score(
-            measure=test.compared.indicator,
-            condition=_in_words(test.compared.changed),
-            value=test.estimate.value,
-            low=test.estimate.low,
-            high=test.estimate.high,
-            seeds=test.estimate.n_seeds,
+            measure=measure,
+            condition=_in_words(arm),
+            value=value.value,
+            low=value.low,
+            high=value.high,
+            seeds=seeds,
         )
-        for test in results.verdicts
-        if test.estimate is not None
-    ]
+        for measure, arm, value, seeds in found
+    )
     return tuple(dict.fromkeys(scores))
 
 

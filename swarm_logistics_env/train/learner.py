@@ -35,8 +35,8 @@ from swarm_logistics_env.records import becoming
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.train.training import Training
-from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.warehouse.packing import unpacked_at
+from swarm_logistics_env.warehouse.structs import NOBODY, World
 
 # Lengths are in units of 10 m; directions are in the frame of the robot's motion.
 KNOWN = (
@@ -47,71 +47,42 @@ KNOWN = (
 )  # fmt: skip
 
 
-def read_known(world: Warehouse, turned: NDArray[np.float64], known: NDArray[np.float32]) -> None:
+@kernel
+def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.float32]) -> None:
     """Fill `known` (rows, len(KNOWN)); rows without a robot stay as they are.
 
     Args:
+        address: of the world (`Warehouse.address`).
         turned: how far each row's frame is turned from its robot's body (rows,) [rad].
     """
-    state = world.state
-    requested = state.requested
-    place = np.zeros(2) if requested == NOBODY else state.item_position[requested]
-    carrier = NOBODY if requested == NOBODY else int(state.item_carrier[requested])
-    fill_known(
-        state.robot_position,
-        state.robot_heading,
-        state.robot_heading_drift,
-        state.lifts,
-        state.delivers,
-        place,
-        requested != NOBODY,
-        carrier,
-        world.scenario.storage_width,
-        world.scenario.warehouse_height,
-        turned,
-        known,
-    )
-
-
-@kernel
-def fill_known(
-    positions: NDArray[np.float64],
-    headings: NDArray[np.float64],
-    drifts: NDArray[np.float64],
-    lifts: NDArray[np.bool_],
-    delivers: NDArray[np.bool_],
-    place: NDArray[np.float64],
-    is_requested: bool,
-    carrier: int,
-    edge: float,
-    height: float,
-    turned: NDArray[np.float64],
-    known: NDArray[np.float32],
-) -> None:
-    """Fill the columns of robots from positions [m], headings [rad] and their rates [rad/s]."""
-    for robot in range(positions.shape[0]):
+    world = unpacked_at(World, address)
+    robots, able, items = world.robots, world.able, world.items
+    edge, height = world.parameters.storage_width, world.parameters.warehouse_height
+    requested = world.progress.requested[0]
+    carrier = NOBODY if requested == NOBODY else items.carrier[requested]
+    for robot in range(len(robots.position)):
         row = known[robot]
-        x, y = positions[robot, 0], positions[robot, 1]
-        frame = headings[robot] + turned[robot]
+        x, y = robots.position[robot, 0], robots.position[robot, 1]
+        frame = robots.heading[robot] + turned[robot]
         cos, sin = math.cos(frame), math.sin(frame)
         row[0], row[1] = (edge - x) / 10.0, (y - 0.5 * height) / 10.0
         row[2], row[3] = cos, sin
-        row[4] = 10.0 * drifts[robot]
-        row[5] = math.log(positions.shape[0]) / 5.0
-        row[6] = 1.0 if lifts[robot] else 0.0
-        row[7] = 1.0 if delivers[robot] else 0.0
+        row[4] = 10.0 * robots.heading_drift[robot]
+        row[5] = math.log(len(robots.position)) / 5.0
+        row[6] = 1.0 if able.lifts[robot] else 0.0
+        row[7] = 1.0 if able.delivers[robot] else 0.0
         row[8:] = 0.0
-        if is_requested:
-            to_x, to_y = place[0] - x, place[1] - y
+        if requested != NOBODY:
+            to_x, to_y = items.position[requested, 0] - x, items.position[requested, 1] - y
             away = max(math.sqrt(to_x * to_x + to_y * to_y), 1e-9)
             row[8] = (cos * to_x + sin * to_y) / away
             row[9] = (cos * to_y - sin * to_x) / away
             row[10] = away / 10.0
             row[11] = max(0.0, 1.0 - away / 2.0)
-        if carrier >= 0:
+        if carrier != NOBODY:
             row[12] = 1.0
-            row[13] = (edge - positions[carrier, 0]) / 10.0
-            row[14] = 1.0 if delivers[carrier] else 0.0
+            row[13] = (edge - robots.position[carrier, 0]) / 10.0
+            row[14] = 1.0 if able.delivers[carrier] else 0.0
 
 
 class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environment of the type check
@@ -195,7 +166,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def _read(self) -> NDArray[np.float32]:
         inputs = self.frame.read(self.observations)[:, : self._n_inputs]
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            read_known(world.warehouse, self.frame.turned[rows], self._known[rows])
+            read_known(world.warehouse.address, self.frame.turned[rows], self._known[rows])
         return np.hstack([inputs, self._known])
 
     def _keys(self) -> NDArray[np.uint64]:
@@ -267,9 +238,7 @@ def device_of(asked: str | None) -> str:
 
 def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
     """Return the tensors of a policy file (`policies.learned.tensor_shapes`) from PPO's policy."""
-    tensors = {
-        "deviations": _array(policy.log_std.exp()),
-    }
+    tensors = {"deviations": _array(policy.log_std.exp())}
     for layer, linear in enumerate(linears(policy)):
         tensors[f"layers.{layer}.weight"] = _array(linear.weight)
         tensors[f"layers.{layer}.bias"] = _array(linear.bias)
@@ -327,6 +296,8 @@ def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) 
 def read_checkpoint(directory: Path) -> dict[str, Any] | None:
     """Return the checkpoint in a training's directory; None: there is none.
 
+    Its "view" is the worlds as they stood.
+
     It is a pickle: resume trainings of your own only.
 
     Raises:
@@ -337,6 +308,7 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
         return None
     try:
         state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=False)
+        state["view"] = pickle.loads(state["view"])
     except (OSError, RuntimeError, EOFError, pickle.UnpicklingError, AttributeError) as error:
         reason = str(error).splitlines()[0]
         raise TrainingError(
@@ -345,14 +317,8 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
     return state
 
 
-def view_of(state: dict[str, Any]) -> NetworkView:
-    """Return the worlds as they stood."""
-    view: NetworkView = pickle.loads(state["view"])
-    return view
-
-
 def restore(learner: PPO, state: dict[str, Any]) -> None:
-    """Bring a learner that was made over `view_of(state)` to where it stood."""
+    """Bring a learner that was made over the checkpoint's view to where it stood."""
     learner.policy.load_state_dict(state["policy"])
     learner.policy.optimizer.load_state_dict(state["optimizer"])
     learner.num_timesteps = state["num_timesteps"]

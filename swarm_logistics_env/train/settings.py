@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -17,10 +17,10 @@ from pydantic import (
     model_validator,
 )
 
-from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
+from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.records import Record, each_of
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
+from swarm_logistics_env.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.warehouse.faults import Fault
 
 Fraction = Annotated[float, Field(gt=0, le=1)]
@@ -28,8 +28,7 @@ Fraction = Annotated[float, Field(gt=0, le=1)]
 
 def _known(modes: tuple[str, ...]) -> tuple[str, ...]:
     for mode in modes:
-        if mode not in FAILURE_MODES:
-            raise ValueError(f"no failure mode {mode!r}{suggest(mode, FAILURE_MODES)}")
+        failure_mode(mode)
     return modes
 
 
@@ -39,7 +38,7 @@ Modes = Annotated[tuple[str, ...], AfterValidator(_known)]
 class Part(Record):
     """A table of a training, or all of it."""
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = TrainingError
+    error_type = TrainingError
 
 
 class Conditions(Part):
@@ -101,7 +100,7 @@ class WorldKind(Part):
 
 
 class Indicators(Part):
-    """Indicators as the reward, see `wrappers.IndicatorReward`.
+    """Indicators as the reward: arguments of `wrappers.IndicatorReward`.
 
     Args:
         weights: "R", "FT", "S", "A" and "P" with their weights.

@@ -43,7 +43,6 @@ from swarm_logistics_env.train.learner import (
     save_checkpoint,
     take_tensors,
     tensors_of,
-    view_of,
 )
 from swarm_logistics_env.train.training import Training, make_worlds
 
@@ -97,7 +96,7 @@ def train(
     view, log = begun, TrainingLog()
     if state is not None:
         begun.close()
-        view, log = view_of(state), state["log"]
+        view, log = state["view"], state["log"]
     learner = make_learner(training, view, device, goes_on=state is not None)
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -124,13 +123,6 @@ class Training(Part):
         )
 
     @property
-    def world_conditions(self) -> tuple[tuple[Conditions, ...], ...]:
-        """The kinds of episodes that every world mixes."""
-        return tuple(
-            kind.conditions or self.conditions for kind in self.worlds for _ in range(kind.count)
-        )
-
-    @property
     def rows(self) -> int:
         """The number of robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
@@ -165,29 +157,16 @@ def make_worlds(training: Training) -> SwarmVecEnv:
     """
     from swarm_logistics_env.adapters import SwarmVecEnv  # loads torch
 
-    make_env: Callable[[int], Wrapper] = partial(_make_env, training)
-    return SwarmVecEnv(
-        make_env=make_env, n_worlds=len(training.world_scenarios), threads=training.threads
-    )
+    scenarios = training.world_scenarios
+    kinds = [kind for kind in training.worlds for _ in range(kind.count)]
 
+    def make_env(world: int) -> Wrapper:
+        core = SwarmLogisticsEnv(scenarios[world], rewards=training.rewards)
+        env = EpisodeMix(core, kinds[world].conditions or training.conditions)
+        asked = training.indicators
+        return env if asked is None else IndicatorReward(env, **dict(asked), own_reward=1.0)
 
-def _make_env(training: Training, world: int) -> Wrapper:
-    scenario = training.world_scenarios[world]
-    env = EpisodeMix(
-        SwarmLogisticsEnv(scenario, rewards=training.rewards),
-        training.world_conditions[world],
-    )
-    asked = training.indicators
-    if asked is None:
-        return env
-    return IndicatorReward(
-        env,
-        asked.weights,
-        references=asked.references,
-        credit=asked.credit,
-        constant=asked.constant,
-        own_reward=1.0,
-    )
+    return SwarmVecEnv(make_env=make_env, n_worlds=len(scenarios), threads=training.threads)
 
 
 class EpisodeMix(Wrapper):

@@ -1,11 +1,16 @@
-"""Faults: which robots, by seed or by role, fail in which mode, from when and for how long."""
+"""Faults: which robots, by seed or by role, fail in which mode, from when and for how long.
+
+Callers write a fault as `Fault`, as the dict of its arguments, or in one word,
+MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]].
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_right
-from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Self
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +30,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
 
 from .failure_modes import FAILURE_MODES, LOST_AS_A_WHOLE, failure_mode
-from .state import WarehouseState
-from .structs import NOBODY
+from .state import WarehouseState, robots_in_role
 
 ROLES = {
     "carrier": "carries the requested item",
@@ -35,40 +39,6 @@ ROLES = {
     "shuffling": "carries an item that is not requested",
     "searching": "empty, anywhere else",
 }
-
-
-def roles_of(state: WarehouseState) -> NDArray[np.str_]:
-    """Return the role of each robot now, a key of `ROLES`, shape (N,); "" for an absent robot.
-
-    A robot that fits several roles has the first of them.
-    """
-    roles = np.full(state.n_robots, "searching", dtype="<U9")
-    roles[state.robot_item != NOBODY] = "shuffling"
-    roles[state.robot_in_delivery] = "in_area"
-    carrier = state.carrier
-    if carrier != NOBODY:
-        to_carrier = state.robot_position - state.robot_position[carrier]
-        is_near = np.hypot(*to_carrier.T) <= state.view_range[carrier]
-        roles[is_near] = "neighbour"
-        roles[carrier] = "carrier"
-    roles[~state.robot_present] = ""
-    return roles
-
-
-def robots_in_role(state: WarehouseState, role: str, count: int) -> NDArray[np.int64]:
-    """Return the numbers of `count` robots, ascending: those in the role first.
-
-    Among robots alike, those nearest to the requested item come first; so the sets of 1, 2, 3
-    robots are nested.
-    """
-    distance = np.zeros(state.n_robots)
-    if state.requested != NOBODY:
-        away = state.robot_position - state.item_position[state.requested]
-        distance = np.hypot(*away.T)
-    is_other = roles_of(state) != role
-    order = np.lexsort((distance, is_other, ~state.robot_present))
-    return np.sort(order[:count]).astype(np.int64)
-
 
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
@@ -101,7 +71,7 @@ class Fault(Record):
         2
     """
 
-    error_type: ClassVar[type[SwarmLogisticsError]] = FaultError
+    error_type = FaultError
 
     mode: str
     robots: PositiveInt | tuple[NonNegativeInt, ...] = 1
@@ -140,10 +110,9 @@ class Fault(Record):
         if self.factor is not None and found.factor is None:
             able = ", ".join(name for name, mode in FAILURE_MODES.items() if mode.factor)
             raise ValueError(f"{self.mode} takes no factor; modes that do: {able}")
-        if self.mode == "removed" and self.duration is not None:
-            raise ValueError("a removed robot does not come back: duration should be None")
-        if self.mode == "removed" and self.intermittent is not None:
-            raise ValueError("a removed robot does not come back: intermittent should be None")
+        for name in ("duration", "intermittent"):
+            if self.mode == "removed" and getattr(self, name) is not None:
+                raise ValueError(f"a removed robot does not come back: {name} should be None")
         if isinstance(self.robots, tuple) and not self.robots:
             raise ValueError("robots = (): should name at least one robot")
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
@@ -159,6 +128,93 @@ class Fault(Record):
         started = time >= self.onset - GRACE
         ended = self.duration is not None and time >= self.onset + self.duration - GRACE
         return started and not ended
+
+
+FaultLike: TypeAlias = Fault | Mapping[str, Any] | str
+
+_NUMBER = r"\d+\.?\d*|\.\d+"
+_FAULT = re.compile(
+    r"(?P<mode>\w+)(:(?P<robots>\d+)(:(?P<role>\w+))?)?"
+    rf"(@(?P<onset>{_NUMBER})(\+(?P<duration>{_NUMBER}))?)?"
+)
+
+
+def checked_faults(
+    name: str, faults: Any, refused: type[SwarmLogisticsError] = FaultError
+) -> tuple[Fault, ...]:
+    """Return faults as a tuple, whichever way each of them is written.
+
+    Args:
+        name: of the argument, for errors.
+        faults: a sequence of `FaultLike`.
+        refused: the error about what is no such sequence.
+
+    Raises:
+        FaultError: a text or a dict is not that of a fault that can be.
+
+    Example:
+        >>> checked_faults("faults", ["FM1:2", {"mode": "FM1", "robots": 2}])[0].robots
+        2
+    """
+    is_list = isinstance(faults, Sequence) and not isinstance(faults, str)
+    if not is_list or not all(isinstance(fault, Fault | Mapping | str) for fault in faults):
+        raise refused(
+            f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)], ["FM1:2"] or '
+            '[{"mode": "FM1", "robots": 2}]'
+        )
+    return tuple(_read(name, fault) for fault in faults)
+
+
+def _read(name: str, given: FaultLike) -> Fault:
+    if isinstance(given, Fault):
+        return given
+    if isinstance(given, str):
+        return fault_of(given)
+    known = Fault.model_fields
+    for field in given:
+        if field not in known:
+            raise FaultError(f"{name}: a fault has no {field!r}{suggest(str(field), known)}")
+    if "mode" not in given:
+        raise FaultError(f'{name}: {dict(given)!r} has no "mode": should name one, as "FM1"')
+    return Fault(**given)
+
+
+def fault_of(text: str) -> Fault:
+    """Return the fault that the text describes.
+
+    Raises:
+        FaultError: the text does not read so, or there is no such fault.
+
+    Example:
+        >>> fault_of("FM4:2:carrier@100+50").duration
+        50.0
+    """
+    match = _FAULT.fullmatch(text)
+    if match is None:
+        raise FaultError(
+            f"fault {text!r}: should be MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200, "
+            "with ROBOTS a whole number and ONSET and DURATION in seconds"
+        )
+    return Fault(
+        match["mode"],
+        int(match["robots"] or 1),
+        onset=float(match["onset"] or 0),
+        duration=float(match["duration"]) if match["duration"] else None,
+        role=match["role"],
+    )
+
+
+def text_of(fault: Fault) -> str | None:
+    """Return the text that describes the fault; None: none does, as it has a factor, say."""
+    role = f":{fault.role}" if fault.role else ""
+    lasts = f"+{_digits(fault.duration)}" if fault.duration else ""
+    onset = f"@{_digits(fault.onset)}{lasts}" if fault.onset or lasts else ""
+    text = f"{fault.mode}:{fault.robots}{role}{onset}"
+    return text if _FAULT.fullmatch(text) and fault_of(text) == fault else None
+
+
+def _digits(seconds: float) -> str:
+    return f"{seconds:.12f}".rstrip("0").rstrip(".")
 
 
 class Occurrence:

@@ -97,12 +97,6 @@ class WarehouseState:
     delivers = Quantity[np.bool_]("able", "delivers")
     sends = Quantity[np.bool_]("able", "sends")
     hears = Quantity[np.bool_]("able", "hears")
-    honest = Quantity[np.bool_]("able", "honest")
-    obeys = Quantity[np.bool_]("able", "obeys")
-    releases_inside = Quantity[np.bool_]("able", "releases_inside")
-    rangers_refresh = Quantity[np.bool_]("able", "rangers_refresh")
-    ranger_bias = Quantity[np.float64]("able", "ranger_bias")
-    radio_delay = Quantity[np.int64]("able", "radio_delay")
 
     item_position = Quantity[np.float64]("items", "position")
     item_status = Quantity[np.int64]("items", "status")
@@ -141,3 +135,36 @@ class WarehouseState:
     def delivered(self) -> int:
         """Items delivered so far: the paper's performance P."""
         return len(self.delivery_times)
+
+
+def roles_of(state: WarehouseState) -> NDArray[np.str_]:
+    """Return the role of each robot now, of `faults.ROLES`, shape (N,); "" for an absent robot.
+
+    A robot that fits several roles has the first of them.
+    """
+    roles = np.full(state.n_robots, "searching", dtype="<U9")
+    roles[state.robot_item != NOBODY] = "shuffling"
+    roles[state.robot_in_delivery] = "in_area"
+    carrier = state.carrier
+    if carrier != NOBODY:
+        to_carrier = state.robot_position - state.robot_position[carrier]
+        is_near = np.hypot(*to_carrier.T) <= state.view_range[carrier]
+        roles[is_near] = "neighbour"
+        roles[carrier] = "carrier"
+    roles[~state.robot_present] = ""
+    return roles
+
+
+def robots_in_role(state: WarehouseState, role: str, count: int) -> NDArray[np.int64]:
+    """Return the numbers of `count` robots, ascending: those in the role first.
+
+    Among robots alike, those nearest to the requested item come first; so the sets of 1, 2, 3
+    robots are nested.
+    """
+    distance = np.zeros(state.n_robots)
+    if state.requested != NOBODY:
+        away = state.robot_position - state.item_position[state.requested]
+        distance = np.hypot(*away.T)
+    is_other = roles_of(state) != role
+    order = np.lexsort((distance, is_other, ~state.robot_present))
+    return np.sort(order[:count]).astype(np.int64)

@@ -16,8 +16,7 @@ from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
 
 from . import layout, stepping
-from .fault_text import FaultLike, checked_faults
-from .faults import GRACE, Fault, Occurrence, apply_faults
+from .faults import GRACE, Fault, FaultLike, Occurrence, apply_faults, checked_faults
 from .grid import blank_grid
 from .logistics import IDLE, MESSAGE
 from .packing import blank, packed

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering.palette import INK, SURROUNDINGS
+from swarm_logistics_env.rendering.palette import SURROUNDINGS
 from swarm_logistics_env.rendering.picture import Picture
 from swarm_logistics_env.rendering.sprites import new_canvas, to_array, words
 
@@ -66,12 +66,13 @@ class Film:
             raise SetupError(f"speed = {speed:g}: should be 0.01 to 1000 times real time")
         self._takes = tuple(takes)
         self._until = min(until, max(take.play.world.scenario.duration for take in takes))
-        self._period, self._frame_rate = speed / frame_rate, frame_rate
+        self._period = speed / frame_rate
         self._pictures = [Picture(take.play.world.scenario, size) for take in takes]
         self._text_height = max(13, round(size / 26))
         self._head = 2 * round(1.5 * self._text_height)
         self._tall = max(picture.height for picture in self._pictures)
         self._width = sum(picture.width for picture in self._pictures)
+        self._n_last = round(LAST_FRAME * frame_rate)
         self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
@@ -93,10 +94,6 @@ class Film:
         for _ in range(self._n_last):
             yield frame
 
-    @property
-    def _n_last(self) -> int:
-        return round(LAST_FRAME * self._frame_rate)
-
     def _draw(self) -> NDArray[np.uint8]:
         canvas = new_canvas(self._width, self._head + self._tall)
         canvas.fill(SURROUNDINGS)
@@ -105,9 +102,9 @@ class Film:
             world = take.play.world
             room = pygame.Rect(x, 0, picture.width, self._head).inflate(-self._text_height, 0)
             # Large, so that it can be read where the film is small.
-            count = words(str(world.state.delivered), round(2.4 * self._text_height), INK)
+            count = words(str(world.state.delivered), round(2.4 * self._text_height))
             canvas.blit(count, count.get_rect(midright=room.midright))
-            name = words(take.name, self._text_height + 4, INK)
+            name = words(take.name, self._text_height + 4)
             room.width -= count.get_width()
             canvas.blit(name, name.get_rect(midleft=room.midleft), (0, 0, *room.size))
             canvas.blit(picture.draw(world.state, world.scenario), (x, self._head))

@@ -23,6 +23,7 @@ from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
 from swarm_logistics_env.watch.session import SPEEDS, Session
 
+_TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against", "names")
 _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius",
@@ -36,7 +37,7 @@ def fixed_data(session: Session) -> dict[str, Any]:
     """Return what never changes: colours, failure modes, speeds, policies to choose from."""
     return {
         "colours": {
-            theme: {name: _css(colour) for name, colour in colours.items()}
+            theme: {name: f"#{bytes(colour).hex()}" for name, colour in colours.items()}
             for theme, colours in (("light", palette.COLOURS), ("dark", palette.DARK_COLOURS))
         },
         "curves": palette.RUN_NAMES,
@@ -58,16 +59,9 @@ def frame(session: Session) -> dict[str, Any]:
     carrier] of the item asked for, or None) and `deliveries` (their times).
     """
     frame: dict[str, Any] = {
-        "seed": session.seed,
+        **{name: getattr(session, name) for name in _TOLD},
         "time": round(session.run.world.state.time, 3),
-        "speed": session.speed,
-        "paused": session.paused,
         "over": session.is_over,
-        "mode": session.mode,
-        "note": session.note,
-        "policy": session.policy,
-        "against": session.against,
-        "names": session.names,
         "scenario": {name: getattr(session.scenario, name) for name in _SHAPE},
         "obstacles": _millimetres(session.run.world.state.obstacle_position),
         "events": [[round(e.time, 1), e.robot, e.label] for e in session.events],
@@ -185,7 +179,7 @@ def _selected(session: Session) -> dict[str, Any] | None:
     robot = session.selected
     if robot is None:
         return None
-    state, row = session.run.world.state, session.run.sensed(robot)
+    state, row = session.run.world.state, session.run.world.observe()[robot]
     seen = unflatten(row, session.scenario)
     beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
     return {
@@ -202,10 +196,6 @@ def _selected(session: Session) -> dict[str, Any] | None:
 def _millimetres(places: NDArray[np.float64]) -> list[list[int]]:
     whole: list[list[int]] = np.rint(1000.0 * places).astype(int).tolist()
     return whole
-
-
-def _css(colour: palette.RGB) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
 def _refuse(constant: str) -> None:

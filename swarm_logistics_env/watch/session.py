@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.errors import FaultError, SetupError, suggest
+from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.fault_text import FaultLike, checked_faults
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults, failed_robots
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
@@ -158,8 +158,7 @@ class Session:
 
     def choose_mode(self, mode: str) -> None:
         """Break robots in that failure mode from now on."""
-        if mode not in FAILURE_MODES:
-            raise FaultError(f"no failure mode {mode!r}{suggest(mode, FAILURE_MODES)}")
+        failure_mode(mode)  # raises FaultError if there is none
         self.mode = mode
 
     def break_robot(self, robot: int | None = None) -> None:

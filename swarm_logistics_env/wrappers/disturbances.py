@@ -86,7 +86,8 @@ class FaultInjection(Wrapper):
     @property
     def failed_robots(self) -> tuple[int, ...]:
         """The robots that this wrapper's faults affect in this episode, ascending."""
-        return tuple(sorted({robot for fault in self.injected for robot in _named(fault)}))
+        named = [fault.robots for fault in self.injected if isinstance(fault.robots, tuple)]
+        return tuple(sorted(set().union(*named)))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's faults added to theirs."""
@@ -148,17 +149,13 @@ class FaultInjection(Wrapper):
 
 def _times(given: ArrayLike) -> list[float]:
     try:
-        times = np.atleast_1d(np.asarray(given, dtype=np.float64)).ravel()
+        times: list[float] = np.asarray(given, dtype=np.float64).ravel().tolist()
     except (TypeError, ValueError):
         raise FaultError(
             f"Fault.onset = {given!r}: should be a time [s], a list of times, or a function of a "
             "numpy Generator that returns them"
         ) from None
-    return [float(time) for time in times]
-
-
-def _named(fault: Fault) -> tuple[int, ...]:
-    return fault.robots if isinstance(fault.robots, tuple) else ()
+    return times
 
 
 class ParameterChange(Wrapper):

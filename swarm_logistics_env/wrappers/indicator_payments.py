@@ -141,10 +141,14 @@ INDICATORS = tuple(PERFORMANCES)
 
 @dataclass(frozen=True)
 class Payment:
-    """The parts of an episode's return: `share` for each item delivered, and `constant` once."""
+    """The parts of an episode's return: `share` for each item delivered, and `constant` once.
+
+    Of an indicator also the performances in them, by the names of `PERFORMANCES`.
+    """
 
     share: float = 0.0
     constant: float = 0.0
+    performances: Mapping[str, tuple[Condition, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -158,16 +162,6 @@ class Ratio:
     offset: float
     reference: Condition
     against: Condition
-
-
-@dataclass(frozen=True)
-class EpisodeIndicator(Payment):
-    """An episode's indicator as share and constant, and the performances in them, by name.
-
-    The names are those of `PERFORMANCES`.
-    """
-
-    performances: Mapping[str, tuple[Condition, float]] = field(default_factory=dict)
 
 
 def comparison(name: str, tested: Condition, own: Scenario) -> Ratio | None:
@@ -211,14 +205,14 @@ def comparison(name: str, tested: Condition, own: Scenario) -> Ratio | None:
 
 def indicator_of(
     name: str, condition: Condition, own: Scenario, references: GivenPerformances | RunningMeans
-) -> EpisodeIndicator | None:
+) -> Payment | None:
     """Return the indicator of episodes of that condition; None: it does not test them.
 
     Raises:
         SetupError: a reference performance is missing or 0, or the indicator is undefined.
     """
     if name == "P":
-        return EpisodeIndicator(1.0)
+        return Payment(1.0)
     compared = comparison(name, condition, own)
     if compared is None:
         return None
@@ -228,7 +222,7 @@ def indicator_of(
         p_against = references.performance(compared.against)
         performances["P_S"] = (compared.against, p_against)
     share = compared.scale / p_o
-    return EpisodeIndicator(share, compared.offset - share * p_against, performances)
+    return Payment(share, compared.offset - share * p_against, performances)
 
 
 def derivative_of(name: str, condition: Condition, own: Scenario, means: RunningMeans) -> Payment:

@@ -17,7 +17,6 @@ from swarm_logistics_env.warehouse.state import NOBODY
 from .indicator_payments import (
     INDICATORS,
     PERFORMANCES,
-    EpisodeIndicator,
     GivenPerformances,
     Payment,
     RunningMeans,
@@ -145,7 +144,7 @@ class IndicatorReward(Wrapper):
         for scenario in self.env.scenarios:
             self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
         self.payments: dict[str, Payment] = {}
-        self._indicators: dict[str, EpisodeIndicator] = {}
+        self._indicators: dict[str, Payment] = {}
         self._is_over, self._delivered = False, 0
 
     def payments_of(self, condition: Condition) -> dict[str, Payment]:
@@ -156,7 +155,7 @@ class IndicatorReward(Wrapper):
         """
         payments = {}
         for name in self.weights:
-            paid = self._indicator(name, condition) or Payment()
+            paid = indicator_of(name, condition, self._own, self._references) or Payment()
             if isinstance(self._references, RunningMeans):
                 slope = derivative_of(name, condition, self._own, self._references)
                 paid = Payment(paid.share + slope.share, paid.constant + slope.constant)
@@ -245,15 +244,12 @@ class IndicatorReward(Wrapper):
         self._indicators = {
             name: indicator
             for name in self.weights
-            if (indicator := self._indicator(name, self.condition))
+            if (indicator := indicator_of(name, self.condition, self._own, self._references))
         }
         weighted = [(self.weights[name], paid) for name, paid in self.payments.items()]
         share = sum(weight * paid.share for weight, paid in weighted)
         constant = sum(weight * paid.constant for weight, paid in weighted)
         self._due = Payment(share, constant if self.constant else 0.0)
-
-    def _indicator(self, name: str, condition: Condition) -> EpisodeIndicator | None:
-        return indicator_of(name, condition, self._own, self._references)
 
 
 def _checked_weights(weights: str | Mapping[str, float]) -> dict[str, float]:

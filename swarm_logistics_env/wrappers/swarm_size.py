@@ -152,8 +152,7 @@ class SwarmSize(Wrapper):
             Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)
         )
         self.scenarios: tuple[Scenario, ...] = self._declared("n_robots", self._size.ends)
-        sizes_announced = (scenario.n_robots for scenario in self.scenarios)
-        largest = max(self.unwrapped.max_robots or 0, *sizes_announced)
+        largest = max(self.unwrapped.max_robots or 0, *(each.n_robots for each in self.scenarios))
         self.unwrapped.possible_agents = agent_names(range(largest))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import checked_options, checked_seed
+from swarm_logistics_env.environment.requests import checked_options
 from swarm_logistics_env.environment.spaces import ArrayStep, DictView
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
@@ -203,7 +203,7 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
         """Begin the episode that `plan` describes and return the first observations (N, D)."""
-        seed = self.env.next_seed if seed is None else checked_seed(seed)
+        seed = self.env.next_seed if seed is None else seed
         observations = self.env.reset_arrays(seed, self.plan(seed, checked_options(options)))
         self.begun(seed)
         return observations
@@ -250,8 +250,12 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
 
     def _place(self) -> int:
         """Return the number of wrappers of the same class inside; it gives each its own draws."""
-        place, env = 0, self.env
-        while env is not env.unwrapped:
-            place += type(env) is type(self)
-            env = env.env
-        return place
+        return sum(type(env) is type(self) for env in layers_of(self.env))
+
+
+def layers_of(env: SwarmLogisticsEnv | Wrapper) -> list[Any]:
+    """Return the wrappers, outermost first, and the environment."""
+    layers: list[Any] = [env]
+    while layers[-1] is not env.unwrapped:
+        layers.append(layers[-1].env)
+    return layers

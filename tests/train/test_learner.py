@@ -27,7 +27,7 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
     state.item_position[state.requested] = (4.0, 6.0)
     turned, known = np.zeros(3), np.zeros((4, len(KNOWN)), np.float32)
     turned[0] = 0.5 * math.pi  # so that the frame looks along -x
-    read_known(env.warehouse, turned, known)
+    read_known(env.warehouse.address, turned, known)
     told = dict(zip(KNOWN, known[0].tolist()))
     assert told["to_delivery"] == pytest.approx(0.4)
     assert (told["frame_cos"], told["frame_sin"]) == pytest.approx((-1.0, 0.0), abs=1e-6)
@@ -39,7 +39,7 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
 
     state.item_status[state.requested], state.item_carrier[state.requested] = CARRIED, 1
     state.robot_position[1] = (7.0, 5.0)
-    read_known(env.warehouse, turned, known)
+    read_known(env.warehouse.address, turned, known)
     told = dict(zip(KNOWN, known[0].tolist()))
     assert (told["is_carried"], told["carrier_delivers"]) == (1.0, 1.0)
     assert told["carrier_to_delivery"] == pytest.approx(0.1)

@@ -28,7 +28,6 @@ from verification.reference import Faults, Planned, Radio, ends, rewards
 
 EXAMPLES = 2000 if settings().max_examples >= 2000 else 40
 STEPS = 36  # a radio that is late by 2 s is late by 20 of these
-ABLE = ("max_speed", "max_turn_rate", "view_range", "ranger_range", "ranger_bias")
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ def check_able(world: Warehouse, faults: Faults, before: WarehouseState) -> list
             elif name == "present":
                 assert state.robot_present[robot] == value
             else:
-                assert getattr(state, name)[robot] == pytest.approx(value), (robot, name)
+                assert getattr(state.able, name)[robot] == pytest.approx(value), (robot, name)
     assert state.failed.tolist() == [bool(able["modes"]) for able in expected]
     assert world.n_removed == sum(not able["present"] for able in expected)
     return expected

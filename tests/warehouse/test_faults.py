@@ -18,9 +18,8 @@ from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import FaultError
 from swarm_logistics_env.observations import N_BEAMS
 from swarm_logistics_env.warehouse.failure_modes import FailureMode
-from swarm_logistics_env.warehouse.fault_text import fault_of, text_of
-from swarm_logistics_env.warehouse.faults import ROLES, failed_robots, robots_in_role, roles_of
-from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.warehouse.faults import ROLES, failed_robots, fault_of, text_of
+from swarm_logistics_env.warehouse.state import NOBODY, robots_in_role, roles_of
 from tests.warehouse.conftest import (
     EAST,
     FAR,

@@ -206,7 +206,7 @@ def test_observation_has_all_parts_and_only_what_is_present() -> None:
     session = Session(scenario)
     session.play(3.0)
     for robot in range(8):
-        row = session.run.sensed(robot)
+        row = session.run.world.observe()[robot]
         found = {name: values for name, _, values in observation_parts(row, scenario)}
         parts = observations.unflatten(row, scenario)
         assert list(found) == list(parts)
