@@ -43,12 +43,12 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 18_288,
-    "tokens of the package": 166_100,
-    "files of the package": 126,
-    "lines of code of studies and report": 4_156,
+    "lines of code of the package": 18_000,
+    "tokens of the package": 164_100,
+    "files of the package": 124,
+    "lines of code of studies and report": 4_095,
     "lines of tests": 19_036,
-    "lines of verification, benchmarks, interop and the scripts of docs": 6_235,
+    "lines of verification, benchmarks, interop and the scripts of docs": 5_800,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,

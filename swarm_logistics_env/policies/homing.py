@@ -14,7 +14,6 @@ never commands a turn, so it is for robots that can move sideways (the holonomic
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,12 +69,20 @@ class Homing:
         frame.read(observations)
         numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
         commands = np.zeros((len(observations), 4))
-        self._decide(observations, frame.memory, frame.keys, numbers, self._period, commands)
+        self._decide(observations, frame, numbers, commands)
         return frame.command(frame.outputs_for(commands))
 
-    def _decide(self, *arrays: Any) -> None:
-        """Fill the last of what `decide_homing` takes: commands in the robots' own frames."""
-        decide_homing(*arrays)
+    def _decide(
+        self,
+        observations: NDArray[np.float32],
+        frame: MotionFrame,
+        random_headings: NDArray[np.int64],
+        commands: NDArray[np.float64],
+    ) -> None:
+        """Fill the commands (N, 4), in the robots' own frames."""
+        decide_homing(
+            observations, frame.memory, frame.keys, random_headings, self._period, commands
+        )
 
 
 @kernel

@@ -19,7 +19,6 @@ Only seeds from 400,000 to 400,045 were used. Like `homing` it needs the holonom
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, random_heading
+from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionFrame, random_heading
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
     AVOID_RANGE,
@@ -80,8 +79,23 @@ class HomingStock(Homing):
         self.parameters = {"holders": float(holders), "stockers": float(stockers)}
         super().__init__()
 
-    def _decide(self, *arrays: Any) -> None:
-        decide_homing_stock(*arrays, *self.parameters.values())
+    def _decide(
+        self,
+        observations: NDArray[np.float32],
+        frame: MotionFrame,
+        random_headings: NDArray[np.int64],
+        commands: NDArray[np.float64],
+    ) -> None:
+        decide_homing_stock(
+            observations,
+            frame.memory,
+            frame.keys,
+            random_headings,
+            self._period,
+            self.parameters["holders"],
+            self.parameters["stockers"],
+            commands,
+        )
 
 
 @kernel
@@ -91,9 +105,9 @@ def decide_homing_stock(
     keys: NDArray[np.uint64],
     random_headings: NDArray[np.int64],
     period: float,
-    commands: NDArray[np.float64],
     holders: float,
     stockers: float,
+    commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) from rows (N, D), memories and the numbers of random headings."""
     for robot in range(rows.shape[0]):
