@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor, comparing
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.tasks.task import Case
 
@@ -161,3 +161,27 @@ class Comparison:
             # The removed robots make the third condition another one by construction.
             **({} if self.removed else {"identical": identical}),
         )
+
+
+def compared(table: str, arms: Sequence[Arm], removed: str | None = None) -> Iterator[Comparison]:
+    """Yield what is asked of arms that differ in one factor, the original one first.
+
+    Neighbouring swarm sizes are compared, else the original arm with each other one; where no arm
+    has the robots removed, no indicator that needs it is asked.
+
+    Args:
+        table: heading of the report's table.
+        removed: name of the setting in which the faulty robots are removed.
+    """
+    original, *others = arms
+    kind = original.setting.kind
+    by_setting = {arm.setting: arm for arm in arms}
+    for before, after in zip(arms, others) if kind == "size" else ((original, x) for x in others):
+        setting = after.setting
+        reference = Setting("fault", removed or "", setting.value, setting.onset)
+        if setting in (reference, OTHER_BEHAVIOUR):
+            continue
+        for definition in comparing(kind):
+            third = by_setting.get(reference) if definition.needs_removed else None
+            if third or not definition.needs_removed:
+                yield Comparison(table, definition.symbol, before, after, third)

@@ -12,13 +12,12 @@ import numpy as np
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.records import file_name
-from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials, read_trials
 from swarm_logistics_env.tasks.task import Case, Outcome
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
-from .comparison import OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
 from .declaration import Declaration, Origin, note
 from .plan import Plan
 from .runs import Runs
@@ -108,7 +107,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     tables = list(_tables(origin))
     return Plan(
         specification,
-        tuple(comparison for title, arms in tables for comparison in _compared(title, arms)),
+        tuple(one for title, arms in tables for one in compared(title, arms, RECORDED.removed)),
         RECORDED.code(),
         {},
         nulls={
@@ -122,27 +121,6 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         imported_seeds=origin.seeds,
         setup=origin.setup,
     )
-
-
-def _compared(title: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
-    original, *others = arms
-    kind = original.setting.kind
-    if kind == "size":
-        for small, large in zip(arms, others):
-            for definition in comparing(kind):
-                yield Comparison(title, definition.symbol, small, large)
-        return
-    by_setting = {arm.setting: arm for arm in arms}
-    for arm in others:
-        setting = arm.setting
-        if kind == "fault" and setting.name in (REPEATED, RECORDED.removed):
-            continue
-        removed = by_setting.get(setting._replace(name=str(RECORDED.removed)))
-        for definition in comparing(kind):
-            # Whoever recorded no trials with the robots removed asks for R alone.
-            if removed is not None or not definition.needs_removed:
-                third = removed if definition.needs_removed else None
-                yield Comparison(title, definition.symbol, original, arm, third)
 
 
 def _case(origin: Origin, row: Trial) -> Case:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice, product
+from itertools import islice, pairwise, product
 from typing import Self
 
 from swarm_logistics_env.errors import StudyError
@@ -14,7 +14,7 @@ from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.task import Case, Run, TaskFault
 
-from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting
+from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
 from .presets import load_reference
 from .specification import (
     BOTH,
@@ -246,12 +246,9 @@ def _scalability(asked: Specification, sizes: Sizes, base: Case) -> Iterator[Com
         n: _arm(asked, base, Setting("size", "n_robots", n), {**sizes.scenario, "n_robots": n})
         for n in sizes.values
     }
-    steps = list(zip(sizes.values, sizes.values[1:]))
-    for definition in comparing("size"):
-        for small, large in steps:
-            yield Comparison(table, definition.symbol, arms[small], arms[large])
+    yield from compared(table, list(arms.values()))
     for small, large in sizes.superlinear:
-        if (small, large) not in steps:
+        if (small, large) not in pairwise(sizes.values):
             raise StudyError(
                 f"superlinear = ({small}, {large}): should be a step between neighbouring "
                 f"sizes of {sizes.values}"
@@ -286,31 +283,27 @@ def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Co
         failing = [task.fault(one, m, onset, lasts, manner) for one in mode.split(BOTH)]
         return _arm(asked, base, Setting("fault", mode, m, onset), faults.scenario, *failing)
 
-    wanted = [one for one in comparing("fault") if one.symbol in asked.indicators]
-    if task.removed is None:
-        wanted = [one for one in wanted if not one.needs_removed]
-    # The robots that are removed are those that would have failed.
-    whom: Manner = {} if faults.role is None else {"role": faults.role}
+    arms = [original]
     for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
-        failed = arm(mode, m, onset, faults.duration, faults.manner)
-        for definition in wanted:
-            third = (
-                arm(str(task.removed), m, onset, None, whom) if definition.needs_removed else None
-            )
-            yield Comparison(table, definition.symbol, original, failed, third)
+        arms.append(arm(mode, m, onset, faults.duration, faults.manner))
+    wanted = [one for one in comparing("fault") if one.symbol in asked.indicators]
+    if task.removed is not None and any(one.needs_removed for one in wanted):
+        # The robots that are removed are those that would have failed.
+        whom: Manner = {} if faults.role is None else {"role": faults.role}
+        for onset, m in product(faults.onsets, faults.robots):
+            arms.append(arm(task.removed, m, onset, None, whom))
+    yield from compared(table, arms, task.removed)
 
 
 def _adaptability(asked: Specification, parameter: Parameter, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
     name = parameter.name
     table = _title(parameter, f"Adaptability to {name}")
-    original, *changed = (
+    arms = [
         _arm(asked, base, Setting("parameter", name, x), {**parameter.scenario, name: x})
         for x in parameter.values
-    )
-    for definition in comparing("parameter"):
-        for arm in changed:
-            yield Comparison(table, definition.symbol, original, arm)
+    ]
+    yield from compared(table, arms)
 
 
 def _ablation(
