@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import shutil
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -96,7 +97,9 @@ def study() -> Study:
 
 def block(found: StudyResults) -> str:
     """Return a row for each variant: P without a fault and in every condition."""
+    # Runs with robots removed, and those with further behaviour seeds, are FT's alone.
     arms = list(dict.fromkeys(cell.arm.setting for cell in found.cells))
+    arms = [arm for arm in arms if not re.match("removed|.*behaviour seeds", str(arm))]
     cells = {(cell.policy, cell.arm.setting): cell for cell in found.cells}
     rows = [(one, *(section.mean_p(cells[one, arm]) for arm in arms)) for one in found.policies]
     text = (

@@ -144,7 +144,7 @@ def test_its_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -
         seeds = study.plan().seeds
         assert min(seeds) >= 20_000
         assert max(seeds) < FIRST_OF_TRAININGS
-    counts = [20, 100, 100, 20, 20, 6, 20, 30, 30, 10, 20]
+    counts = [20, 100, 100, 20, 20, 6, 20, 30, 30, 10, 34]
     assert [len(one.plan().seeds) for one in studies] == counts
 
 
