@@ -65,7 +65,10 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
     neighbours = _block(NEIGHBOURS, N_NEIGHBOURS, NEIGHBOUR_FEATURES)
     lowest = _block(LOWEST_TIMER, 1, ("present", "x", "y", "timer"))
     message = _run(MESSAGES, n_columns(scenario) - MESSAGES)
-    found = (
+    messages = (
+        Column("neighbour_message", "1", message, -1, 1, "the numbers that each broadcasts"),
+    )
+    return (
         Column("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"to robots; {beam}"),
         Column("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "to walls and obstacles"),
         Column("range_items", "m", _run(RANGE_ITEMS, N_BEAMS), 0, reach, "to free items"),
@@ -98,9 +101,8 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
             "velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; cut at top speed"
         ),
         Column("contact", "flag", _run(CONTACT, 1), 0, 1, "it touches a robot, wall or obstacle"),
-        Column("neighbour_message", "1", message, -1, 1, "the numbers that each broadcasts"),
+        *(messages if scenario.message_size else ()),
     )
-    return found if scenario.message_size else found[:-1]
 
 
 def bounds(scenario: Scenario) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

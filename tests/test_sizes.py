@@ -44,10 +44,10 @@ def test_no_two_modules_have_one_name() -> None:
 ROOT = PACKAGE.parent
 MOST = {
     "lines of code of the package": 18_000,
-    "tokens of the package": 164_100,
+    "tokens of the package": 163_950,
     "files of the package": 124,
-    "lines of code of studies and report": 4_095,
-    "lines of tests": 19_036,
+    "lines of code of studies and report": 4_082,
+    "lines of tests": 19_025,
     "lines of verification, benchmarks, interop and the scripts of docs": 5_801,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }

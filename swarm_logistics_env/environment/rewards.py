@@ -165,9 +165,14 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
 
 SECONDS_A_METRE = 2.0
 
-_TERMS = (delivery, own_delivery, lift_requested, approach, stocking, contact, blocked_request)
 REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
-    term.__name__: term for term in _TERMS
+    "delivery": delivery,
+    "own_delivery": own_delivery,
+    "lift_requested": lift_requested,
+    "approach": approach,
+    "stocking": stocking,
+    "contact": contact,
+    "blocked_request": blocked_request,
 }
 _AT_DELIVERIES = {"delivery", "own_delivery"}
 
