@@ -18,9 +18,8 @@ import shlex
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from swarm_logistics_env.cli import app
 
@@ -35,15 +34,11 @@ _FILE = re.compile(r"# (\w+\.(?:py|toml))\n")
 _WALL_TIME = re.compile(r"times real time|runs played|On one process| MB$")
 
 
-@dataclass(frozen=True)
-class Block:
-    """A fenced block of a page: `text[start:end]` is its code."""
+class Block(NamedTuple):
+    """A fenced block of a page."""
 
     language: str
     code: str
-    start: int
-    end: int
-    after: int  # where the block ends, fence included
 
 
 def pages() -> list[Path]:
@@ -53,46 +48,30 @@ def pages() -> list[Path]:
 
 def blocks(text: str) -> list[Block]:
     """Return the blocks of a page, in order."""
-    return [
-        Block(m["language"], m["code"], m.start("code"), m.end("code"), m.end())
-        for m in _BLOCK.finditer(text)
-        if not m["language"].startswith("{")
-    ]
+    found = (Block(match["language"], match["code"]) for match in _BLOCK.finditer(text))
+    return [block for block in found if not block.language.startswith("{")]
 
 
 def recorded(text: str) -> str:
     """Run a page's blocks in a folder with `examples` alone; return it with what they printed."""
-    pieces: list[str] = []
-    done = 0
-    printed: str | None = None
-    before = 0
     names: dict[str, Any] = {"__name__": "page"}
+    printed: str | None = None
+    end = 0  # of the block before
+
+    def anew(match: re.Match[str]) -> str:
+        nonlocal printed, end
+        block, between = Block(match["language"], match["code"]), text[end : match.start()]
+        if block.language.startswith("{"):
+            return match[0]
+        end, said = match.end(), printed
+        printed = None if block.language == "text" else _printed(block, names)
+        if block.language == "text" and said is not None and not between.strip():
+            return f"```text\n{said}```"
+        return match[0]
+
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
         Path("examples").symlink_to(EXAMPLES, target_is_directory=True)
-        for block in blocks(text):
-            if block.language == "text":
-                if (
-                    printed is not None
-                    and not text[before : block.start - len("```text\n")].strip()
-                ):
-                    pieces += [text[done : block.start], printed]
-                    done = block.end
-                printed = None
-                continue
-            file = _FILE.match(block.code)
-            if file:
-                Path(file[1]).write_text(block.code, encoding="utf-8")
-            printed = None
-            if block.language == "python":
-                printed = _printed_by_python(block.code, names)
-            elif block.language == "console":
-                printed = "".join(
-                    _printed_by_command(line[2:])
-                    for line in block.code.splitlines()
-                    if line.startswith("$ ")
-                )
-            before = block.after
-    return "".join(pieces) + text[done:]
+        return _BLOCK.sub(anew, text)
 
 
 def comparable(text: str) -> str:
@@ -134,10 +113,18 @@ def _importable() -> Iterator[None]:
                 del sys.modules[name]
 
 
-def _printed_by_python(code: str, names: dict[str, Any]) -> str:
-    with contextlib.redirect_stdout(io.StringIO()) as out:
-        exec(compile(code, "page", "exec"), names)
-    return out.getvalue()
+def _printed(block: Block, names: dict[str, Any]) -> str | None:
+    """Run a block, or write the file that it is; return what it prints, None: it runs nothing."""
+    if file := _FILE.match(block.code):
+        Path(file[1]).write_text(block.code, encoding="utf-8")
+    if block.language == "python":
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            exec(compile(block.code, "page", "exec"), names)
+        return out.getvalue()
+    if block.language == "console":
+        lines = block.code.splitlines()
+        return "".join(_printed_by_command(line[2:]) for line in lines if line.startswith("$ "))
+    return None
 
 
 def _printed_by_command(line: str) -> str:

@@ -9,10 +9,12 @@ trainings and seeds hold the true value.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
@@ -243,84 +245,67 @@ def planned_power(
     return float(np.median(planned)), float(np.mean(found))
 
 
-def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table."""
-    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
+Row = dict[str, object]
 
 
-def until_clear_rows(studies: int = STUDIES) -> Iterator[Sequence[str]]:
+def until_clear_rows() -> Iterator[Row]:
     """Yield the errors of studies that run until they are clear, alone and in a family."""
     for model in MODELS:
         for most in (60, 200):
             looks = looks_up_to(most)
-            one = wrong_verdicts(model, looks, studies)
-            each = wrong_verdicts(model, looks, FAMILY * studies, 0.05 / FAMILY).share
-            sides = f"{one.above:.3f}, {one.below:.3f}"
-            yield model, str(most), f"{one.share:.3f}", sides, f"{1 - (1 - each) ** FAMILY:.3f}"
+            one = wrong_verdicts(model, looks)
+            each = wrong_verdicts(model, looks, FAMILY * STUDIES, 0.05 / FAMILY).share
+            family = {f"in a family of {FAMILY}": 1 - (1 - each) ** FAMILY}
+            yield {"counts": model, "most seeds": most, **one._asdict(), **family}
 
 
-def equivalence_rows(studies: int = STUDIES) -> Iterator[Sequence[str]]:
+def equivalence_rows() -> Iterator[Row]:
     """Yield the errors and the power of equivalence at a margin of 0.1."""
     for model in ("poisson", "overdispersed"):
-        wrong = (share_equivalent(model, 30, change, studies) for change in (-EDGE, EDGE))
+        wrong = {
+            f"wrong at {at}, 30 seeds": share_equivalent(model, 30, at) for at in (-EDGE, EDGE)
+        }
         seeds = planned_seeds(model)
-        power = share_equivalent(model, seeds, 0.0, studies)
-        yield model, ", ".join(f"{share:.3f}" for share in wrong), str(seeds), f"{power:.2f}"
+        power = share_equivalent(model, seeds, 0.0)
+        yield {"counts": model, **wrong, "planned seeds": seeds, "their power": power}
 
 
-def stall_rows(studies: int = STALL_STUDIES) -> Iterator[Sequence[str]]:
+def stall_rows() -> Iterator[Row]:
     """Yield the errors at the true value where some runs stall, until clear as well.
 
-    In brackets those that the runs seen alone would make. What is called wrong above the truth, and
+    Also those that the runs seen alone would make. What is called wrong above the truth, and
     equivalent though P falls by a tenth, is the harm that stalls do.
     """
     fixed: list[Sequence[int]] = [[n] for n in (10, 20, 30, 50, 100)]
     for model in STALLS:
         for looks in (*fixed, looks_up_to(60), looks_up_to(200)):
-            one, seen = (wrong_verdicts(model, looks, studies, only_seen=o) for o in (False, True))
-            equal = ""
-            if len(looks) == 1:
-                both = (
-                    share_equivalent(model, looks[0], -EDGE, studies, only_seen=only)
-                    for only in (False, True)
-                )
-                equal = "{:.3f} ({:.3f})".format(*both)
-            above, below = (
-                f"{getattr(one, side):.3f} ({getattr(seen, side):.3f})"
-                for side in ("above", "below")
-            )
-            seeds = str(looks[0]) if equal else f"until clear, {looks[-1]}"
-            yield model, seeds, above, below, equal
+            until = "" if len(looks) == 1 else "until clear, "
+            row: Row = {"runs": model, "seeds": f"{until}{looks[-1]}"}
+            for seen, words in ((False, ""), (True, ", only seen")):
+                wrong = wrong_verdicts(model, looks, STALL_STUDIES, only_seen=seen)
+                row |= {f"above{words}": wrong.above, f"below{words}": wrong.below}
+                if len(looks) == 1:
+                    row[f"equivalent{words}"] = share_equivalent(
+                        model, looks[0], -EDGE, STALL_STUDIES, only_seen=seen
+                    )
+            yield row
 
 
-def trainings_rows(studies: int = TRAINED_STUDIES) -> Iterator[Sequence[str]]:
+def trainings_rows() -> Iterator[Row]:
     """Yield the coverage and the width of intervals over trainings and seeds."""
-    for model in MODELS:
-        for trainings in (5, 10):
-            for spread in (0.0, 0.1, 0.3):
-                told = trainings_coverage(model, trainings, 20, spread, studies)
-                yield model, str(trainings), f"{spread}", f"{told.share:.3f}", f"{told.width:.2f}"
+    for model, trainings, spread in product(MODELS, (5, 10), (0.0, 0.1, 0.3)):
+        told = trainings_coverage(model, trainings, 20, spread)
+        yield {"counts": model, "trainings": trainings, "spread": spread, **told._asdict()}
 
 
-TABLES: Mapping[str, tuple[Sequence[str], Callable[[], Iterable[Sequence[str]]]]] = {
-    f"Until clear, {STUDIES:,} studies": (
-        ("counts", "most seeds", "wrong", "above, below", f"in a family of {FAMILY}"),
-        until_clear_rows,
-    ),
-    f"Equivalence, {STUDIES:,} studies": (
-        ("counts", "wrong at -0.1 and 0.1, 30 seeds", "planned seeds", "their power"),
-        equivalence_rows,
-    ),
-    f"Where runs stall, {STALL_STUDIES:,} studies": (
-        ("runs", "seeds", "wrong above", "wrong below", "wrongly equivalent"),
-        stall_rows,
-    ),
-    f"R over trainings and 20 seeds, {TRAINED_STUDIES:,} studies": (
-        ("counts", "trainings", "spread between trainings", "coverage", "median width"),
-        trainings_rows,
-    ),
+TABLES: Mapping[str, Callable[[], Iterator[Row]]] = {
+    f"Until clear, {STUDIES:,} studies": until_clear_rows,
+    f"Equivalence, {STUDIES:,} studies": equivalence_rows,
+    f"Where runs stall, {STALL_STUDIES:,} studies": stall_rows,
+    f"R over trainings and 20 seeds, {TRAINED_STUDIES:,} studies": trainings_rows,
 }
 
 if __name__ == "__main__":
-    for title, (heading, told) in TABLES.items():
-        print(f"{title}:\n\n{markdown(heading, told())}\n")
+    for title, rows in TABLES.items():
+        table = pd.DataFrame(rows()).to_string(float_format="{:.3f}".format, na_rep="")
+        print(f"{title}:\n\n{table}\n")

@@ -83,7 +83,13 @@ def _by_figure(
         after, by_fault = test.after, test.after.kind == "fault"
         return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
 
-    return grouped(_once(results), place)
+    def same(test: Verdict) -> tuple[str, str, str, str]:
+        compared = test.compared
+        return compared.policy, compared.table, compared.indicator, compared.label
+
+    # That against the lowest threshold shows them all.
+    alike = grouped(results.verdicts, same).values()
+    return grouped((min(tests, key=lambda t: t.compared.threshold) for tests in alike), place)
 
 
 def _where(table: str, onset: float, swarm: int) -> str:
@@ -159,25 +165,12 @@ def _definitions(tests: Sequence[Verdict]) -> list[Definition]:
 def _caption(tests: Sequence[Verdict]) -> str:
     """Return what a figure shows, e.g. "robustness R; above 0 robust."."""
     definitions = _definitions(tests)
-    above: dict[float, list[str]] = {}
-    for definition in definitions:
-        for threshold, adjective in definition.adjectives.items():
-            above.setdefault(threshold, []).append(adjective)
-    says = ", ".join(f"above {threshold:g} {', '.join(says)}" for threshold, says in above.items())
+    named = [named for definition in definitions for named in definition.adjectives.items()]
+    above = grouped(named, lambda one: one[0]).items()
+    says = ", ".join(f"above {at:g} {', '.join(word for _, word in here)}" for at, here in above)
     if not says:
         says = "(P_new - P_o) / P_o; below a threshold P falls by more than that share"
     return f"{listed([definition.heading for definition in definitions])}; {says}."
-
-
-def _once(results: StudyResults) -> list[Verdict]:
-    """Return each value once: that asked against the lowest threshold."""
-
-    def same(test: Verdict) -> tuple[str, str, str, str]:
-        compared = test.compared
-        return compared.policy, compared.table, compared.indicator, compared.label
-
-    alike = grouped(results.verdicts, same).values()
-    return [min(tests, key=lambda t: t.compared.threshold) for tests in alike]
 
 
 def rate_figures(results: StudyResults) -> Iterator[Figure]:

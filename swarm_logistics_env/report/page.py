@@ -89,9 +89,7 @@ def _steps(times: NDArray[np.float64]) -> list[JsonValue]:
 def watch_command(arm: Arm) -> str | None:
     """Return the command that plays a condition but for its seed; None: there is none."""
     case = arm.case
-    if case.task.name != DEFAULT or case.behaviour:
-        return None
-    if not case.policy.is_text:
+    if case.task.name != DEFAULT or case.behaviour or not case.policy.is_text:
         return None
     words = ["swarm-logistics", "watch", "--policy", case.policy.name]
     default = case.task.default.model_dump(mode="json")

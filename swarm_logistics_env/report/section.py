@@ -162,11 +162,7 @@ def mean_p(cell: Cell) -> str:
 
 def ratio(test: Verdict) -> str:
     """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
-    return (
-        NOTHING
-        if test.interval is None
-        else bracketed(test.interval, 3) + SATURATED * test.saturated
-    )
+    return bracketed(test.interval, 3) + SATURATED * (test.saturated and test.interval is not None)
 
 
 def said(verdict: str | None) -> str:

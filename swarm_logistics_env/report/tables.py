@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+import numpy as np
+
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.measures import (
@@ -263,10 +265,10 @@ def _verdict(estimate: Estimate | None) -> str:
     return section.said(estimate.verdict) + section.SATURATED * ("capped" in estimate.flags)
 
 
-def _median(curve: RepairCurve) -> str:
-    median = curve.curve.median()
+def _median(found: RepairCurve) -> str:
+    median = found.curve.median()
     return "not reached" if median is None else f"{median:g}"
 
 
-def _not_back(curve: RepairCurve) -> str:
-    return f"{curve.censored} of {curve.total} runs"
+def _not_back(found: RepairCurve) -> str:
+    return f"{np.count_nonzero(~found.back)} of {found.back.size} runs"

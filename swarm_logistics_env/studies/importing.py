@@ -104,7 +104,10 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     Raises:
         StudyError: something has nothing that it can be relative to.
     """
-    tables = list(_tables(origin))
+    tables = [
+        (title, [Arm(setting, _case(origin, row)) for setting, row in rows])
+        for title, rows in _tables(origin.trials)
+    ]
     return Plan(
         specification,
         tuple(one for title, arms in tables for one in compared(title, arms, RECORDED.removed)),
@@ -148,42 +151,39 @@ def _outcome(row: Trial) -> Outcome:
     return Outcome(delivery_times=np.array(row.times), ended_at=row.duration or 0.0)
 
 
-_Arms = list[Arm]
+_Varied = list[tuple[Setting, Trial]]  # the rows of a table, the original condition first
 _Fixed = tuple[tuple[str, float], ...]  # name and value of what is the same in a table
 
 
-def _tables(origin: Origin) -> Iterator[tuple[str, _Arms]]:
+def _tables(trials: Sequence[Trial]) -> Iterator[tuple[str, _Varied]]:
     """Yield what can be compared: all trials that differ in one thing alone, for each thing.
 
     Yields:
-        The heading in the report, and the arms, the original one first.
+        The heading in the report, and the rows with what each has of that thing.
     """
-    for policy, table in dict.fromkeys((row.policy, row.table) for row in origin.trials):
-        here = [row for row in origin.trials if (row.policy, row.table) == (policy, table)]
+    for (_, table), here in grouped(trials, lambda row: (row.policy, row.table)).items():
         plain = [row for row in here if row.fault == NO_FAULT]
         sized = [row for row in plain if row.n_robots is not None]
         of = f"{table}: " if table else ""
-        arms_of = partial(_size_arms, origin)
-        yield from _split(f"{of}Scalability", sized, lambda row: row.parameters, arms_of)
-        title = f"{of}Fault tolerance and robustness"
-        yield from _split(title, here, _all_but(None), partial(_fault_arms, origin))
+        yield from _split(f"{of}Scalability", sized, lambda row: row.parameters, _sizes)
+        yield from _split(f"{of}Fault tolerance and robustness", here, _all_but(None), _faults)
         for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
-            arms_of = partial(_parameter_arms, origin, name, dict(plain[0].parameters)[name])
-            yield from _split(f"{of}Adaptability to {name}", plain, _all_but(name), arms_of)
+            values = partial(_values, name, dict(plain[0].parameters)[name])
+            yield from _split(f"{of}Adaptability to {name}", plain, _all_but(name), values)
 
 
 def _split(
     general: str,
     rows: Sequence[Trial],
     fixed: Callable[[Trial], _Fixed],
-    arms_of: Callable[[Sequence[Trial]], _Arms],
-) -> Iterator[tuple[str, _Arms]]:
-    """Yield a table for each group of rows that have the same fixed values and differ in an arm."""
-    tables = {key: arms_of(group) for key, group in grouped(rows, fixed).items()}
-    tables = {key: arms for key, arms in tables.items() if len(arms) > 1}
-    for key, arms in tables.items():
+    varied: Callable[[Sequence[Trial]], _Varied],
+) -> Iterator[tuple[str, _Varied]]:
+    """Yield a table for each group of rows that have the same fixed values and differ otherwise."""
+    found = {key: varied(group) for key, group in grouped(rows, fixed).items()}
+    tables = {key: table for key, table in found.items() if len(table) > 1}
+    for key, table in tables.items():
         told = ", ".join(f"{name} = {value:g}" for name, value in key)
-        yield f"{general} ({told})" if len(tables) > 1 else general, arms
+        yield f"{general} ({told})" if len(tables) > 1 else general, table
 
 
 def _all_but(varied: str | None) -> Callable[[Trial], _Fixed]:
@@ -194,14 +194,12 @@ def _all_but(varied: str | None) -> Callable[[Trial], _Fixed]:
     )
 
 
-def _size_arms(origin: Origin, group: Sequence[Trial]) -> _Arms:
-    return [
-        Arm(Setting("size", "n_robots", row.n_robots or 0), _case(origin, row))
-        for row in sorted(group, key=lambda row: row.n_robots or 0)
-    ]
+def _sizes(group: Sequence[Trial]) -> _Varied:
+    rows = sorted(group, key=lambda row: row.n_robots or 0)
+    return [(Setting("size", "n_robots", row.n_robots or 0), row) for row in rows]
 
 
-def _fault_arms(origin: Origin, group: Sequence[Trial]) -> _Arms:
+def _faults(group: Sequence[Trial]) -> _Varied:
     broken = next((row for row in group if row.faulty), None)
     if broken is None:
         return []
@@ -211,14 +209,11 @@ def _fault_arms(origin: Origin, group: Sequence[Trial]) -> _Arms:
             "none) of the same robots and parameters: R and FT are relative to it"
         )
     # What faults are measured against stands first, then the pair that shows chance alone.
-    ordered = sorted(group, key=lambda row: (row.faulty > 0, row.fault == REPEATED))
-    return [
-        Arm(Setting("fault", row.fault, row.faulty, row.onset), _case(origin, row))
-        for row in ordered
-    ]
+    rows = sorted(group, key=lambda row: (row.faulty > 0, row.fault == REPEATED))
+    return [(Setting("fault", row.fault, row.faulty, row.onset), row) for row in rows]
 
 
-def _parameter_arms(origin: Origin, name: str, x_o: float, group: Sequence[Trial]) -> _Arms:
+def _values(name: str, x_o: float, group: Sequence[Trial]) -> _Varied:
     by_value = {dict(row.parameters)[name]: row for row in group}
     values = sorted(by_value, key=lambda x: x != x_o)  # a stable sort: x_o, then as in the file
     if values[0] == 0.0 and len(values) > 1:
@@ -226,9 +221,7 @@ def _parameter_arms(origin: Origin, name: str, x_o: float, group: Sequence[Trial
             f"line {by_value[0.0].line}: {name} = 0 is x_o, as in the first row, "
             "and A is relative to x_o: let a row with another value stand first"
         )
-    return [
-        Arm(Setting("parameter", name, value), _case(origin, by_value[value])) for value in values
-    ]
+    return [(Setting("parameter", name, value), by_value[value]) for value in values]
 
 
 def _refuse_unused(origin: Origin, plan: Plan) -> None:

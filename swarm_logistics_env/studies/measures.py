@@ -13,13 +13,10 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.resilience import SurvivalCurve
-from swarm_logistics_env.tasks.task import Outcome
 
-from .comparison import Comparison
+from .comparison import Arm, Comparison
 from .results import StudyResults, Times
 from .verdict import Cell, grouped, same_runs
-
-Outcomes = tuple[Outcome, ...]
 
 
 class RepairCurve(NamedTuple):
@@ -27,13 +24,11 @@ class RepairCurve(NamedTuple):
 
     Attributes:
         curve: share of runs that are not back yet.
-        censored: how many were not back by then.
-        total: of how many.
+        back: which runs came back by the end, (n_runs,).
     """
 
     curve: SurvivalCurve
-    censored: int
-    total: int
+    back: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -60,20 +55,19 @@ class Resilience:
 def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
     for comparison in mid_run_faults(results):
-        m, n = comparison.changed.setting.value, comparison.n_robots
-        whole, *third, faulty = map(results.outcomes_of, comparison.arms)
-        if not (whole and faulty and all(third)):
+        if not all(map(results.outcomes_of, comparison.arms)):
             continue
-        removed = third[0] if third else None
-        onset, paired = comparison.changed.setting.onset, results.plan.paired
+        faulty, removed = comparison.changed, comparison.removed
+        share = faulty.setting.value / comparison.n_robots
         indices = (
-            _index(faulty, removed, onset, 1.0, paired=paired) if removed else None,
-            _index(faulty, whole, onset, 1.0 - m / n, paired=paired),
+            _index(results, faulty, removed, 1.0) if removed else None,
+            _index(results, faulty, comparison.original, 1.0 - share),
         )
         try:
             if removed is None:
                 raise StudyError("no runs with the robots removed are there to compare with")
-            pairs = (_times(faulty), _times(removed)), _null(results, comparison)
+            broken = results.times_of(faulty), results.times_of(removed)
+            pairs = broken, _null(results, comparison)
             single = tuple(_repair_curve(comparison, *pair) for pair in pairs)
         except (StudyError, spi.IndicatorError) as error:
             yield Resilience(comparison, *indices, problem=str(error))
@@ -91,23 +85,17 @@ def mid_run_faults(results: StudyResults) -> list[Comparison]:
     ]
 
 
-def _times(runs: Outcomes) -> Times:
-    return tuple(run.delivery_times for run in runs)
-
-
-def _index(
-    faulty: Outcomes, reference: Outcomes, onset: float, threshold: float, *, paired: bool
-) -> Estimate | None:
-    named = {"faulty": faulty, "reference": reference}
+def _index(results: StudyResults, faulty: Arm, reference: Arm, threshold: float) -> Estimate | None:
+    named = {"faulty": results.outcomes_of(faulty), "reference": results.outcomes_of(reference)}
     try:
         return spi.resilience_index(
-            _times(faulty),
-            _times(reference),
-            onset=onset,
+            results.times_of(faulty),
+            results.times_of(reference),
+            onset=faulty.setting.onset,
             threshold=threshold,
-            paired=paired,
+            paired=results.plan.paired,
             saturated=[name for name, runs in named.items() if any(r.all_delivered for r in runs)],
-            identical=same_runs([r.digest for r in faulty], [r.digest for r in reference]),
+            identical=same_runs(*([run.digest for run in runs] for runs in named.values())),
         )
     except spi.IndicatorError:  # nothing is delivered after the onset in the reference
         return None
@@ -134,8 +122,7 @@ def _repair_curve(comparison: Comparison, times: Times, reference: Times) -> Rep
     end = comparison.original.case.scenario.duration
     window = window_of(comparison)
     seconds, back = spi.repair_times(times, reference, onset=onset, end=end, window=window)
-    censored = int(np.count_nonzero(~back))
-    return RepairCurve(spi.kaplan_meier(seconds, back), censored, back.size)
+    return RepairCurve(spi.kaplan_meier(seconds, back), back)
 
 
 _LONGEST_WINDOW = 100.0  # s

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.tasks.task import Run, Task
+from swarm_logistics_env.tasks.task import Outcome, Run, Task
 
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
@@ -154,7 +154,7 @@ class Study:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        whole, seconds, played = self._runs(shard), 0.0, 0
+        whole, seconds, outcomes = self._runs(shard), 0.0, list[Outcome]()
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
@@ -162,7 +162,6 @@ class Study:
             done = store.succeeded()
             kept = sum(run.key in done for run in whole)
             tried: set[str] = set()
-            errors: list[str] = []
             end = None if minutes is None else time.monotonic() + 60.0 * minutes
             left = 0
             # A run that failed in this call is not tried again.
@@ -173,16 +172,16 @@ class Study:
                     title += f", up to {seeds} seeds"
                 if minutes is not None:
                     title += f", for {minutes:g} min"
-                outcomes, took = play(missing, engine, store, title, end)
-                left = len(missing) - len(outcomes)
-                played += len(outcomes)
+                finished, took = play(missing, engine, store, title, end)
+                outcomes += finished
+                left = len(missing) - len(finished)
                 tried |= {run.key for run in missing}
-                errors += [one.error for one in outcomes if one.error is not None]
                 seconds += took
                 if left or not self.specification.until_clear:
                     break
+        errors = [one.error for one in outcomes if one.error is not None]
         error = errors[0].strip().splitlines()[-1] if errors else None
-        return Tally(played, len(errors), kept, seconds, error, left)
+        return Tally(len(outcomes), len(errors), kept, seconds, error, left)
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs
@@ -284,21 +283,18 @@ class Study:
 
     @contextmanager
     def _store(self, *, existing: bool = False) -> Iterator[Runs]:
-        if self.out is not None:
-            if existing:
-                opened = Runs.existing(self.out)
-            else:
-                try:
-                    self.out.mkdir(parents=True, exist_ok=True)
-                except OSError as error:
-                    raise StudyError(f"cannot write to {self.out}: {error.strerror}") from error
-                opened = Runs(self.out / FILE_NAME)
-            with opened:
-                yield opened
+        if self.out is None:
+            if self._memory is None:
+                if existing:
+                    raise StudyError("nothing has been run: call run() first")
+                self._memory = Runs(None)
+                finalize(self, self._memory.close)
+            yield self._memory
             return
-        if self._memory is None:
-            if existing:
-                raise StudyError("nothing has been run: call run() first")
-            self._memory = Runs(None)
-            finalize(self, self._memory.close)
-        yield self._memory
+        if not existing:
+            try:
+                self.out.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise StudyError(f"cannot write to {self.out}: {error.strerror}") from error
+        with Runs.existing(self.out) if existing else Runs(self.out / FILE_NAME) as opened:
+            yield opened
