@@ -75,7 +75,7 @@ def main() -> None:
 
 def rows(world: str, learner: str | None = None) -> list[dict[str, Any]]:
     """Return the rows of whole trainings that are there, by learner and seed."""
-    found = [json.loads(path.read_text("utf-8")) for path in RESULTS.glob(f"*-{world}-*.json")]
+    found = [json.loads(path.read_text("utf-8")) for path in RESULTS.glob(f"*-{world}@*.json")]
     names, whole = LEARNERS if learner is None else (learner,), Learning("", world, 0).agent_steps
     return sorted(
         (row for row in found if row["learner"] in names and row["agent_steps"] == whole),
@@ -168,7 +168,7 @@ def draw(canvas: Any, beside: dict[str, dict[str, list[float]]]) -> None:
     """Draw P over agent-steps of every training, a panel for each world."""
     for world, axes in zip(WORLDS, canvas.subplots(len(WORLDS))):
         for (name, colour), seed in product(zip(LEARNERS, COLOURS), TRAININGS):
-            path = RESULTS / f"{name}-{world}-{seed}.csv"
+            path = RESULTS / f"{name}-{world}@{seed}.csv"
             if path.exists():
                 points = list(csv.DictReader(path.read_text("utf-8").splitlines()))
                 steps = [float(point["agent_steps"]) / 1e6 for point in points]

@@ -1,7 +1,7 @@
 """What all learners share: worlds, rewards, PPO's settings, the curve, the policy file and the row.
 
 Each learner writes results/interop/NAME.csv, its curve, NAME.safetensors, a policy file for
-`swarm-logistics judge`, and NAME.json, its row; NAME is "LEARNER-WORLD-SEED".
+`swarm-logistics judge`, and NAME.json, its row; NAME is "LEARNER-WORLD@SEED".
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class Learning:
         batch = self.rows * SETTINGS.n_steps
         self.updates = max(1, (agent_steps or AGENT_STEPS[world]) // batch)
         self.agent_steps = self.updates * batch
-        self.name = f"{learner}-{world}-{seed}"
+        self.name = f"{learner}-{world}@{seed}"
         self._curve: list[dict[str, float]] = []
         self._seconds, self._since = 0.0, time.process_time()
 

@@ -136,7 +136,7 @@ def test_each_learner_learns_two_updates_and_writes_a_policy(
     assert points[0]["layers.2.bias"].tolist() == pytest.approx([0.8, 0.0, 0.0], abs=1e-6)
     assert points[0]["deviations"].tolist() == pytest.approx([0.5] * 3, abs=1e-3)
     assert all((points[0][name] != points[-1][name]).any() for name in points[0])
-    policy: Any = policies.load(str(tmp_path / f"{learner}-small-0.safetensors"))
+    policy: Any = policies.load(str(tmp_path / f"{learner}-small@0.safetensors"))
     assert (policy.card.network.hidden, policy.card.agent_steps) == ((128, 64), 30_720)
     assert (len(row["P"]), list(row["P_F"])) == (1, ["FM1", "FM2", "FM3", "FM4"])
 
