@@ -32,7 +32,7 @@ help:
 	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
-	@echo "make interop         four learners of other people's code, three trainings each (2.5 core-hours): results/interop"
+	@echo "make interop         four learners of other people's code, three trainings each (1.4 core-hours): results/interop"
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make docs            the documentation site, site/index.html"

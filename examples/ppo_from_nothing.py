@@ -42,7 +42,8 @@ def main(total_timesteps=1_000_000, duration=200.0, seed=0, judged=20):
     learned = [*actor.parameters(), *critic.parameters(), spread]
     optimizer = torch.optim.Adam(learned, lr=1e-3)
     seen = torch.from_numpy(env.reset())
-    for _ in range(total_timesteps // (STEPS * env.num_envs)):
+    updates = total_timesteps // (STEPS * env.num_envs)
+    for update in range(updates):
         taken = []
         with torch.no_grad():
             for _ in range(STEPS):
@@ -71,6 +72,9 @@ def main(total_timesteps=1_000_000, duration=200.0, seed=0, judged=20):
                 loss.backward()
                 nn.utils.clip_grad_norm_(learned, 0.5)
                 optimizer.step()
+        if update % 5 == 0 or update == updates - 1:
+            mean = sum(paid[4].mean() for paid in taken) / STEPS
+            print(f"update {update + 1} of {updates}: {mean:.4f} of reward a step", flush=True)
     return compared(actor, spread, scenario, range(1000, 1000 + judged))
 
 

@@ -44,10 +44,10 @@ class Learner(NamedTuple):
 
 
 LEARNERS = {
-    "sb3-ppo": Learner("dev", "interop.sb3_ppo", {"small": 3, "paper": 10}),
-    "torchrl-ppo": Learner("torchrl", "interop.torchrl_ppo", {"small": 6, "paper": 15}),
-    "benchmarl-ippo": Learner("benchmarl", "interop.benchmarl_ppo", {"small": 6, "paper": 15}),
-    "benchmarl-mappo": Learner("benchmarl", "interop.benchmarl_ppo", {"small": 6, "paper": 15}),
+    "sb3-ppo": Learner("dev", "interop.sb3_ppo", {"small": 2, "paper": 5}),
+    "torchrl-ppo": Learner("torchrl", "interop.torchrl_ppo", {"small": 3, "paper": 7}),
+    "benchmarl-ippo": Learner("benchmarl", "interop.benchmarl_ppo", {"small": 4, "paper": 7}),
+    "benchmarl-mappo": Learner("benchmarl", "interop.benchmarl_ppo", {"small": 4, "paper": 7}),
 }
 
 

@@ -44,7 +44,7 @@ def test_no_two_modules_have_one_name() -> None:
 ROOT = PACKAGE.parent
 MOST = {
     "lines of code of the package": 18_000,
-    "tokens of the package": 163_850,
+    "tokens of the package": 163_860,
     "files of the package": 124,
     "lines of code of studies and report": 4_053,
     "lines of tests": 19_025,

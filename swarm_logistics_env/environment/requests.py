@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.errors import CommandError, SetupError, suggest
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.warehouse.faults import GRACE, checked_faults, failed_robots
@@ -117,7 +118,8 @@ def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return a copy of the options as a dict; it is empty for None.
 
     Raises:
-        SetupError: they are not a mapping, or one is nearly called as one of `OPTIONS`.
+        SetupError: they are not a mapping, or one is nearly called as one of `OPTIONS`, or is a
+            field of the scenario.
     """
     if options is None:
         return {}
@@ -127,6 +129,11 @@ def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
         # Other libraries pass options of their own, which have no such name.
         if get_close_matches(unknown.casefold(), OPTIONS, cutoff=0.8):
             raise SetupError(f"there is no reset option {unknown!r}{suggest(unknown, OPTIONS)}")
+        if unknown in Scenario.model_fields:
+            raise SetupError(
+                f"there is no reset option {unknown!r}: should be in the option 'scenario', as "
+                f"options={{'scenario': {{{unknown!r}: {options[unknown]!r}}}}}"
+            )
     return dict(options)
 
 

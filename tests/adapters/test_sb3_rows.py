@@ -225,3 +225,10 @@ def test_the_example_runs() -> None:
     ran = doctest.testmod(sb3)
     assert ran.attempted > 5
     assert not ran.failed
+
+
+def test_an_error_of_make_env_says_what_it_is_called_with() -> None:
+    wrong: Any = SwarmLogisticsEnv
+    with pytest.raises(SetupError) as caught:
+        SwarmVecEnv(make_env=wrong)
+    assert "called with the number of a world" in caught.value.__notes__[0]
