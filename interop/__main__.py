@@ -17,10 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning, robustness, shown
+from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning, robustness
 from swarm_logistics_env import policies, spi
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, images
+from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.train.evaluation import performances
 
 ROOT = RESULTS.parents[1]
@@ -137,13 +138,13 @@ def table(beside: dict[str, dict[str, list[float]]]) -> str:
             lines.append([
                 name, world, f"{kept[0]['agent_steps']:,}",
                 f"{np.mean([row['cpu_minutes'] for row in kept]):.1f}",
-                shown(*spi.mean_interval(p)), each_training(found),
+                bracketed(spi.mean_interval(p), 1), each_training(found),
                 f"{sum(is_clear(each, beside[world]['swarm-dt']) for each in p)} of {len(p)}",
                 *(robustness(p, [row["P_F"][mode] for row in kept], world) for mode in MODES),
             ])  # fmt: skip
     for world, name in product(WORLDS, REFERENCES):
         if name in beside[world]:
-            p_of = shown(*spi.mean_interval(beside[world][name]))
+            p_of = bracketed(spi.mean_interval(beside[world][name]), 1)
             lines.append([name, world, *[""] * 2, p_of, *[""] * (len(head) - 5)])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
@@ -155,7 +156,7 @@ def each_training(found: list[dict[str, Any]]) -> str:
     for row in found:
         if row["seed"] not in TRAININGS:
             words += f"; seed {row['seed']}: {np.mean(row['P']):.1f}, predicted "
-            words += shown(*spi.prediction_interval(kept))
+            words += bracketed(spi.prediction_interval(kept), 1)
     return words
 
 
@@ -179,7 +180,7 @@ def draw(canvas: Any, beside: dict[str, dict[str, list[float]]]) -> None:
         axes.set(
             title=f"{world} world", xlabel="million agent-steps", ylabel="P [items]", ylim=(0, None)
         )
-        axes.legend(fontsize=7, ncols=2)
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7)
 
 
 if __name__ == "__main__":

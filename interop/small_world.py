@@ -25,6 +25,7 @@ from swarm_logistics_env.motion import INPUTS, OUTPUTS
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, Network, PolicyCard
 from swarm_logistics_env.records import becoming
+from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.train.evaluation import performances, versions
 from swarm_logistics_env.wrappers import MotionFrame
 
@@ -195,7 +196,7 @@ class Learning:
         r = ", ".join(f"{mode} {robustness(p_o, p, self.world)}" for mode, p in row["P_F"].items())
         print(
             f"{self.name}: {self.agent_steps:,} agent-steps, {row['cpu_minutes']} CPU minutes, "
-            f"P {shown(*spi.mean_interval(p_o))} on {len(SEEDS)} new seeds; "
+            f"P {bracketed(spi.mean_interval(p_o), 1)} on {len(SEEDS)} new seeds; "
             f"R with {FAULTY} of {self.scenario.n_robots} robots: {r}"
         )
         return row
@@ -229,14 +230,7 @@ def robustness(p_o: Sequence[Any], p_f: Sequence[Any], world: str = "small") -> 
     if not np.any(p_o):
         return "-"
     r = spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY)
-    return shown(r.value, r.low, r.high, 2)
-
-
-def shown(value: float, low: float | None, high: float | None, decimals: int = 1) -> str:
-    """Return a value with its limits, where there are any."""
-    if low is None or high is None:
-        return f"{value:.{decimals}f}"
-    return f"{value:.{decimals}f} [{low:.{decimals}f}, {high:.{decimals}f}]"
+    return bracketed(r, 2)
 
 
 def main(learn: Callable[[Learning], Tensors], learners: Sequence[str]) -> None:
