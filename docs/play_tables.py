@@ -200,13 +200,19 @@ ENTRANTS = (
     "swarm-dt", "swarm-dt-follow", "homing", "homing-stock", "central", "central-stock",
     "ppo-delivery@all", "ppo-robust@all", "ppo-indicator@all",
 )  # fmt: skip
+# Other people's learners, where `make interop` has trained them; each in its largest world.
+LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "benchmarl-mappo-small")
 
 
 def benchmark_studies(out: Path) -> tuple[Study, ...]:
     """Return the benchmark's study of each entrant, each in a directory of its own."""
+    files = [ROOT / "results" / "interop" / f"{name}@all.safetensors" for name in LEARNERS]
+    there = [str(path) for path in files if path.with_stem(path.stem[:-3] + "0").exists()]
     return tuple(
-        Study.preset(benchmark.STUDY, out=out / "benchmark" / section.slug(name), policies=[name])
-        for name in ENTRANTS
+        Study.preset(
+            benchmark.STUDY, out=out / "benchmark" / section.slug(Path(name).stem), policies=[name]
+        )
+        for name in (*ENTRANTS, *there)
     )
 
 
