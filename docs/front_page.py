@@ -21,6 +21,7 @@ MEDIA = DOCS / "media"
 
 _REFERENCE = "swarm-dt"  # the paper's controller
 _LEARNED = "ppo-"
+_TRAINED = "ppo-robust"  # among faults: whether it bears them is told, whatever came of it
 _STOCK = "homing-stock"
 _NUMBER = r"-?(?:[\d.,]+|∞)"
 _VALUE = re.compile(rf"({_NUMBER}) \[({_NUMBER}), ({_NUMBER})\]")
@@ -144,9 +145,11 @@ def _faults(rows: Rows) -> Iterator[str]:
     best = {mode: max(row, key=lambda name: row[name].low) for mode, row in r.items()}
     mode = max(r, key=lambda mode: r[mode][best[mode]].value - r[mode][worst[mode]].value)
     lost, kept = worst[mode], best[mode]
+    told = [kept, *(name for name in r[mode] if name.startswith(_TRAINED) and name != kept)]
+    others = ", ".join(f"of `{name}` {r[mode][name].text}" for name in told)
     yield (
         f"**One collapses under a fault that another bears**: with two robots in {mode} R of "
-        f"`{lost}` is {r[mode][lost].text}, of `{kept}` {r[mode][kept].text}."
+        f"`{lost}` is {r[mode][lost].text}, {others}."
     )
 
 
@@ -227,7 +230,7 @@ def draw(rows: Rows, path: Path) -> None:
 
 # -- links --------------------------------------------------------------------------------------
 
-NOTE = "A package index does not show them: pictures and links are those of the repository.\n"
+NOTE = "A package index does not show them: relative pictures and links.\n"
 
 
 def with_address(text: str, address: str | None) -> str:

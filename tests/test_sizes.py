@@ -48,7 +48,7 @@ MOST = {
     "files of the package": 124,
     "lines of code of studies and report": 4_053,
     "lines of tests": 19_025,
-    "lines of verification, benchmarks, interop and the scripts of docs": 5_780,
+    "lines of verification, benchmarks, interop and the scripts of docs": 5_790,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
