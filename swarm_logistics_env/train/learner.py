@@ -196,7 +196,8 @@ def make_learner(
     learner = PPO(
         AsymmetricPolicy,
         view,
-        learning_rate=lambda left: last + left * (first - last),
+        # The last rollout may pass the end of a training, where the rate would go on to fall.
+        learning_rate=lambda left: max(0.0, last + left * (first - last)),
         n_steps=ppo.n_steps,
         batch_size=training.rows * ppo.n_steps // ppo.n_minibatches,
         n_epochs=ppo.epochs,

@@ -40,6 +40,13 @@ def done(small: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(small(), tmp_path_factory.mktemp("done"))
 
 
+def test_fewer_steps_than_a_rollout_leave_weights_that_are_numbers(
+    small: Any, tmp_path: Path
+) -> None:
+    policy: Any = policies.load(str(train(small(agent_steps=1), tmp_path)))
+    assert all(np.isfinite(tensor).all() for tensor in policy.tensors.values())
+
+
 def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> None:
     scores = Scores(seeds=2, sizes=(2, 3), modes=("FM4",), robots=(1,), n_robots=3)
     path = train(small(scores=scores), tmp_path, command="the command")
