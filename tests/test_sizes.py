@@ -47,7 +47,7 @@ MOST = {
     "tokens of the package": 163_860,
     "files of the package": 124,
     "lines of code of studies and report": 4_053,
-    "lines of tests": 19_031,
+    "lines of tests": 19_035,
     "lines of verification, benchmarks, interop and the scripts of docs": 5_790,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }

@@ -40,11 +40,14 @@ def done(small: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(small(), tmp_path_factory.mktemp("done"))
 
 
-def test_fewer_steps_than_a_rollout_leave_weights_that_are_numbers(
+def test_the_learning_rate_stays_at_its_end_where_a_rollout_passes_that(
     small: Any, tmp_path: Path
 ) -> None:
-    policy: Any = policies.load(str(train(small(agent_steps=1), tmp_path)))
-    assert all(np.isfinite(tensor).all() for tensor in policy.tensors.values())
+    trained = [
+        load_file(train(small(agent_steps=1, ppo=small().ppo.replace(learning_rate=rate)), out))
+        for rate, out in ((1e-3, tmp_path / "slow"), (0.5, tmp_path / "fast"))
+    ]
+    assert all((tensor == trained[1][name]).all() for name, tensor in trained[0].items())
 
 
 def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> None:
