@@ -1,7 +1,5 @@
 """Settings of the documentation site: `make docs`. Nothing is fetched when a page is viewed."""
 
-from __future__ import annotations
-
 from functools import partial
 from importlib.metadata import version as installed_version
 from typing import TYPE_CHECKING, Any
@@ -12,9 +10,8 @@ from latex2mathml.converter import convert
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-project = "swarm-logistics-env"
-author = "swarm-logistics-env contributors"
-project_copyright = author
+project = html_title = "swarm-logistics-env"
+author = project_copyright = "swarm-logistics-env contributors"
 version = release = installed_version("swarm-logistics-env")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
@@ -25,10 +22,10 @@ myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["media"]
 html_theme = "furo"
-html_title = "swarm-logistics-env"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_theme_options = {"navigation_with_keys": True}
+html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sphinx = False
 pygments_style = "default"
@@ -36,13 +33,12 @@ pygments_style = "default"
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the signatures hold them
 autodoc_preserve_defaults = True
+autodoc_mock_imports = ["stable_baselines3"]
 napoleon_numpy_docstring = False
 napoleon_use_rtype = False
 napoleon_use_ivar = True
 default_role = "code"  # docstrings mark code with single backticks
 toc_object_entries_show_parents = "hide"
-autodoc_mock_imports = ["stable_baselines3"]
-
 
 # The pages in the order of the site's menu. They stand here, because GitHub would show a list of
 # contents in a page as it is written.
@@ -50,11 +46,11 @@ CONTENTS = {
     "Use": ("quickstart", "The environment <environment>", "training", "faults"),
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
     "Research": ("results", "research/questions_of_the_field", "research/readings_and_tries"),
-    "Look up": ("reference", "Promises <promises>", "Comparison <comparison>"),
+    "Look up": ("reference", "Comparison <comparison>"),
 }
 
 
-def setup(app: Sphinx) -> None:
+def setup(app: "Sphinx") -> None:
     """Render formulas as MathML, which browsers draw themselves; add the contents."""
     app.connect("source-read", add_contents)
     renderers = [(partial(formula, display), None) for display in ("inline", "block")]
@@ -62,10 +58,7 @@ def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
 
 
-html_math_renderer = "mathml"
-
-
-def add_contents(app: Sphinx, page: str, text: list[str]) -> None:
+def add_contents(app: "Sphinx", page: str, text: list[str]) -> None:
     """Put the list of all pages below the first one."""
     if page == "index":
         for caption, pages in CONTENTS.items():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +22,10 @@ settings.register_profile(
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
+ROOT = Path(__file__).parents[1]
 # Beside an installed package (`make test-lowest`) there is no source tree to read.
-if not (Path(__file__).parents[1] / "swarm_logistics_env").is_dir():
-    collect_ignore = [
-        "test_imports.py",
-        "test_packaging.py",
-        "verification/test_mutants.py",
-    ]
+if not (ROOT / "swarm_logistics_env").is_dir():
+    collect_ignore = ["test_imports.py", "test_packaging.py", "verification/test_mutants.py"]
 
 
 SMALL: dict[str, Any] = {
@@ -45,6 +44,13 @@ SMALL: dict[str, Any] = {
     "parameters": [{"name": "delivery_width", "values": [1.0, 0.5]}],
     "ablations": [{"policy": "random-walk"}],
 }
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
+    """Imports a script of docs/ by its name."""
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    return importlib.import_module
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterator
 from importlib.util import resolve_name
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -46,68 +45,38 @@ MAY_IMPORT: dict[str, set[str]] = {
     "studies": RUNS | {"progress_bar", "spi", "tasks"},
     "report": {"errors", "records", "warehouse", "spi", "tasks", "studies"},
     "attack": RUNS | {"spi", "tasks", "studies"},
-    "train": RUNS
-    | ENVIRONMENT
-    | {"progress_bar", "wrappers", "adapters", "spi", "tasks", "studies"},
     "testing": RUNS | ENVIRONMENT | {"spi"},
 }
 # A Study offers its report, so it stands above both; the other modules of studies stand below.
 MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report"}
-MAY_IMPORT["train"] |= {"Study", "report", "progress_bar"}
+MAY_IMPORT["train"] = MAY_IMPORT["studies"] | ENVIRONMENT | MAY_IMPORT["Study"]
+MAY_IMPORT["train"] |= {"wrappers", "adapters", "Study"}
 # The front doors import whatever they offer.
 MAY_IMPORT["cli"] = set(MAY_IMPORT)
 MAY_IMPORT["__init__"] = set(MAY_IMPORT)
 MAY_IMPORT["__main__"] = {"cli"}
 
-HEAVY = {"torch", "pandas", "matplotlib", "pygame", "scipy.stats"}
+HEAVY = {"torch", "pandas", "matplotlib", "pygame", "scipy.stats", f"{PACKAGE}.rendering"}
+MODULES = {
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in sorted((ROOT / PACKAGE).rglob("*.py"))
+}
 
 
-class Import(NamedTuple):
-    """One import statement: the module it stands in, the module it loads, and when."""
-
-    importer: str
-    imported: str
-    line: int
-    at_import_time: bool
-
-
-def module_name(path: Path) -> str:
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-MODULES = {module_name(path): path for path in sorted((ROOT / PACKAGE).rglob("*.py"))}
-
-
-def imports_in(tree: ast.AST, *, at_import_time: bool = True) -> Iterator[tuple[ast.stmt, bool]]:
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            yield node, at_import_time
-        else:
-            runs_later = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-            for_types = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-            now = at_import_time and not runs_later and not for_types
-            yield from imports_in(node, at_import_time=now)
-
-
-def all_imports() -> list[Import]:
-    found = []
+def all_imports() -> Iterator[tuple[str, int, str]]:
+    """Yield the module that each import stands in, its line, and the module that it loads."""
     for importer, path in MODULES.items():
-        for node, now in imports_in(ast.parse(path.read_text(encoding="utf-8"))):
+        folder = importer if path.name == "__init__.py" else importer.rpartition(".")[0]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
-                targets = [alias.name for alias in node.names]
-            else:
-                assert isinstance(node, ast.ImportFrom)
-                folder = importer if path.name == "__init__.py" else importer.rpartition(".")[0]
+                yield from ((importer, node.lineno, alias.name) for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
                 base = resolve_name("." * node.level + (node.module or ""), folder)
-                members = [f"{base}.{alias.name}" for alias in node.names]
-                targets = [member if member in MODULES else base for member in members]
-            found += [Import(importer, target, node.lineno, now) for target in targets]
-    return found
+                for member in (f"{base}.{alias.name}" for alias in node.names):
+                    yield importer, node.lineno, member if member in MODULES else base
 
 
-IMPORTS = all_imports()
-OWN_IMPORTS = [i for i in IMPORTS if i.imported.split(".")[0] == PACKAGE]
+IMPORTS = list(all_imports())
 
 
 def part(module: str) -> str:
@@ -117,41 +86,26 @@ def part(module: str) -> str:
     return module.split(".")[1] if "." in module else "__init__"
 
 
-def test_table_has_every_part_and_points_one_way() -> None:
-    assert MODULES, f"no module found in {ROOT / PACKAGE}"
+def test_imports_point_one_way_as_the_table_has_it() -> None:
     assert {part(module) for module in MODULES} - set(MAY_IMPORT) == set()
     graph = {p: allowed for p, allowed in MAY_IMPORT.items() if p not in {"cli", "__init__"}}
     graphlib.TopologicalSorter(graph).prepare()  # raises CycleError
-
-
-def test_imports_point_one_way() -> None:
     uphill = [
-        f"{i.importer}:{i.line} imports {i.imported}"
-        for i in OWN_IMPORTS
-        if part(i.imported) not in MAY_IMPORT.get(part(i.importer), set()) | {part(i.importer)}
+        f"{importer}:{line} imports {imported}"
+        for importer, line, imported in IMPORTS
+        if imported.split(".")[0] == PACKAGE
+        and part(imported) not in MAY_IMPORT[part(importer)] | {part(importer)}
     ]
     assert uphill == []
 
 
-def test_no_module_waits_for_itself() -> None:
-    graph: dict[str, set[str]] = {module: set() for module in MODULES}
-    for i in OWN_IMPORTS:
-        if i.at_import_time:
-            graph[i.importer].add(i.imported)
-    graphlib.TopologicalSorter(graph).prepare()  # raises CycleError, which names the modules
-
-
 def test_only_physics_knows_pymunk() -> None:
-    users = {i.importer for i in IMPORTS if i.imported.split(".")[0] == "pymunk"}
-    assert users <= {f"{PACKAGE}.warehouse.physics"}
+    users = {importer for importer, _, imported in IMPORTS if imported.split(".")[0] == "pymunk"}
+    assert users == {f"{PACKAGE}.warehouse.physics"}
 
 
 @pytest.mark.parametrize("module", [PACKAGE, f"{PACKAGE}.swarm_logistics_v0", f"{PACKAGE}.spi"])
 def test_importing_loads_nothing_heavy(module: str) -> None:
-    script = f"import sys, {module}; print(*sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    loaded = set(done.stdout.split())
-    assert loaded & (HEAVY | {f"{PACKAGE}.rendering"}) == set()
+    command = [sys.executable, "-c", f"import sys, {module}; print(*sys.modules)"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) & HEAVY == set()

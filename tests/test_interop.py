@@ -1,13 +1,8 @@
-"""Other people's wrappers and learners: `make interop-calls` has them installed.
-
-TorchRL, SuperSuit and RLlib, each with robots that have failed from the start and with swarms whose
-size changes between episodes; and two updates of each learner of `interop`.
-"""
+"""Other people's wrappers and learners: `make interop-calls` has them installed."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,24 +20,22 @@ def plain() -> Any:
     return swarm_logistics_v0.parallel_env(n_robots=N_ROBOTS, max_cycles=STEPS)
 
 
-def sizes() -> Any:
-    return SwarmSize(plain(), [3, N_ROBOTS], leave=[(1, 1.0)])
+def both() -> Any:
+    env = SwarmSize(plain(), [3, N_ROBOTS], leave=[(1, 1.0)])
+    return FixedAgents(FaultInjection(env, "FM1", robots=2, onset=0.0))
 
 
-CONDITIONS: dict[str, Callable[[], Any]] = {
-    "faults": lambda: FaultInjection(plain(), "FM1", robots=2, onset=0.0),
-    "sizes": lambda: FixedAgents(sizes()),
-    "both": lambda: FixedAgents(FaultInjection(sizes(), "FM1", robots=2, onset=0.0)),
-}
-EACH = pytest.mark.parametrize("condition", CONDITIONS)
+EACH = pytest.mark.parametrize(
+    "condition", [lambda: FaultInjection(plain(), "FM1", robots=2, onset=0.0), both]
+)
 pytestmark = pytest.mark.filterwarnings("default")  # theirs
 
 
 @EACH
-def test_torchrl_gets_what_the_specs_promise(condition: str) -> None:
+def test_torchrl_gets_what_the_specs_promise(condition: Any) -> None:
     envs = pytest.importorskip("torchrl.envs", reason="needs torchrl")
     utils = pytest.importorskip("torchrl.envs.utils")
-    wrapped = envs.PettingZooWrapper(CONDITIONS[condition](), return_state=True)
+    wrapped = envs.PettingZooWrapper(condition(), return_state=True)
     utils.check_env_specs(wrapped, seed=0)
     rollout = wrapped.rollout(5 * STEPS, break_when_any_done=False)
     assert rollout.batch_size == (5 * STEPS,)
@@ -50,16 +43,10 @@ def test_torchrl_gets_what_the_specs_promise(condition: str) -> None:
 
 
 @EACH
-def test_supersuit_stacks_frames_and_makes_vectors(condition: str) -> None:
+def test_supersuit_makes_vectors(condition: Any) -> None:
     supersuit = pytest.importorskip("supersuit", reason="needs supersuit")
-    from pettingzoo.test import parallel_api_test
-
     width = plain().observation_space("robot_0").shape[0]
-    stacked = supersuit.frame_stack_v1(plain(), 4)
-    observations, _ = stacked.reset(seed=0)
-    assert {row.shape for row in observations.values()} == {(4 * width,)}
-    parallel_api_test(stacked, num_cycles=2 * STEPS)
-    vector = supersuit.pettingzoo_env_to_vec_env_v1(CONDITIONS[condition]())
+    vector = supersuit.pettingzoo_env_to_vec_env_v1(condition())
     vector.reset(seed=0)
     for _ in range(2 * STEPS):
         rows, *_ = vector.step([vector.action_space.sample()] * vector.num_envs)
@@ -68,13 +55,13 @@ def test_supersuit_stacks_frames_and_makes_vectors(condition: str) -> None:
 
 @pytest.mark.parametrize("central", [False, True])
 @EACH
-def test_rllib_trains(condition: str, central: bool) -> None:
+def test_rllib_trains(condition: Any, central: bool) -> None:
     ppo = pytest.importorskip("ray.rllib.algorithms.ppo", reason="needs ray[rllib]")
     pettingzoo_env = pytest.importorskip("ray.rllib.env.wrappers.pettingzoo_env")
     registry = pytest.importorskip("ray.tune.registry")
 
     def make(_: Any) -> Any:
-        env = CONDITIONS[condition]()
+        env = condition()
         return CentralEnv(env, flat=True) if central else pettingzoo_env.ParallelPettingZooEnv(env)
 
     registry.register_env("swarm", make)
@@ -96,32 +83,28 @@ def small_world() -> Any:
 def test_the_worlds_of_the_task_are_those_that_all_learn_in(name: str) -> None:
     yaml, shared = pytest.importorskip("yaml"), small_world()
     path = Path(shared.__file__).parent / "swarm_logistics" / f"{name}.yaml"
-    fields = yaml.safe_load(path.read_text(encoding="utf-8"))
-    assert fields.pop("rewards") == shared.REWARDS
-    assert Scenario(**fields) == shared.WORLDS[name]
-    preset = load_training("delivery")
-    assert preset.rewards == shared.REWARDS
-    assert (
-        shared.WORLDS[name] == {"small": preset.world_scenarios[0], "paper": preset.scenario}[name]
-    )
+    fields, preset = yaml.safe_load(path.read_text("utf-8")), load_training("delivery")
+    assert fields.pop("rewards") == preset.rewards == shared.REWARDS
+    its_own = preset.world_scenarios[0] if name == "small" else preset.scenario
+    assert Scenario(**fields) == shared.WORLDS[name] == its_own
 
 
 @pytest.mark.parametrize(
-    ("module", "library", "learner"),
+    ("library", "module", "learner"),
     [
-        ("sb3_ppo", "stable_baselines3", "sb3-ppo"),
-        ("torchrl_ppo", "torchrl", "torchrl-ppo"),
-        ("benchmarl_ppo", "benchmarl", "benchmarl-ippo"),
-        ("benchmarl_ppo", "benchmarl", "benchmarl-mappo"),
+        ("stable_baselines3", "sb3_ppo", "sb3-ppo"),
+        ("torchrl", "torchrl_ppo", "torchrl-ppo"),
+        ("benchmarl", "benchmarl_ppo", "benchmarl-ippo"),
+        ("benchmarl", "benchmarl_ppo", "benchmarl-mappo"),
     ],
 )
 def test_each_learner_learns_two_updates_and_writes_a_policy(
-    module: str, library: str, learner: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    library: str, module: str, learner: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip(library)
     shared = small_world()
-    changed = {"RESULTS": tmp_path, "SEEDS": range(1), "CURVE_SEEDS": range(1), "POINTS": 1}
-    for name, value in changed.items():
+    monkeypatch.setattr(shared, "RESULTS", tmp_path)
+    for name, value in {"SEEDS": range(1), "CURVE_SEEDS": range(1), "POINTS": 1}.items():
         monkeypatch.setattr(shared, name, value)
     points, tell = list[Any](), shared.Learning.tell
 
@@ -132,7 +115,6 @@ def test_each_learner_learns_two_updates_and_writes_a_policy(
     monkeypatch.setattr(shared.Learning, "tell", watched)
     learning = shared.Learning(learner, "small", 0, agent_steps=30_720)
     row = learning.end(importlib.import_module(f"interop.{module}").learn(learning))
-    assert (learning.agent_steps, row["agent_steps"]) == (30_720, 30_720)
     assert points[0]["layers.2.bias"].tolist() == pytest.approx([0.8, 0.0, 0.0], abs=1e-6)
     assert points[0]["deviations"].tolist() == pytest.approx([0.5] * 3, abs=1e-3)
     assert all((points[0][name] != points[-1][name]).any() for name in points[0])
@@ -151,21 +133,15 @@ def test_worlds_of_torchrl_end_and_begin_each_for_itself() -> None:
         return FaultInjection(env, "removed", robots=1, onset=0.5)
 
     utils.check_env_specs(worlds(make, [0, 1]))
-    env = worlds(make, [0, 1])
-    done = env.rollout(65, break_when_any_done=False)["next", "done"][..., 0]
+    done = worlds(make, [0, 1]).rollout(65, break_when_any_done=False)["next", "done"][..., 0]
     assert [where.nonzero().flatten().tolist() for where in done] == [[19, 39, 59], [29, 59]]
 
 
-def test_the_plan_is_at_most_four_hours_and_one_more_training_stands_beside_its_prediction() -> (
-    None
-):
+def test_one_more_training_stands_beside_its_prediction() -> None:
     small_world()
-    plan = importlib.import_module("interop.__main__")
-    minutes = [each.minutes for each in plan.LEARNERS.values()]
-    in_paper = plan.BEST * max(each["paper"] for each in minutes)
-    assert 3 * (sum(each["small"] for each in minutes) + in_paper) <= 240
+    table = importlib.import_module("interop.__main__")
     rows = [{"seed": seed, "P": [p, p + 2.0]} for seed, p in enumerate([40.0, 44.0, 42.0, 60.0])]
-    assert plan.each_training(rows[:3]) == "41.0, 45.0, 43.0"
-    assert plan.each_training(rows).endswith("; seed 3: 61.0, predicted 43.0 [33.1, 52.9]")
-    assert plan.is_clear([40.0, 44.0, 42.0] * 4, [20.0, 30.0, 22.0] * 4)
-    assert not plan.is_clear([22.0, 28.0, 22.0] * 4, [20.0, 30.0, 22.0] * 4)
+    assert table.each_training(rows[:3]) == "41.0, 45.0, 43.0"
+    assert table.each_training(rows).endswith("; seed 3: 61.0, predicted 43.0 [33.1, 52.9]")
+    assert table.is_clear([40.0, 44.0, 42.0] * 4, [20.0, 30.0, 22.0] * 4)
+    assert not table.is_clear([22.0, 28.0, 22.0] * 4, [20.0, 30.0, 22.0] * 4)

@@ -21,6 +21,11 @@ from swarm_logistics_env import kernels
 print(kernels.pair_key(np.uint64(1), 2), kernels.pair_key(np.uint64(1), np.int32(2)))
 print(sum(sum(each.stats.cache_hits.values()) for each in kernels._all_kernels))
 """
+LONG = """
+from swarm_logistics_env import kernels
+kernels._SILENCE = 0.0
+kernels.uniform(1, 2), kernels.gaussian(1, 2)
+"""
 
 
 def started(script: str, cache: Path, **variables: str) -> subprocess.Popen[str]:
@@ -37,39 +42,24 @@ def finished(process: subprocess.Popen[str]) -> list[str]:
 
 
 def test_two_processes_that_start_at_once_keep_one_cache(tmp_path: Path) -> None:
-    # Twice, and not more often, as a start takes nearly a second for its imports alone.
-    for round_ in range(2):
-        cache = tmp_path / str(round_)
-        both = [finished(each) for each in [started(FIRST_CALLS, cache) for _ in range(2)]]
-        assert both[0][0] == both[1][0]
-    third = finished(started(FIRST_CALLS, cache))
+    both = [finished(each) for each in [started(FIRST_CALLS, tmp_path) for _ in range(2)]]
+    assert both[0][0] == both[1][0]
+    third = finished(started(FIRST_CALLS, tmp_path))
     assert third[:2] == [both[0][0], "2"]  # both signatures are loaded
 
 
 def test_a_kernel_compiles_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    def double(number: float) -> float:
-        return 2.0 * number
-
-    def half(number: float) -> float:
-        return number / 2.0
-
     def refuse(self: object) -> None:
         raise RuntimeError("cannot cache function: no locator available")
 
-    compiled = [kernels.kernel(function) for function in (double, half)]
-    monkeypatch.setattr(type(compiled[0]), "enable_caching", refuse)
+    double = kernels.kernel(lambda number: 2.0 * number)
+    half = kernels.kernel(lambda number: number / 2.0)
+    monkeypatch.setattr(type(double), "enable_caching", refuse)
     kernels._warn_of_no_cache.cache_clear()
     with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
-        assert [function(3.0) for function in compiled] == [6.0, 1.5]
+        assert (double(3.0), half(3.0)) == (6.0, 1.5)
     assert len(told) == 1
     kernels._warn_of_no_cache.cache_clear()
-
-
-LONG = """
-from swarm_logistics_env import kernels
-kernels._SILENCE = 0.0
-kernels.uniform(1, 2), kernels.gaussian(1, 2)
-"""
 
 
 def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -> None:
@@ -88,9 +78,6 @@ class Inner(NamedTuple):
 
 class Outer(NamedTuple):
     inner: Inner
-
-class Told:
-    text = "told"
 
 @inlined_kernel
 def part(number):
@@ -112,12 +99,10 @@ def whole(address):
         ("n_things: int", "n_things: float", True),
         ("    inner: Inner", "    inner: Inner\n    n_more: int", True),
         ("number + 1.0", "number - 1.0", True),
-        ("number + 1.0", "number + 2.0", True),
         ("@inlined_kernel", "@kernel", True),
         ("N_BEAMS", "N_COLUMNS", True),
         ("Return more", "Return one more", False),
         ("Of kernels", "Of two kernels", False),
-        ('"told"', '"told anew"', False),
     ],
 )
 def test_what_is_kept_is_used_until_code_of_kernels_changes(
@@ -129,7 +114,6 @@ def test_what_is_kept_is_used_until_code_of_kernels_changes(
         exec(compile(source, "made", "exec", dont_inherit=True), names)
         return kernels._digest_of(names["whole"])
 
-    assert old in SOURCE
     assert (digest(SOURCE.replace(old, new)) != digest(SOURCE)) == changes
     steps = kernels._digest_of(stepping.step)
     monkeypatch.setattr(grid, "_FEW", 81)  # of a kernel that others call
@@ -147,9 +131,3 @@ def test_a_kernel_that_another_one_called_can_be_called_from_python() -> None:
 
     assert [outer(3.0), inner(3.0), outer(4.0), inner(5.0)] == [8.0, 4.0, 10.0, 6.0]
     assert inner(1) == 2.0  # another signature
-
-    @kernels.kernel
-    def counting(number: int) -> float:
-        return inner(number > 0)  # and one more, which only this kernel asks for
-
-    assert (counting(3), inner(True)) == (2.0, 2.0)

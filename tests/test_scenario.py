@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
@@ -8,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_logistics_env import SCENARIO_PRESETS, Scenario, Warehouse
+from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.scenario import SOURCES
 
@@ -25,21 +24,15 @@ from swarm_logistics_env.scenario import SOURCES
 )
 def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
     scenario = Scenario(**fields)
-    assert Scenario.from_json(scenario.to_json()) == scenario
-    assert Scenario(**json.loads(json.dumps(scenario.model_dump(mode="json")))) == scenario
-    assert hash(Scenario.from_json(scenario.to_json())) == hash(scenario)
-    with pytest.raises(ValueError, match="frozen"):
-        scenario.n_robots = 3  # type: ignore[misc]
+    back = Scenario.from_json(scenario.to_json())
+    assert (back, hash(back)) == (scenario, hash(scenario))
 
 
 @pytest.mark.parametrize(
     ("fields", "complaint"),
     [
         ({"n_robots": 0}, "Scenario.n_robots = 0: should be greater than 0"),
-        ({"n_robots": 2.5}, "Scenario.n_robots = 2.5: should be a valid integer"),
-        ({"warehouse_width": 0.0}, "warehouse_width = 0.0: should be greater than 0"),
         ({"duration": math.nan}, "duration = nan: should be a finite number"),
-        ({"memory_size": 17}, "memory_size = 17: should be less than or equal to 16"),
         ({"relay": "flood"}, "relay = 'flood': should be 'none' or 'gossip'"),
         ({"n_robot": 3}, "no field 'n_robot'; did you mean 'n_robots'?"),
         ({"n_robots": 0, "n_items": -1}, r"n_robots = 0: .*; .*n_items = -1: .*"),
@@ -49,10 +42,8 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
             {"warehouse_width": 0.5, "warehouse_height": 0.5, "delivery_width": 0.1},
             r"n_robots = 25 of radius 0.125 m do not fit .* 0.4 x 0.5 m: should be at most 1 ",
         ),
-        ({"n_items": 5000}, "n_items = 5000 .* do not fit .* 8 x 10 m: should be at most 651"),
         ({"n_obstacles": 300}, "n_obstacles = 300 .* should be at most 113"),
         ({"n_obstacles": 100, "n_items": 200}, r"n_items = 200 .* should be at most \d+ "),
-        ({"warehouse_height": 0.2}, "warehouse_height = 0.2 m is narrower .* at least 0.25 m"),
         ({"warehouse_width": 2.2}, r"width - delivery_width = 0.2 m is narrower .* least 0.25 m"),
         ({"control_period": 0.05}, "control_period = 0.05 s should be a whole multiple of .* 0.02"),
         ({"physics_period": 0.05}, "physics_period = 0.05 s: should be at most 0.02 s, or robots"),
@@ -74,26 +65,13 @@ def test_what_cannot_be_is_refused_with_the_reason(fields: dict[str, Any], compl
 
 
 @pytest.mark.parametrize(
-    ("field", "count"), [("n_robots", 651), ("n_items", 651), ("n_obstacles", 113)]
+    ("field", "count"), [("n_robots", 651), ("n_items", 651), ("n_obstacles", 112)]
 )
 def test_as_many_as_it_says_fit_do_fit(field: str, count: int) -> None:
-    smallest = Scenario(n_robots=1, n_items=1)
-    if field == "n_obstacles":
-        # Obstacles take their room from the others.
-        count -= 1
+    smallest = Scenario(n_robots=1, n_items=1)  # which need the room of one obstacle
     Warehouse(smallest.replace(**{field: count})).reset(0)
     with pytest.raises(ScenarioError, match=field):
         smallest.replace(**{field: 652})
-
-
-@pytest.mark.parametrize(
-    ("duration", "control_period", "steps"),
-    [(500.0, 0.1, 5000), (0.7, 0.1, 7), (0.75, 0.1, 8), (1.0, 0.02, 50), (2.0, 0.3, 7)],
-)
-def test_an_episode_has_enough_steps_for_its_duration(
-    duration: float, control_period: float, steps: int
-) -> None:
-    assert Scenario(duration=duration, control_period=control_period).n_steps == steps
 
 
 def test_conditions_list_every_field_with_its_value_unit_and_source() -> None:
@@ -102,10 +80,8 @@ def test_conditions_list_every_field_with_its_value_unit_and_source() -> None:
         meaning = field.description or ""
         assert rows[name][2] == meaning
         # A length, a time and the like has its unit; the source comes last.
-        value = field.default
-        assert not isinstance(value, float) or "[" in meaning, name
-        origin = meaning.rsplit("; ", 1)[-1]
-        kind, _, sources = origin.partition(": ")
+        assert not isinstance(field.default, float) or "[" in meaning, name
+        kind, _, sources = meaning.rsplit("; ", 1)[-1].partition(": ")
         assert kind in ("source", "fitted", "chosen", "off"), name
         assert set(sources.split(", ")) <= (SOURCES.keys() if kind == "source" else {""}), name
     assert rows["n_robots"][1] == "7 (default 25)"
@@ -113,15 +89,15 @@ def test_conditions_list_every_field_with_its_value_unit_and_source() -> None:
     assert rows["n_items"][1] == "60"
 
 
-def test_presets() -> None:
-    paper = Scenario()
+def test_presets_and_that_an_episode_has_enough_steps_for_its_duration() -> None:
+    paper = Scenario.preset("paper")
+    assert paper == Scenario()
     assert (paper.warehouse_width, paper.warehouse_height, paper.storage_width) == (10.0, 10.0, 8.0)
     assert (paper.n_robots, paper.n_items, paper.duration) == (25, 60, 500.0)
     assert (paper.n_steps, paper.n_substeps) == (5000, 5)
-    assert set(SCENARIO_PRESETS) == {"paper", "paper_scalability", "dots", "realistic"}
-    assert Scenario.preset("paper") == Scenario()
     assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
     assert Scenario.preset("realistic").handling_steps == 10
-    assert Scenario.preset("dots") == Scenario(max_speed=1.0, max_acceleration=2.0)
+    for duration, period, steps in ((0.7, 0.1, 7), (0.75, 0.1, 8), (2.0, 0.3, 7)):
+        assert Scenario(duration=duration, control_period=period).n_steps == steps
     with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
         Scenario.preset("papr")

@@ -1,14 +1,19 @@
-"""The tables of docs/results.md: written from studies, none typed by hand."""
+"""The tables of docs/results.md and of the questions of the field: from studies, none by hand."""
 
 from __future__ import annotations
 
-import importlib
 import re
+import shutil
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from swarm_logistics_env import spi
+from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
@@ -16,105 +21,71 @@ ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"<!-- tables: (\w+) -->\n(.*?)\n<!-- end of tables -->", re.DOTALL)
+QUESTIONS = sorted((ROOT / "examples" / "questions").glob("*.toml"))
+ANSWERS = ROOT / "docs" / "research" / "questions_of_the_field.md"
+TEXT = ANSWERS.read_text(encoding="utf-8")
+EACH = pytest.mark.parametrize("question", QUESTIONS, ids=lambda file: file.stem)
 
 
 @pytest.fixture
-def tables(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The script `docs/play_tables.py`."""
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    return importlib.import_module("play_tables")
+def tables(script: Callable[[str], Any]) -> Any:
+    return script("play_tables")
 
 
 @pytest.fixture
-def small(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A page of markers, and studies of seconds instead of minutes."""
     page = tmp_path / "page.md"
-    page.write_text(
-        "Before.\n\n<!-- tables: paper -->\n<!-- end of tables -->\n\nBetween.\n\n"
-        "<!-- tables: clearing -->\n<!-- end of tables -->\n"
-        "<!-- tables: sentences -->\n<!-- end of tables -->\n"
-        "<!-- tables: ladder -->\n<!-- end of tables -->\n"
-        "<!-- tables: leans -->\n<!-- end of tables -->\n"
-        "<!-- tables: robust -->\n<!-- end of tables -->\n"
-        "<!-- tables: benchmark -->\n<!-- end of tables -->\n"
-        "<!-- tables: policies -->\nold\n<!-- end of tables -->\nAfter.\n"
-    )
-    short: dict[str, Any] = {"seeds": 2, "first_seed": 3, "scenario": {"duration": 40.0}}
+    names = "paper", "clearing", "sentences", "ladder", "leans", "robust", "benchmark", "policies"
+    blocks = (f"<!-- tables: {name} -->\nold\n<!-- end of tables -->\n" for name in names)
+    page.write_text("Before.\n\n" + "Between.\n".join(blocks) + "After.\n")
+    paper: dict[str, Any] = {"name": "paper", "reference": "paper"}
+    widths = {"name": "delivery_width", "values": [2.0, 1.5], "title": "Held out: narrow"}
+    rest = {**paper, "sizes": [{"values": [5, 10]}], "parameters": [widths]}
+    fault = {"faults": [{"modes": ["FM4"], "robots": [1, 2]}]}
+    sizes: dict[str, Any] = {"sizes": [{"values": [5, 25]}]}
+    policies = ["swarm-dt", "homing", "ppo-delivery"]
+    slow = {"policy": "swarm-dt", "title": "slow", "scenario": {"handling_time": 1.0}}
+    few = {"n_items": 6, "duration": 100.0}
+    ladder: dict[str, Any] = {"policies": policies[:2], "scenario": few}
+    ladder["ablations"] = [{"policy": "swarm-dt", "title": "fast"}, slow]
+    asked: dict[str, list[dict[str, Any]]] = {
+        "paper": [rest, {**paper, **fault}, {**paper, "faults": [{"modes": ["FM3_send"]}]}, rest],
+        "policy": [{"policies": policies, **sizes, **fault}, {"seeds": 3, **fault}],
+        "ladder": [{"task": "clearing", **ladder}, ladder, ladder],
+        "benchmark": [{"policies": ["homing"], "parameters": [widths]}],
+    }
 
-    def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
-        paper: dict[str, Any] = {**short, "name": "paper", "reference": "paper"}
-        widths = {"name": "delivery_width", "values": [2.0, 1.5]}
-        rest: dict[str, Any] = {"sizes": [{"values": [5, 10]}], "parameters": [widths]}
-        faults = [{"modes": ["FM4"], "robots": [1, 2]}]
-        parts: tuple[dict[str, Any], ...]
-        parts = rest, {"faults": faults}, {"faults": [{"modes": ["FM3_send"]}]}, rest
-        return tuple(Study(out=out / f"{i}", **fields, **paper) for i, fields in enumerate(parts))
+    def studies(name: str, out: Path) -> list[Study]:
+        short: dict[str, Any] = {"seeds": 2, "first_seed": 3, "scenario": {"duration": 40.0}}
+        each = enumerate(asked[name])
+        return [Study(out=out / f"{name}{i}", **{**short, **fields}) for i, fields in each]
 
-    def clearing_study(out: Path) -> Study:
-        return Study(
-            out=out / "clearing",
-            task="clearing",
-            policies=["homing", "ppo-delivery"],
-            seeds=2,
-            scenario={"n_items": 4, "duration": 200.0},
-            sizes=[{"values": [10, 25]}],
-        )
-
-    def policy_studies(out: Path) -> tuple[Study, ...]:
-        small: dict[str, Any] = {**short, "faults": [{"modes": ["FM4"], "robots": [2]}]}
-        policies = ["swarm-dt", "homing", "ppo-delivery"]
-        return (
-            Study(out=out / "of policies", policies=policies, sizes=[{"values": [5, 25]}], **small),
-            Study(out=out / "robust", policies=policies[:1], **{**small, "seeds": 3}),
-        )
-
-    def ladder_studies(out: Path) -> tuple[Study, ...]:
-        slow = [{"policy": "swarm-dt", "title": "slow", "scenario": {"handling_time": 1.0}}]
-        fields: dict[str, Any] = {
-            "policies": ["swarm-dt", "homing"],
-            "ablations": [{"policy": "swarm-dt", "title": "fast"}, *slow],
-            "seeds": 2,
-            "scenario": {"n_items": 6, "duration": 100.0},
-        }
-        tasks = "clearing", "warehouse", "warehouse"
-        return tuple(Study(out=out / f"l{i}", task=task, **fields) for i, task in enumerate(tasks))
-
-    def benchmark_studies(out: Path) -> tuple[Study, ...]:
-        widths = {"name": "delivery_width", "values": [2.0, 1.0], "title": "Held out: narrow"}
-        fields: dict[str, Any] = {**short, "parameters": [widths]}
-        return (Study(out=out / "benchmark", policies=["homing"], **fields),)
-
-    monkeypatch.setattr(tables.front_page, "main", lambda: None)
-    for name, value in {
-        "PAGE": page,
-        "record_scores": lambda out: None,
-        "OUT": tmp_path / "out",
-        "BENCHMARK": tmp_path / "benchmark.json",
-        "PROCESSES": 1,
-        "paper_studies": paper_studies,
-        "policy_studies": policy_studies,
-        "clearing_study": clearing_study,
-        "ladder_studies": ladder_studies,
-        "benchmark_studies": benchmark_studies,
-        "ENTRIES": tmp_path / "entries.json",
-        "MEDIA": tmp_path,
-    }.items():
+    for name in asked:
+        monkeypatch.setattr(tables, f"{name}_studies", lambda out, *_, n=name: studies(n, out))
+    cleared: Any = partial(Study, task="clearing", policies=policies[1:], seeds=2, **sizes)
+    monkeypatch.setattr(tables, "clearing_study", lambda out: cleared(out=out / "c", scenario=few))
+    for name in ("OUT", "BENCHMARK", "ENTRIES"):
+        monkeypatch.setattr(tables, name, tmp_path / name)
+    for name, value in {"PAGE": page, "MEDIA": tmp_path, "PROCESSES": 1}.items():
         monkeypatch.setattr(tables, name, value)
+    monkeypatch.setattr(tables, "record_scores", lambda out: None)
+    monkeypatch.setattr(tables.front_page, "main", lambda: None)
     return page
 
 
 def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
-    tables: Any, small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tables: Any, page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tables.main()
-    first = small.read_text()
+    first = page.read_text()
     assert first.startswith("Before.\n\n<!-- tables: paper -->\n\nOf ")
     assert first.endswith("\n\n<!-- end of tables -->\nAfter.\n")
-    assert "Between." in first
+    assert first.count("Between.\n") == 7
     assert "\nold\n" not in first
-    small.write_text(first.replace("N = 5", "N = 6"))
-    played = []
-    run = Study.run
+    assert {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")} == {"S", "FT", "A"}
+    page.write_text(first.replace("N = 5", "N = 6"))
+    played, run = [], Study.run
 
     def watched(self: Study, *args: Any, **fields: Any) -> Any:
         tally = run(self, *args, **fields)
@@ -123,39 +94,88 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
 
     monkeypatch.setattr(Study, "run", watched)
     tables.main()
-    assert small.read_text() == first
-    drawn = {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")}
-    assert drawn == {"S", "FT", "A"}
+    assert page.read_text() == first
     assert played == [0] * 11
     # Nor does what is played anew change a digit.
     monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
     tables.main()
-    assert small.read_text() == first
+    assert page.read_text() == first
     assert sum(played) > 20
 
 
-def test_its_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> None:
+def test_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> None:
     out = Path("a")
-    first = tables.FIRST_SEED
-    paper = tables.paper_studies(out, first)
-    studies = (*paper, *tables.policy_studies(out), tables.clearing_study(out))
-    studies = (*studies, *tables.ladder_studies(out))
-    for study in studies:
+    studies = [
+        *tables.paper_studies(out, tables.FIRST_SEED), *tables.policy_studies(out),
+        tables.clearing_study(out), *tables.ladder_studies(out),
+    ]  # fmt: skip
+    for study in (*studies, *map(Study.from_file, QUESTIONS)):
         seeds = study.plan().seeds
         assert min(seeds) >= 20_000
         assert max(seeds) < FIRST_OF_TRAININGS
-    counts = [20, 100, 100, 20, 20, 6, 20, 30, 30, 10, 34]
-    assert [len(one.plan().seeds) for one in studies] == counts
+        assert len(seeds) >= 6
+        assert study.plan().cases
 
 
 @pytest.mark.parametrize("page", [PAGE, README], ids=["results.md", "README.md"])
 def test_no_table_is_typed_by_hand(page: str) -> None:
-    named = [name for name, _ in BLOCK.findall(PAGE)]
-    assert named == [
-        "clearing", "paper", "sentences", "ladder", "leans", "policies", "robust", "benchmark",
-        "costs",
-    ]  # fmt: skip
     rest = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
-    # `test_readme` plays what this one says.
+    # `test_docs` plays what this one says.
     rest = re.sub(r"^\| items in 200 s.*?\n\n", "", rest, flags=re.DOTALL | re.MULTILINE)
     assert not [line for line in rest.splitlines() if line.startswith("|")]
+
+
+def test_every_question_has_its_command_and_figure_and_its_intervals_stand_in_a_table(
+    script: Callable[[str], Any],
+) -> None:
+    assert sorted(script("play_questions").QUESTIONS) == [file.stem for file in QUESTIONS]
+    for file in QUESTIONS:
+        assert f"`python docs/play_questions.py {file.stem}`" in TEXT
+        assert f"](../media/{file.stem}.svg)" in TEXT
+    values = re.findall(r"-?[\d.]*\d \[[^]]+\]", " ".join(BLOCK.sub("", TEXT).split()))
+    assert len(values) > 30
+    assert [value for value in values if f"| {value} " not in TEXT] == []
+
+
+def test_jackknife_of_a_mean_is_its_t_interval(script: Callable[[str], Any]) -> None:
+    sample = np.array([3.0, 5.0, 4.0, 9.0])
+    jackknife = script("question_tables").jackknife_interval
+    found = jackknife(4, lambda seeds: float(sample[seeds].mean()))
+    assert found == pytest.approx(spi.mean_interval(sample))
+
+
+@EACH
+def test_page_quotes_what_was_played(
+    question: Path, tables: Any, script: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same questions over two seeds of a short run, of policies that soon deliver."""
+    pytest.importorskip("matplotlib", reason="needs the extra study")
+    asked, name = Study.from_file(question).specification, question.stem
+    late = any(onset for part in asked.faults for onset in part.onsets)
+    varied = ("sizes", "faults", "parameters")
+    fields = {part: [one.model_dump() for one in getattr(asked, part)] for part in varied}
+    # One mode each; where there is FM4, it is the one that a page may draw.
+    for one in fields["faults"]:
+        one["modes"] = ["FM4"] if "FM4" in one["modes"] else one["modes"][:1]
+    study = Study(
+        out=tmp_path / name,
+        policies=["homing"] if late else ["homing", "central"],
+        seeds=2,
+        scenario={**asked.scenario.model_dump(), "duration": 210.0 if late else 40.0},
+        indicators=asked.indicators,
+        **fields,
+    )
+    for folder in ("media", ANSWERS.parent.name):
+        (tmp_path / folder).mkdir()
+    page = Path(shutil.copy(ANSWERS, tmp_path / ANSWERS.parent.name))
+    questions = script("play_questions")
+    monkeypatch.setattr(questions, "DOCS", tmp_path)
+    monkeypatch.setattr(questions, "study", lambda *_, **__: study)
+    monkeypatch.setattr(tables, "PROCESSES", 1)
+    questions.main([name])
+    text, found = page.read_text(encoding="utf-8"), study.findings()
+    for test in found.verdicts:
+        assert section.ratio(test) in text, test.compared.label
+    for cell in found.cells:
+        assert cell.arm.setting.kind != "size" or section.mean_p(cell) in text
+    assert "<svg" in (tmp_path / "media" / f"{name}.svg").read_text(encoding="utf-8")

@@ -1,1 +1,1 @@
-"""Checks of the promises in docs/promises.md: golden trajectories, invariants, mutants."""
+"""Checks of the promises in tests/README.md: golden trajectories, invariants, mutants."""

@@ -238,16 +238,16 @@ class ParameterChange(Wrapper):
     def begun(self, seed: int) -> None:
         """Store this episode's value and time."""
         self.value, self.time = self._drawn(seed)
-        present = getattr(self.warehouse.scenario, self.name)
-        if self.time is None:
-            self.value = present
-        self._is_due = self.value != present
+        self._is_due = self.time is not None
+        if not self._is_due:
+            self.value = getattr(self.warehouse.scenario, self.name)
 
     def before_step(self, commands: ArrayLike) -> ArrayLike:
         """Make the change if it is due."""
         if self._is_due and self.warehouse.state.time >= (self.time or 0.0) - GRACE:
-            self.warehouse.change(**{self.name: self.value})
             self._is_due = False
+            if self.value != getattr(self.warehouse.scenario, self.name):
+                self.warehouse.change(**{self.name: self.value})
         return commands
 
     def _drawn(self, seed: int) -> tuple[Any, float | None]:

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.cli import app
 from swarm_logistics_env.cli.judging import RECORDED
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import PRESETS
+from tests.cli.conftest import Command
 
 LAB = """robots;fault;faulty;boxes
 8;;;12.5
@@ -26,28 +26,17 @@ import numpy as np
 
 class Mine:
     def reset(self, n_robots, seed): ...
-
-    def act(self, observations):
-        return np.zeros((len(observations), 4))
-
+    def act(self, observations): return np.zeros((len(observations), 4))
 class Failing(Mine):
-    def act(self, observations):
-        raise RuntimeError("no more")
-
+    def act(self, observations): raise RuntimeError("no more")
 class Short(Mine):
-    def act(self, observations):
-        return np.zeros((len(observations), 3))
-
-class NoAct:
-    def reset(self, n_robots, seed): ...
+    def act(self, observations): return np.zeros((len(observations), 3))
 """
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, with trials and a policy; a policy is judged in a small warehouse."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
+@pytest.fixture(autouse=True)
+def material(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trials and a policy in the current folder; a policy is judged in a small warehouse."""
     Path("lab.csv").write_text(LAB)
     Path("judged_policy.py").write_text(OWN)
     size = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0}
@@ -57,101 +46,70 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         faults=[{"modes": ["FM4"], "robots": [1]}],
         parameters=[],
     )
+    held_out = {"title": "Held out: x", "modes": ["FM1+FM4"], "robots": [1]}
     monkeypatch.setitem(PRESETS, "scorecard", small)
-    return tmp_path
+    monkeypatch.setitem(PRESETS, "benchmark", small.replace(seeds=3, faults=[held_out], sizes=[]))
 
 
-def names(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()} - {"__pycache__"}
+TRIALS = "judge lab.csv --column performance=boxes"
 
 
-TRIALS = ["judge", "lab.csv", "--column", "performance=boxes"]
-
-
-def test_trials_are_judged_and_what_is_written_is_told(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None:
     Path("setup.toml").write_text('arena = "4 m x 4 m"\nrobots = 8\n')
-    stated = ["--setup", "setup.toml", "--setup", "floor=tiles", "--full"]
-    assert app.run([*TRIALS, *stated]) == 0
-    printed = capsys.readouterr().out
+    printed = command(f"{TRIALS} --setup setup.toml --setup floor=tiles --full")
     assert printed.startswith("6 runs in lab.csv\n")
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
+    assert "No FT: it needs trials without the robots, fault = removed" in printed
+    assert "For a paper: lab: P at N = 8, no fault: 12.3 [" in printed
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
     assert f"Figure: {out / 'figures' / 'answer.svg'}\nTables: {out / 'tables.tex'}\n" in printed
-    assert "For a paper: lab: P at N = 8, no fault: 12.3 [" in printed
-    for name in ("report.html", "report.md", "claims.csv", "figures/answer.svg"):
+    for name in ("report.html", "claims.csv", "figures/answer.svg"):
         assert (out / name).is_file()
     report = (out / "report.md").read_text()
     assert "| arena | 4 m x 4 m |\n| robots | 8 |\n| floor | tiles |" in report
-    tables = (out / "tables.tex").read_text()
-    assert r"{wheel, m = 1} & {10.6 [8.4, 12.8]} & {[6.2, 14.9]} & {-0.013 [" in tables
-    assert tables.count(r"\begin{table}") == tables.count(r"\end{table}") > 1
-    assert "95 \\%" in tables
-    assert "_" not in tables.replace("\\_", "")
     # The same trials again are another study beside it.
-    assert app.run(TRIALS) == 0
+    assert "so this one goes into results/judged/lab-2" in command(TRIALS)
     assert Path("results", "judged", "lab-2", "report.md").is_file()
-    assert app.run([*TRIALS, "--out", str(out)]) == 2
-    assert "holds a study already" in capsys.readouterr().err
-
-
-def test_a_small_performance_is_not_rounded_away(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    Path("rates.csv").write_text("N;P\n4;0.0123\n4;0.0131\n4;0.011\n8;0.02\n8;0.021\n8;0.019\n")
-    assert app.run(["judge", "rates.csv", "--full"]) == 0
-    assert "| N = 4 | 0.0121 [0.0095, 0.0148] | [" in capsys.readouterr().out
+    assert "holds a study already" in command(f"{TRIALS} --out {out}", code=2)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("words", "said"),
     [
-        (["lab.csv", "--colum", "a=b"], "No such option: --colum"),
-        (["lab.csv", "--column", "performance"], "--column performance: should be NAME=VALUE"),
-        (["lab.csv", "--column", "performance=boxe"], "'boxe': did you mean 'boxes'?"),
-        (["lab.csv"], "has no column 'performance'"),
-        (["lab.cvs"], "cannot read lab.cvs"),
-        (["lab.csv", "--setup", "nowhere.toml"], "--setup nowhere.toml: should be NAME=VALUE, or"),
-        (["lab.csv", "--seeds", "5"], "--seeds is not for a file of trials, and 'lab.csv' is one"),
-        (["nowhere_at_all:Mine"], "No module named 'nowhere_at_all': should lie in this folder"),
-        (["judged_policy:NoAct"], "is no policy: it should have the methods reset and act"),
-        (["model.zip"], "executes the code"),
-        (["homing", "--column", "N=robots"], "--column is not for a policy, and 'homing' is one"),
-        (["homing", "--seeds", "2"], "--seeds"),
+        ("lab.csv --column performance", "--column performance: should be NAME=VALUE"),
+        ("lab.csv --column performance=boxe", "'boxe': did you mean 'boxes'?"),
+        ("lab.csv", "has no column 'performance'"),
+        ("lab.csv --setup nowhere.toml", "--setup nowhere.toml: should be NAME=VALUE, or"),
+        ("lab.csv --seeds 5", "--seeds is not for a file of trials, and 'lab.csv' is one"),
+        ("model.zip", "executes the code"),
+        ("homing --column N=robots", "--column is not for a policy, and 'homing' is one"),
+        ("homing --seeds 2", "--seeds"),
+        ("homing --benchmark --seeds 5", "same conditions for everybody"),
     ],
 )
 def test_what_cannot_be_judged_ends_in_one_sentence_before_anything_is_written(
-    folder: Path, arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+    words: str, said: str, folder: Path, command: Command
 ) -> None:
-    before = names(folder)
-    assert app.run(["judge", *arguments]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert len(said.splitlines()) == 1
-    assert names(folder) == before
+    assert said in command(f"judge {words}", code=2)
+    assert {path.name for path in folder.iterdir()} <= {
+        "lab.csv",
+        "judged_policy.py",
+        "__pycache__",
+    }
 
 
-def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = ["judge", "homing", "--processes", "1", "--seeds", "5"]
-    assert app.run([*command, "--minutes", "0"]) == 0
-    printed = capsys.readouterr().out
-    again = "swarm-logistics judge homing --processes 1 --seeds 5 --minutes 0"
-    assert f"Stopped after 0 min; the same command goes on: {again}\n" in printed
+def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Command) -> None:
+    words = "judge homing --processes 1 --seeds 5"
+    printed = command(f"{words} --minutes 0")
+    again = f"the same command goes on: swarm-logistics {words} --minutes 0\n"
+    assert f"Stopped after 0 min; {again}" in printed
     assert "1 runs played" in printed.splitlines()[-1]
-    assert app.run(command) == 0
-    printed = capsys.readouterr().out
-    out = Path("results", "judged", "homing")
-    study = Study.stored(out)
+    printed = command(words)
+    study = Study.stored("results/judged/homing")
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
-    assert f"P, items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
-    assert f"Figure: {out / 'figures' / 'answer.svg'}" in printed
     assert f"For a paper: homing: P, items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
-    assert "P of the shipped policies here: " in printed
     shipped = printed.split("P of the shipped policies here: ")[1].splitlines()[0]
     assert " homing " not in shipped  # not ranked by itself
     others = set(json.loads(RECORDED.read_text())["policies"]) - {"homing"}
@@ -162,99 +120,53 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(
     assert "1 were kept" in last
 
 
-def test_a_policy_is_played_until_it_is_clear(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    given = ["judge", "judged_policy:Mine", "--processes", "1", "--seeds", "30", "--out"]
-    assert app.run([*given, "clear"]) == 0
-    printed = capsys.readouterr().out
+def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
+    words = "judge judged_policy:Mine --processes 1 --seeds 30 --out"
+    printed = command(f"{words} clear")
     assert Study.stored("clear").specification.until_clear
     # Nobody delivers: there is no ratio, and every question stops at the first look.
     told = "no fault: 0 (at most 0.15, as none of 20 runs delivered anything)."
     assert told in " ".join(printed.split())
     assert "undefined: it delivers nothing" in printed
     assert "80 runs played" in printed.splitlines()[-1]
-    assert app.run([*given, "all", "--all-seeds"]) == 0
-    assert not Study.stored("all").specification.until_clear
-    assert "120 runs played" in capsys.readouterr().out.splitlines()[-1]
+    assert "120 runs played" in command(f"{words} all --all-seeds").splitlines()[-1]
 
 
-def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    given = ["judge", "judged_policy:Failing", "--processes", "1", "--seeds", "3"]
-    assert app.run([*given, "--out", "card"]) == 1
-    printed = capsys.readouterr().out
+def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command: Command) -> None:
+    words = "--processes 1 --seeds 3 --out card"
+    printed = command(f"judge judged_policy:Failing {words}", code=1)
     assert "P: no run has succeeded." in printed
     assert "12 failed, the first with RuntimeError: no more" in printed.splitlines()[-1]
     assert "3 of 3 runs failed" in Path("card", "report.md").read_text()
-
-
-def test_commands_of_a_wrong_shape_are_refused_before_anything_is_kept(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    given = ["judge", "judged_policy:Short", "--processes", "1", "--out", "card"]
-    assert app.run(given) == 2
-    assert "commands of shape (4, 3): should be (4, 4)" in capsys.readouterr().err
-    assert not Path("card").exists()
+    assert "failed" in command("judge judged_policy:Failing --benchmark --processes 1", code=1)
+    said = command("judge judged_policy:Short --processes 1 --out short", code=2)
+    assert "commands of shape (4, 3): should be (4, 4)" in said
+    assert not Path("short").exists()
 
 
 def test_recorded_p_is_that_of_the_shipped_policies() -> None:
     recorded = json.loads(RECORDED.read_text(encoding="utf-8"))
-    assert set(recorded["policies"]) <= {name for name in policies.NAMES if "central" not in name}
-    plan = Study.preset("scorecard", seeds=60).plan()
-    assert recorded["seeds"][0] == plan.seeds[0]
-    for name in {"swarm-dt", "homing"} & set(recorded["policies"]):
+    first = recorded["seeds"][0]
+    assert first == Study.preset("scorecard", seeds=60).plan().seeds[0]
+    for name in ("swarm-dt", "homing"):
         # If this fails, run `make tables`.
-        first = run_episode(Scenario(restock=True), policies.load(name), seed=plan.seeds[0])
-        assert recorded["policies"][name]["p"][0] == first.delivered
+        episode = run_episode(Scenario(restock=True), policies.load(name), seed=first)
+        assert recorded["policies"][name]["p"][0] == episode.delivered
 
 
-def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert app.run(["judge", "homing", "--clearing", "--seeds", "3", "--processes", "1"]) == 0
-    told = capsys.readouterr().out
-    assert " s, all items after " not in told
-    assert ", all items after " in told
-    assert "†" not in told
-    report = (folder / "results" / "judged" / "homing-clearing" / "report.md").read_text()
+def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(command: Command) -> None:
+    assert ", all items after " in command("judge homing --clearing --seeds 3 --processes 1")
+    report = Path("results/judged/homing-clearing/report.md").read_text()
     assert "Time until all items are delivered" in report
     assert "items delivered per minute" in report
-    assert app.run(["judge", "lab.csv", "--clearing"]) == 2
 
 
-def test_trials_without_removed_robots_and_a_second_judgement_are_named(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert app.run(["judge", "lab.csv", "--column", "performance=boxes"]) == 0
-    assert "No FT: it needs trials without the robots, fault = removed" in capsys.readouterr().out
-    assert app.run(["judge", "lab.csv", "--column", "performance=boxes"]) == 0
-    assert "earlier judgement, so this one goes into results/judged/lab-2" in (
-        capsys.readouterr().out
-    )
-
-
-def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    fields = {"seeds": 3, "faults": [{"title": "Held out: x", "modes": ["FM1+FM4"], "robots": [1]}]}
-    small = PRESETS["scorecard"].replace(**fields, sizes=[], parameters=[])
-    monkeypatch.setitem(PRESETS, "benchmark", small)
-    command = ["judge", "homing", "--benchmark", "--processes", "1"]
-    assert app.run(command) == 0
-    told = capsys.readouterr().out
+def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(command: Command) -> None:
+    told = command("judge homing --benchmark --processes 1")
     assert "Worst cell: Held out: x, FM1+FM4, m = 1" in told
     assert "entries by score" in told
-    assert (folder / "results" / "benchmark" / "homing" / "report.html").exists()
-    assert app.run(command) == 0
-    again = capsys.readouterr().out
+    assert Path("results/benchmark/homing/report.html").exists()
+    again = command("judge homing --benchmark --processes 1")
     assert "0 runs played" in again
-    assert (
-        again.split("Report:")[0].split("entries")[1]
-        == told.split("Report:")[0].split("entries")[1]
-    )
-    assert app.run([*command, "--seeds", "5"]) == 2
-    assert "same conditions for everybody" in capsys.readouterr().err
-    assert app.run(["judge", "judged_policy.py:Failing", "--benchmark", "--processes", "1"]) == 1
-    assert "failed" in capsys.readouterr().out
+    first, second = (text.split("entries")[1].split("Report:")[0] for text in (told, again))
+    assert first == second

@@ -3,48 +3,24 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 
-from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.wrappers import (
-    FaultInjection,
-    FixedAgents,
-    IndicatorReward,
-    ParameterChange,
-    RunningMeans,
-    SwarmSize,
-)
+from swarm_logistics_env.wrappers import FaultInjection, IndicatorReward, RunningMeans, SwarmSize
+from tests.wrappers.conftest import small
 
 
-def small() -> SwarmLogisticsEnv:
-    return SwarmLogisticsEnv(n_robots=4, n_items=8, duration=1.0)
+def judged() -> Any:
+    env = SwarmSize(small(duration=1.0), [6, 8], leave=[(1, 0.3)])
+    env = FaultInjection(env, "FM4", 2, onset=0.5, duration=0.2)
+    return IndicatorReward(env, {"FT": 1.0, "S": 1.0}, references=RunningMeans())
 
 
-def judged(env: Any) -> IndicatorReward:
-    weights = {"R": 1.0, "FT": 1.0, "S": 1.0, "A": 1.0, "P": 0.1}
-    return IndicatorReward(env, weights, references=RunningMeans())
-
-
-ENVIRONMENTS: dict[str, Callable[[], Any]] = {
-    "plain": small,
-    "faults later": lambda: FaultInjection(small(), "FM4", 2, onset=0.5, duration=0.2),
-    "changes": lambda: ParameterChange(small(), "max_speed", [1.0, 2.0], at=0.5),
-    "rewards": lambda: judged(FaultInjection(SwarmSize(small(), [4, 6]), "FM1")),
-    "fixed": lambda: FixedAgents(judged(SwarmSize(small(), [4, 6], leave=[(1, 0.3)]))),
-}
-
-
-@pytest.mark.parametrize("make", ENVIRONMENTS.values(), ids=ENVIRONMENTS)
-def test_they_are_numbers_with_the_same_keys_at_every_step_and_share_nothing(
-    make: Callable[[], Any],
-) -> None:
-    env, other = make(), make()
+def test_they_are_numbers_with_the_same_keys_at_every_step_and_share_nothing() -> None:
+    env, other = judged(), judged()
     keys = list(next(iter(env.reset(seed=0)[1].values())))
-    assert {"failed", "delivered"} <= set(keys)
+    assert {"failed", "delivered", "FT"} <= set(keys)
     for seed in range(4):
         (observations, infos), (_, others) = env.reset(seed=seed), other.reset(seed=seed)
         while True:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pettingzoo
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from numpy.typing import NDArray
-from pettingzoo import AECEnv, ParallelEnv
 
 from swarm_logistics_env import Fault, Scenario, swarm_logistics_v0
+from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import (
-    ArgumentError,
-    CommandError,
-    ScenarioError,
-    SetupError,
-)
+from swarm_logistics_env.environment.requests import gathered
+from swarm_logistics_env.environment.spaces import agent_names
+from swarm_logistics_env.errors import ArgumentError, CommandError, ScenarioError, SetupError
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
 from swarm_logistics_env.wrappers import FaultInjection
 from tests.wrappers.conftest import eastward
@@ -37,20 +35,26 @@ def east(env: SwarmLogisticsEnv) -> dict[str, NDArray[np.float64]]:
     return {agent: commands[int(agent[6:])] for agent in env.agents}
 
 
-def test_the_three_constructors_give_what_their_names_say() -> None:
-    assert isinstance(swarm_logistics_v0.parallel_env(n_robots=2), ParallelEnv)
-    for make in (swarm_logistics_v0.env, swarm_logistics_v0.raw_env):
-        aec = make(n_robots=2)
-        assert isinstance(aec, AECEnv)
-        aec.reset(seed=0)
-        assert aec.agents == ["robot_0", "robot_1"]
+@pytest.mark.parametrize("make", [swarm_logistics_v0.env, swarm_logistics_v0.raw_env])
+def test_the_constructors_of_the_sequential_form_make_it(make: Any) -> None:
+    aec = make(n_robots=2)
+    aec.reset(seed=0)
+    assert aec.agents == ["robot_0", "robot_1"]
+
+
+@pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="PettingZoo has no registry yet")
+def test_pettingzoo_makes_both_forms_by_name() -> None:
+    parallel = pettingzoo.make("parallel", "swarm_logistics_v0", n_robots=3, max_cycles=7)
+    assert isinstance(parallel, SwarmLogisticsEnv)
+    assert parallel.max_cycles == 7
+    assert pettingzoo.make("aec", "swarm_logistics_v0", n_robots=3).max_num_agents == 3
 
 
 def test_actions_may_be_given_in_any_order_and_beyond_their_bounds() -> None:
     first, second = parallel_env(n_robots=2), parallel_env(n_robots=2)
     for env in (first, second):
         env.reset(seed=1)
-    far = {"robot_1": np.array([0.1, 0.2, 0.3, 0.4]), "robot_0": np.array([7.0, 0.0, -3.0, 9.0])}
+    far: Any = {"robot_1": np.array([0.1, 0.2, 0.3, 0.4]), "robot_0": [7.0, 0.0, -3.0, 9.0]}
     cut = {"robot_0": np.array([1.0, 0.0, -1.0, 1.0]), "robot_1": far["robot_1"]}
     assert data_equivalence(first.step(far), second.step(cut))
 
@@ -58,13 +62,8 @@ def test_actions_may_be_given_in_any_order_and_beyond_their_bounds() -> None:
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        ({"robot_1": None}, "no command for 'robot_1': should be one for every agent"),
-        ({"robot_7": np.zeros(4)}, "'robot_7', who is not there: should be among 2 possible"),
         ({"robot_0": np.zeros(3)}, r"command of 'robot_0' of shape \(3,\): should be \(4,\)"),
-        ({"robot_0": 1.0}, r"of shape \(\): should be \(4,\)"),
         ({"robot_0": ["a"] * 4}, "commands should be numbers"),
-        ({"robot_0": np.zeros(4, complex)}, "should be numbers"),
-        ({"robot_0": [[1.0, 2.0], [3.0]]}, r"\(type list\) cannot be read: should be numbers"),
         ({"robot_1": [0, np.nan, 0, 0]}, r"\[1, 1\] = nan: should be finite"),
     ],
 )
@@ -74,14 +73,60 @@ def test_wrong_commands_are_refused_and_nothing_has_happened(
     env, undisturbed = parallel_env(n_robots=2), parallel_env(n_robots=2)
     env.reset(seed=0)
     undisturbed.reset(seed=0)
-    actions: dict[str, Any] = {**still(env), **change}
-    wrong = {agent: command for agent, command in actions.items() if command is not None}
     with pytest.raises(CommandError, match=complaint):
-        env.step(wrong)
-    with pytest.raises(CommandError, match=r"actions of type .*: should be a dict"):
-        env.step(list(actions.values()))  # type: ignore[arg-type]
+        env.step({**still(env), **change})
+    with pytest.raises(CommandError, match="actions of type list: should be a dict"):
+        env.step([np.zeros(4)])  # type: ignore[arg-type]
     assert env.agents == ["robot_0", "robot_1"]
     assert data_equivalence(env.step(still(env)), undisturbed.step(still(undisturbed)))
+
+
+class OnGPU:
+    """What a tensor on another device does when NumPy asks for it."""
+
+    dtype, device, requires_grad, shape = "torch.float32", "cuda:0", False, (4,)
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("can't convert cuda:0 device type tensor to numpy.")
+
+
+def tensor(dtype: str = "float32", **arguments: Any) -> Any:
+    torch = pytest.importorskip("torch")
+    return torch.zeros(4, dtype=getattr(torch, dtype), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind"),
+    [
+        (lambda: tensor("bfloat16"), "type Tensor, dtype torch.bfloat16, device cpu"),
+        (lambda: tensor(requires_grad=True), "type Tensor, .*, device cpu, requires_grad True"),
+        (OnGPU, "type OnGPU, dtype torch.float32, device cuda:0"),
+    ],
+)
+def test_what_cannot_be_read_is_refused(make: Callable[[], Any], kind: str) -> None:
+    env, central = parallel_env(n_robots=2), CentralEnv(n_robots=1)
+    env.reset(seed=0)
+    central.reset(seed=0)
+    actions: dict[str, Any] = {"robot_0": np.zeros(4), "robot_1": make()}
+    with pytest.raises(CommandError, match=rf"command of 'robot_1' \({kind}.*\) cannot be read"):
+        list(map(env.step, [actions] * 3))
+    with pytest.raises(CommandError, match="cannot be read"):
+        list(env.step(actions) for _ in range(3))  # noqa: C400  # no loop swallows it
+    with pytest.raises(CommandError, match=rf"commands \({kind}.*\) cannot be read"):
+        env.step_arrays(make())
+    with pytest.raises(CommandError, match=rf"action \({kind}.*\) cannot be read"):
+        central.step(make())
+    assert env.warehouse.state.step == 0
+
+
+def test_a_name_among_many_is_told() -> None:
+    names = agent_names(range(100_000))
+    actions = dict.fromkeys(names, np.zeros(4))
+    with pytest.raises(CommandError, match=r"a command for 'robot_x', .* 100000 possible agents"):
+        gathered({**actions, "robot_x": np.zeros(4)}, names, names, (4,))
+    del actions["robot_99999"]
+    with pytest.raises(CommandError, match="no command for 'robot_99999'"):
+        gathered(actions, names, names, (4,))
 
 
 @pytest.mark.parametrize(
@@ -90,13 +135,12 @@ def test_wrong_commands_are_refused_and_nothing_has_happened(
         ({"n_robot": 3}, ScenarioError, "did you mean 'n_robots'"),
         ({"render_mode": "hologram"}, SetupError, "render_mode = 'hologram': should be"),
         ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
-        ({"reward": {}}, ScenarioError, "unexpected .* argument 'reward'; did you mean 'rewards'"),
-        ({"num_agents": 3}, TypeError, "keyword argument 'num_agents'; did you mean 'n_robots'"),
-        ({"frameskip": 4}, ArgumentError, "got an unexpected keyword argument 'frameskip'"),
+        ({"num_agents": 3}, ArgumentError, "'num_agents'; did you mean 'n_robots'"),
         ({"max_robots": 24}, SetupError, "max_robots = 24: should be .* of at least 25"),
-        ({"max_robots": 9000}, ScenarioError, "n_robots = 9000 of radius .* do not fit"),
         ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be a whole number"),
         ({"rewards": ["delivery"]}, SetupError, r"rewards = \[.*\]: should be None or a dict"),
+        ({"rewards": {"delivry": 1.0}}, SetupError, "'delivry'; did you mean 'delivery'"),
+        ({"rewards": {"delivery": np.nan}}, SetupError, r"rewards\['delivery'\] = nan"),
     ],
 )
 def test_wrong_arguments_are_refused(
@@ -106,57 +150,34 @@ def test_wrong_arguments_are_refused(
         parallel_env(**arguments)
 
 
-def episode_digest(env: SwarmLogisticsEnv, seed: int | None) -> str:
-    digest = hashlib.sha256(env.reset_arrays(seed).tobytes())
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        digest.update(env.step_arrays(rng.uniform(-1, 1, (3, 4)))[0].tobytes())
-    return digest.hexdigest()
-
-
 def test_episodes_follow_from_the_last_seed_that_was_given_and_differ() -> None:
+    def bits(env: SwarmLogisticsEnv, seed: int | None) -> bytes:
+        return env.reset_arrays(seed).tobytes() + env.step_arrays(np.ones((3, 4)))[0].tobytes()
+
     env, other, unseeded = (parallel_env(n_robots=3) for _ in range(3))
-    digests = [episode_digest(env, seed) for seed in (0, None, None)]
-    assert [episode_digest(other, seed) for seed in (0, None, None)] == digests
-    assert episode_digest(env, 0) == digests[0]
-    digests += [episode_digest(unseeded, None) for _ in range(2)]
-    digests += [episode_digest(parallel_env(n_robots=3), None)]
-    assert len(set(digests)) == 6
-
-
-def test_options_change_one_episode() -> None:
-    env = parallel_env(n_robots=2, max_robots=5, faults=(Fault("FM1", 1),))
-    options = {"scenario": {"n_robots": 4}, "faults": [Fault("FM2", (0, 3))]}
-    observations, infos = env.reset(seed=0, options=options)
-    assert list(observations) == env.agents == [f"robot_{number}" for number in range(4)]
-    assert env.possible_agents == [f"robot_{number}" for number in range(5)]
-    assert [info["failed"] for info in infos.values()] == [1, 0, 0, 1]
-    env.step(still(env))
-    _, infos = env.reset(seed=0)
-    assert env.agents == ["robot_0", "robot_1"]
-    assert [info["failed"] for info in infos.values()].count(1) == 1
+    seen = [bits(env, seed) for seed in (0, None, None)]
+    assert [bits(other, seed) for seed in (0, None, None)] == seen
+    assert bits(env, 0) == seen[0]
+    seen += [bits(unseeded, None), bits(unseeded, None), bits(parallel_env(n_robots=3), None)]
+    assert len(set(seen)) == 6
 
 
 def test_spaces_and_possible_agents_stay_as_they_were_made() -> None:
     env = parallel_env(n_robots=3, n_items=5, max_robots=4)
     agents, spaces, state_space = env.possible_agents, env.observation_spaces, env.state_space
     assert list(spaces) == list(env.action_spaces) == agents
-    assert spaces["robot_3"] is env.observation_space("robot_3")
-    assert env.action_spaces["robot_3"] is env.action_space("robot_3")
     env.reset(seed=0)
     before = env.warehouse.state
     for scenario, complaint in (
-        ({"n_robots": 5}, "n_robots = 5: should be at most 4, .* max_robots=5 or .* SwarmSize"),
+        ({"n_robots": 5}, "n_robots = 5: should be at most 4"),
         ({"n_items": 6}, "n_items = 6: observations or states could leave their spaces"),
-        ({"duration": 501.0}, "duration = 501.0: observations or states"),
         ({"message_size": 1}, "message_size = 1: observations or states"),
     ):
         with pytest.raises(SetupError, match=complaint):
             env.reset(seed=1, options={"scenario": scenario})
         assert env.warehouse.state is before
-    for scenario in ({"n_robot": 3}, {"delivery_width": 10.0}):
-        with pytest.raises(ScenarioError):
-            env.reset(seed=1, options={"scenario": scenario})
+    with pytest.raises(ScenarioError, match="n_robot"):
+        env.reset(seed=1, options={"scenario": {"n_robot": 3}})
     for n_robots in (1, 4):
         env.reset(seed=1, options={"scenario": {"n_robots": n_robots, "n_items": 2}})
         assert len(env.agents) == n_robots
@@ -166,12 +187,10 @@ def test_spaces_and_possible_agents_stay_as_they_were_made() -> None:
     assert env.state_space == state_space
 
 
-@pytest.mark.parametrize("n_robots", [2, 3])
-def test_a_reset_that_leaves_nobody_is_refused(n_robots: int) -> None:
+def test_a_reset_that_leaves_nobody_is_refused() -> None:
     env = parallel_env(n_robots=3, faults=[Fault("removed", 2), Fault("removed", (0, 1, 2), 0.1)])
-    options = {"scenario": {"n_robots": n_robots}, "faults": [Fault("removed", n_robots)]}
-    with pytest.raises(SetupError, match=f"remove all {n_robots} robots at 0 s"):
-        env.reset(seed=0, options=options)
+    with pytest.raises(SetupError, match="remove all 2 robots at 0 s"):
+        env.reset(seed=0, options={"scenario": {"n_robots": 2}, "faults": [Fault("removed", 2)]})
     assert not env.is_begun
     assert len(env.reset(seed=0)[0]) == 1
 
@@ -179,7 +198,6 @@ def test_a_reset_that_leaves_nobody_is_refused(n_robots: int) -> None:
 @pytest.mark.parametrize(
     ("arguments", "is_cut", "steps"),
     [
-        ({"duration": 1.0}, True, 10),
         ({"max_cycles": 7}, True, 7),
         ({"duration": 0.5, "max_cycles": 7}, True, 5),
         ({"scenario": REACHABLE}, False, None),
@@ -191,13 +209,8 @@ def test_all_end_together_and_a_step_after_that_is_refused_and_moves_nothing(
     arguments: dict[str, Any], is_cut: bool, steps: int | None
 ) -> None:
     env = parallel_env(**{"n_robots": 2, **arguments})
-
-    def refused(when: str) -> None:
-        for step in (lambda: env.step({}), lambda: env.step_arrays(np.zeros((2, 4)))):
-            with pytest.raises(SetupError, match=rf"step {when}: call reset"):
-                step()
-
-    refused("before reset")
+    with pytest.raises(SetupError, match="step before reset: call reset"):
+        env.step({})
     for _ in range(2):
         env.reset(seed=0)
         total, step = 0.0, 0
@@ -205,25 +218,22 @@ def test_all_end_together_and_a_step_after_that_is_refused_and_moves_nothing(
             _, rewards, terminated, truncated, infos = env.step(east(env))
             step += 1
             total += rewards["robot_0"]
-            assert env.warehouse.state.time == pytest.approx(0.1 * step)
             assert set(terminated.values()) == {not env.agents and not is_cut}
             assert set(truncated.values()) == {not env.agents and is_cut}
         assert steps in (None, step)
         assert total == infos["robot_1"]["delivered"]
         assert (total > 0.0) == ("scenario" in arguments)
-        before = env.state()
-        refused("after the end of the episode")
+        with pytest.raises(SetupError, match="step after the end of the episode: call reset"):
+            env.step({})
         assert env.warehouse.state.step == step
-        np.testing.assert_array_equal(env.state(), before)
         assert env.state_space.contains(env.state())
+        env.max_cycles = step  # once more, so that what ends them comes as the time ends
 
 
 def test_unknown_options_are_ignored_with_a_warning_unless_a_known_one_is_nearly_meant() -> None:
     env = parallel_env(n_robots=2)
-    for name in ("options", "default"):
-        with pytest.warns(UserWarning, match=f"reset option '{name}' is ignored; "):
-            observations, _ = env.reset(seed=0, options={name: [Fault("removed", 1)]})
-        assert len(observations) == 2
+    with pytest.warns(UserWarning, match="reset option 'default' is ignored"):
+        assert len(env.reset(seed=0, options={"default": [Fault("removed", 1)]})[0]) == 2
     for name, meant in (("fault", "faults"), ("FAULTS", "faults"), ("senario", "scenario")):
         for each in (env, FaultInjection(env, "FM1")):
             with pytest.raises(SetupError, match=f"no reset option '{name}'; .* mean '{meant}'"):
@@ -234,8 +244,7 @@ def test_unknown_options_are_ignored_with_a_warning_unless_a_known_one_is_nearly
 
 def test_a_removed_robot_terminates_once_and_leaves() -> None:
     faults = [Fault("removed", (1,), onset=0.2), Fault("removed", (3,))]
-    env = parallel_env(scenario=Scenario(n_robots=9, n_items=7), n_robots=4, faults=faults)
-    assert (env.scenario.n_items, env.scenario.n_robots) == (7, 4)
+    env = parallel_env(n_robots=4, faults=faults)
     observations, _ = env.reset(seed=0)
     assert list(observations) == ["robot_0", "robot_1", "robot_2"]
     assert env.possible_agents == [*observations, "robot_3"]
@@ -247,22 +256,19 @@ def test_a_removed_robot_terminates_once_and_leaves() -> None:
     for part in (observations, rewards, infos):
         assert list(part) == ["robot_0", "robot_1", "robot_2"]
     assert env.agents == ["robot_0", "robot_2"]
-    others: dict[str, Any]
-    for others in ({}, {"robot_1": np.zeros(4)}):
-        observations, *_ = env.step({**still(env), **others})
-        assert list(observations) == ["robot_0", "robot_2"]
+    env.step(still(env))
+    observations, *_ = env.step({**still(env), "robot_1": np.zeros(4)})
+    assert list(observations) == ["robot_0", "robot_2"]
 
 
 def test_infos_tell_failures_while_they_hold_and_observations_do_not() -> None:
     faults = [Fault("FM2", (1,), onset=0.2, duration=0.2), Fault("FM4", (1,), onset=0.3)]
     failing, healthy = parallel_env(n_robots=2, faults=faults), parallel_env(n_robots=2)
-    seen, plain = failing.reset(seed=0)[0], healthy.reset(seed=0)[0]
-    assert data_equivalence(seen, plain)
+    assert data_equivalence(failing.reset(seed=0)[0], healthy.reset(seed=0)[0])
     modes = []
     for _ in range(5):
         seen, _, _, _, infos = failing.step(still(failing))
-        plain, *_ = healthy.step(still(healthy))
-        assert data_equivalence(seen, plain)
+        assert data_equivalence(seen, healthy.step(still(healthy))[0])
         modes.append(failing.warehouse.state.failure_modes[1])
         assert infos["robot_0"] == {"failed": 0, "delivered": 0}
         assert infos["robot_1"] == {"failed": int(bool(modes[-1])), "delivered": 0}

@@ -3,34 +3,53 @@
 from __future__ import annotations
 
 import sys
-import textwrap
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swarm_logistics_env.observations import bounds
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
-from swarm_logistics_env.scenario import Scenario
 
 Tensors = dict[str, NDArray[np.float32]]
+
+OWN_MODULE = """\
+import numpy as np
+
+class Still:
+    def __init__(self, gripper=1.0):
+        self.parameters = {"gripper": gripper}
+
+    def reset(self, n_robots, seed): ...
+
+    def act(self, observations):
+        return np.tile([0.0, 0.0, 0.0, self.parameters["gripper"]], (len(observations), 1))
+
+    class Inner:
+        def reset(self, n_robots, seed): ...
+        def act(self, observations): ...
+
+class NoPolicy: ...
+
+class Named(Still):
+    identity = "weights 1"
+
+number = 7
+"""
 
 
 @pytest.fixture
 def card() -> PolicyCard:
-    network = Network(hidden=(8, 6), exploration=0.5)
+    network = Network(hidden=(8, 6), activation="relu", exploration=0.5)
     return PolicyCard(name="small", network=network, seed=3, versions={"numpy": "2"})
 
 
 @pytest.fixture
 def tensors(card: PolicyCard) -> Tensors:
-    rng = np.random.default_rng(0)
-    return {
-        name: rng.normal(0, 0.5, shape).astype(np.float32)
-        for name, shape in tensor_shapes(card.network).items()
-    } | {"deviations": np.full(3, 0.3, np.float32)}
+    rng, shapes = np.random.default_rng(0), tensor_shapes(card.network)
+    made = {name: rng.normal(0, 0.5, shape).astype(np.float32) for name, shape in shapes.items()}
+    return {**made, "deviations": np.full(3, 0.3, np.float32)}
 
 
 @pytest.fixture
@@ -41,46 +60,10 @@ def file(card: PolicyCard, tensors: Tensors, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def rows() -> NDArray[np.float32]:
-    low, high = bounds(Scenario())
-    return np.random.default_rng(1).uniform(low, high, (7, len(low))).astype(np.float32)
-
-
-@pytest.fixture
 def own_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A module of a user's own, with good and bad policies in it."""
     path = tmp_path / "own_policies.py"
-    path.write_text(
-        textwrap.dedent(
-            """
-            import numpy as np
-
-            class Still:
-                def __init__(self, gripper=1.0):
-                    self.parameters = {"gripper": gripper}
-
-                def reset(self, n_robots, seed):
-                    pass
-
-                def act(self, observations):
-                    commands = np.zeros((len(observations), 4))
-                    commands[:, 3] = self.parameters["gripper"]
-                    return commands
-
-                class Inner:
-                    def reset(self, n_robots, seed): ...
-                    def act(self, observations): ...
-
-            class NoPolicy:
-                pass
-
-            class Named(Still):
-                identity = "weights 1"
-
-            number = 7
-            """
-        )
-    )
+    path.write_text(OWN_MODULE)
+    monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "own_policies", raising=False)
     return path

@@ -1,3 +1,5 @@
+"""The scripts that remember the way home, and those that keep a stock beside the delivery area."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -6,25 +8,32 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swarm_logistics_env import Scenario, run_episode
+from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env import observations as row
+from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import load
-from swarm_logistics_env.warehouse import Warehouse
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
+SMALL = Scenario(
+    n_robots=10, n_items=24, warehouse_width=7.0, warehouse_height=5.0, duration=60.0, restock=True
+)
+WITHOUT_STOCK = {"homing-stock": "homing", "central-stock": "central"}
 
 
-def fresh(n_robots: int, seed: int = 0) -> Any:
-    policy = load("homing")
-    policy.reset(n_robots, seed)
+def fresh(n_robots: int, name: str = "homing", **parameters: Any) -> Any:
+    policy = load(name, **parameters)
+    policy.reset(n_robots, 0)
     return policy
 
 
-def rows_of(n_robots: int, velocity: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.float32]:
+def rows_of(
+    n_robots: int, velocity: tuple[float, float] = (0.0, 0.0), inside: bool = False
+) -> NDArray[np.float32]:
     """Rows of robots far from everything that move at this velocity [m/s]."""
     rows = np.zeros((n_robots, row.N_COLUMNS), np.float32)
     rows[:, row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS] = 2.0
     rows[:, row.VELOCITY : row.VELOCITY + 2] = velocity
+    rows[:, row.IN_DELIVERY_AREA] = inside
     return rows
 
 
@@ -33,17 +42,20 @@ def loaded(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     return rows
 
 
-def inside(rows: NDArray[np.float32]) -> NDArray[np.float32]:
-    rows[:, row.IN_DELIVERY_AREA] = 1.0
-    return rows
-
-
-def test_it_is_shipped_and_delivers_more_than_swarm_dt() -> None:
-    scenario = Scenario(duration=60.0, restock=True)
-    delivered = {
-        name: run_episode(scenario, load(name), seed=0).delivered for name in ("swarm-dt", "homing")
-    }
-    assert delivered["homing"] > 2 * delivered["swarm-dt"]
+@pytest.mark.parametrize(
+    ("name", "weaker", "times", "duration"),
+    # The stock is laid in first.
+    [("homing", "swarm-dt", 2, 60), *((*pair, 1.1, 200) for pair in WITHOUT_STOCK.items())],
+)
+def test_it_delivers_more_than_a_simpler_one(
+    name: str, weaker: str, times: float, duration: float
+) -> None:
+    scenario = SMALL.replace(duration=duration)
+    more, fewer = (
+        sum(run_episode(scenario, load(policy), seed).delivered for seed in range(3))
+        for policy in (name, weaker)
+    )
+    assert more > times * fewer
 
 
 @pytest.mark.parametrize("entered", [EAST, NORTH])
@@ -52,48 +64,58 @@ def test_a_laden_robot_goes_where_it_entered_the_delivery_area(
 ) -> None:
     policy = fresh(20)
     policy.act(rows_of(20, entered))
-    policy.act(inside(rows_of(20, entered)))
+    policy.act(rows_of(20, entered, inside=True))
     policy.act(rows_of(20))  # outside again, without a direction of leaving
     for _ in range(20):  # what it commands becomes its heading, so it swings home
         commands = policy.act(loaded(rows_of(20, entered)))
     assert (commands[:, :2] @ np.array(entered) > 0.95).all()
-    assert (commands[:, 3] == 1.0).all()
+    assert (commands[:, 2:] == [0.0, 1.0]).all()  # it never commands a turn
 
 
 def test_a_robot_that_never_entered_knows_no_direction() -> None:
     commands = fresh(200).act(loaded(rows_of(200)))
-    angles = np.arctan2(commands[:, 1], commands[:, 0])
-    assert all(
-        ((angles > low) & (angles < low + np.pi / 2)).any() for low in (-3.0, -1.5, 0.0, 1.5)
-    )
+    quarters = np.arctan2(commands[:, 1], commands[:, 0]) // (np.pi / 2)
+    assert {-2, -1, 0, 1} <= set(quarters.tolist())
 
 
 def test_it_follows_the_lowest_timer_heard_until_it_knows_the_way_for_sure() -> None:
-    policy = fresh(30)
-    rows = loaded(rows_of(30, EAST))
+    policy, rows = fresh(30), loaded(rows_of(30, EAST))
     rows[:, row.LOWEST_TIMER : row.LOWEST_TIMER + 3] = (1.0, *NORTH)
     for _ in range(20):
         commands = policy.act(rows)
     assert (commands[:, 1] > 0.9).all()
     for _ in range(4):  # enters in the east four times, without a way out at speed
         policy.act(rows_of(30, EAST))
-        policy.act(inside(rows_of(30, EAST)))
-        policy.act(inside(rows_of(30)))
+        policy.act(rows_of(30, EAST, inside=True))
+        policy.act(rows_of(30, inside=True))
         policy.act(rows_of(30))
     for _ in range(20):
         commands = policy.act(rows)
     assert (commands[:, 0] > 0.9).all()
 
 
-def test_it_never_commands_a_turn() -> None:
-    scenario = Scenario(n_robots=30, warehouse_width=6, warehouse_height=5, n_items=20)
-    world = Warehouse(scenario.replace(heading_drift=0.0))
-    rows, policy = world.reset(0), fresh(30)
-    first = world.state.robot_heading.copy()
-    for _ in range(100):
-        commands = policy.act(rows)
-        assert np.isfinite(commands).all()
-        assert (np.hypot(commands[:, 0], commands[:, 1]) <= 1.0 + 1e-9).all()
-        assert (commands[:, 2] == 0.0).all()
-        rows = world.step(commands)
-    np.testing.assert_allclose(world.state.robot_heading, first)
+@pytest.mark.parametrize("name", WITHOUT_STOCK)
+@pytest.mark.parametrize("mode", ["FM1", "FM2", "FM3", "FM4", "motor_dead", "removed"])
+def test_with_a_stock_it_gets_on_with_robots_that_fail(name: str, mode: str) -> None:
+    assert run_episode(SMALL, load(name), 0, (Fault(mode, 2),)).delivered >= 4
+
+
+@pytest.mark.parametrize(("holders", "drops"), [(0.0, True), (1.0, False)])
+def test_who_holds_keeps_its_item_and_who_stocks_puts_it_down_before_the_area(
+    holders: float, drops: bool
+) -> None:
+    policy = fresh(20, "homing-stock", holders=holders, stockers=1.0 - holders)
+    policy.act(rows_of(20, EAST))
+    policy.act(rows_of(20, EAST, inside=True))
+    leaving = rows_of(20, (-1.0, 0.0))
+    leaving[:, row.CARRYING] = 1.0
+    gripper = policy.act(leaving)[:, 3]
+    assert (gripper == (-1.0 if drops else 0.0)).all()
+    leaving[:, row.ITEMS : row.ITEMS + 3] = (1.0, 0.3, 0.3)  # no gap beside this item
+    assert (policy.act(leaving)[:, 3] == 0.0).all()
+
+
+@pytest.mark.parametrize(("holders", "stockers"), [(-0.1, 0.4), (0.7, 0.7)])
+def test_shares_that_cannot_be_are_refused(holders: float, stockers: float) -> None:
+    with pytest.raises(PolicyError, match="holders"):
+        load("homing-stock", holders=holders, stockers=stockers)

@@ -17,24 +17,24 @@ from swarm_logistics_env.policies import Policy, PolicySpec
 pytest.importorskip("stable_baselines3")
 
 
-@pytest.fixture(scope="module")
-def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def saved(path: Path, **fields: Any) -> Path:
+    """Save an untrained model."""
+    from stable_baselines3 import PPO
+
     from swarm_logistics_env.adapters import SwarmVecEnv
 
-    env = SwarmVecEnv(n_worlds=1, n_robots=2, duration=2.0)
-    path = tmp_path_factory.mktemp("model") / "model.zip"
-    untrained(env).save(path)
+    env = SwarmVecEnv(n_worlds=1, n_robots=2, **fields)
+    small = {"net_arch": [4]}
+    PPO("MlpPolicy", env, policy_kwargs=small, n_steps=8, batch_size=8, device="cpu").save(path)
     return path
 
 
-def untrained(env: Any) -> Any:
-    from stable_baselines3 import PPO
-
-    small = {"net_arch": [4]}
-    return PPO("MlpPolicy", env, policy_kwargs=small, n_steps=8, batch_size=8, seed=0, device="cpu")
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return saved(tmp_path_factory.mktemp("model") / "model.zip")
 
 
-def test_a_trusted_model_plays(model: Path) -> None:
+def test_a_trusted_model_plays_and_is_known_by_its_content(model: Path, tmp_path: Path) -> None:
     policy: Any = policies.load(str(model), trust_code=True)
     assert run_episode(Scenario(n_robots=3, duration=1.0), policy, seed=0).ended_at == 1.0
     rows = np.random.default_rng(0).normal(size=(4, 140)).astype(np.float32)
@@ -42,13 +42,10 @@ def test_a_trusted_model_plays(model: Path) -> None:
 
     told, _ = PPO.load(model, device="cpu").predict(rows, deterministic=True)
     assert (policy.act(rows) == told).all()
-
-
-def test_identity_follows_the_file(model: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.zip"
     other.write_bytes(model.read_bytes())
-    one, two = (policies.load(str(path), trust_code=True) for path in (model, other))
-    assert policies.identity(one) == policies.identity(two)
+    same = policies.load(str(other), trust_code=True)
+    assert policies.identity(same) == policies.identity(policy)
 
 
 def test_the_command_line_asks_too(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -69,18 +66,12 @@ def test_a_study_reads_it_where_the_command_trusts_it_and_no_file_says_so(model:
         PolicySpec.of({"name": text, "trusted": True})
 
 
-def test_what_is_no_model_is_refused(model: Path, tmp_path: Path) -> None:
-    broken = tmp_path / "broken.zip"
+def test_what_is_no_model_or_one_of_other_spaces_is_refused(model: Path, tmp_path: Path) -> None:
+    broken, other = tmp_path / "broken.zip", saved(tmp_path / "other.zip", message_size=2)
     broken.write_bytes(model.read_bytes()[:500])
-    with pytest.raises(PolicyError, match="is no PPO model of stable-baselines3"):
-        policies.load(str(broken), trust_code=True)
-
-
-def test_a_model_of_other_spaces_is_refused(tmp_path: Path) -> None:
-    from swarm_logistics_env.adapters import SwarmVecEnv
-
-    env = SwarmVecEnv(n_worlds=1, n_robots=1, message_size=2)
-    path = tmp_path / "model.zip"
-    untrained(env).save(path)
-    with pytest.raises(PolicyError, match=r"to commands \(6,\): should map \(140,\) to \(4,\)"):
-        policies.load(str(path), trust_code=True)
+    for path, sentence in (
+        (broken, "is no PPO model of stable-baselines3"),
+        (other, r"to commands \(6,\): should map \(140,\) to \(4,\)"),
+    ):
+        with pytest.raises(PolicyError, match=sentence):
+            policies.load(str(path), trust_code=True)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,6 @@ from swarm_logistics_env.train.training import load_training, preset_names
 from swarm_logistics_env.warehouse import Fault
 
 SHIPPED = sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))
-SHORT = Scenario(restock=True, duration=80.0)
-SEEDS = range(4)
 
 
 def test_each_is_a_training_of_a_preset_and_the_median_one_has_its_name() -> None:
@@ -43,22 +42,21 @@ def test_they_are_small_and_say_how_they_were_made(name: str) -> None:
 
 
 @cache
-def delivered(name: str, *faults: Fault, **fields: float) -> float:
+def delivered(name: str, *faults: Fault, **fields: Any) -> float:
     """Return the mean of what a policy delivers over some seeds."""
-    policy, scenario = policies.load(name), SHORT.replace(**fields)
-    return float(np.mean([run_episode(scenario, policy, seed, faults).delivered for seed in SEEDS]))
+    policy, scenario = policies.load(name), Scenario(restock=True, duration=80.0, **fields)
+    episodes = (run_episode(scenario, policy, seed, faults) for seed in range(4))
+    return float(np.mean([episode.delivered for episode in episodes]))
 
 
-@pytest.mark.parametrize(("name", "n_robots"), [(name, n) for name in SHIPPED for n in (5, 30)])
+@pytest.mark.parametrize("n_robots", [5, 30])
+@pytest.mark.parametrize("name", SHIPPED)
 def test_they_deliver_more_than_swarm_dt(name: str, n_robots: int) -> None:
     assert delivered(name, n_robots=n_robots) > 1.5 * delivered("swarm-dt", n_robots=n_robots)
 
 
-def test_a_fast_drift_costs_delivery_little() -> None:
+def test_a_drift_costs_little_and_robust_lets_go_of_what_it_cannot_deliver() -> None:
     slow, fast = (delivered("ppo-delivery", heading_drift=drift) for drift in (0.0, 0.1))
     assert fast > 0.5 * slow
-
-
-def test_robust_lets_go_of_what_it_cannot_deliver() -> None:
     fault = Fault("FM4", 2)
     assert delivered("ppo-robust", fault) > 1.4 * delivered("swarm-dt", fault)

@@ -15,61 +15,54 @@ from swarm_logistics_env.policies import SwarmDT, SwarmDTParameters, load
 from swarm_logistics_env.scenario import SOURCES
 
 
-def nothing_near(n_robots: int = 1) -> NDArray[np.float32]:
-    """Return rows of robots that sense nothing within range, empty, timers silent."""
+def sensing(*things: tuple[int, list[float]], n_robots: int = 1) -> NDArray[np.float32]:
+    """Return rows of robots that sense these things alone: from a column on, its values."""
     rows = np.zeros((n_robots, row.N_COLUMNS), np.float32)
     for scan in (row.RANGE_ROBOTS, row.RANGE_WALLS, row.RANGE_ITEMS):
         rows[:, scan : scan + row.N_BEAMS] = 2.0
     rows[:, row.TIMER] = 10.0
+    for column, values in things:
+        rows[:, column : column + len(values)] = values
     return rows
 
 
-def fresh(n_robots: int = 1, seed: int = 0, **parameters: Any) -> SwarmDT:
-    policy = SwarmDT(**parameters)
-    policy.reset(n_robots, seed)
+NOTHING = sensing()
+ITEM = row.ITEMS, [1.0, 0.3, 0.0]
+HEARD = row.LOWEST_TIMER, [1.0, 0.0, 2.0, 3.0]
+CARRYING, CARRYING_REQUESTED = (row.CARRYING, [1.0, 0.0]), (row.CARRYING, [1.0, 1.0])
+
+
+def neighbour(x: float, y: float) -> tuple[int, list[float]]:
+    return row.NEIGHBOURS, [1.0, x, y]
+
+
+def straight(**parameters: Any) -> SwarmDT:
+    """Return a policy whose stored heading only turns for what is sensed."""
+    policy = SwarmDT(diffusion=0.0, **parameters)
+    policy.reset(1, 0)
     return policy
 
 
-def straight(n_robots: int = 1, **parameters: Any) -> SwarmDT:
-    """Return a policy whose stored heading only turns for what is sensed."""
-    return fresh(n_robots, diffusion=0.0, **parameters)
+def swarm(n_robots: int, period: float) -> SwarmDT:
+    policy = SwarmDT()
+    policy.configure(Scenario(control_period=period))
+    policy.reset(n_robots, 0)
+    return policy
 
 
 def heading_of(commands: NDArray[np.float64]) -> float:
     return math.atan2(commands[0, 1], commands[0, 0])
 
 
-def with_neighbour(rows: NDArray[np.float32], x: float, y: float) -> NDArray[np.float32]:
-    changed = rows.copy()
-    changed[0, row.NEIGHBOURS : row.NEIGHBOURS + 3] = 1.0, x, y
-    return changed
-
-
-def with_item(rows: NDArray[np.float32], x: float, y: float) -> NDArray[np.float32]:
-    changed = rows.copy()
-    changed[0, row.ITEMS : row.ITEMS + 3] = 1.0, x, y
-    return changed
-
-
-def carrying(rows: NDArray[np.float32], requested: bool) -> NDArray[np.float32]:
-    changed = rows.copy()
-    changed[0, row.CARRYING] = 1.0
-    changed[0, row.CARRYING_REQUESTED] = float(requested)
-    return changed
-
-
-def hearing(rows: NDArray[np.float32], x: float, y: float) -> NDArray[np.float32]:
-    changed = rows.copy()
-    changed[0, row.LOWEST_TIMER : row.LOWEST_TIMER + 4] = 1.0, x, y, 3.0
-    return changed
+def plus(commands: NDArray[np.float64], x: float, y: float) -> NDArray[np.float64]:
+    """Return the velocity of commands with another one added, of the top speed at most."""
+    summed = commands[0, :2] + [x, y]
+    return np.asarray(summed / max(np.hypot(*summed), 1.0))
 
 
 @pytest.mark.parametrize("period", [0.02, 0.2])
 def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> None:
-    policy = SwarmDT()
-    policy.configure(Scenario(control_period=period))
-    policy.reset(4000, 0)
-    rows = nothing_near(4000)
+    policy, rows = swarm(4000, period), sensing(n_robots=4000)
     first = policy.act(rows)
     np.testing.assert_allclose(np.hypot(first[:, 0], first[:, 1]), 1.0)
     assert (first[:, 2:] == [0.0, 1.0]).all()
@@ -87,61 +80,47 @@ def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> 
 
 @pytest.mark.parametrize("beam", range(row.N_BEAMS))
 def test_a_wall_reflects_the_stored_heading_once(beam: int) -> None:
-    rows = nothing_near()
     policy = straight()
-    before = heading_of(policy.act(rows))
-    wall = rows.copy()
-    wall[0, row.RANGE_WALLS + beam] = 0.15
+    before = heading_of(policy.act(NOTHING))
     towards = beam * math.tau / row.N_BEAMS
     approaches = math.cos(before - towards) > 0.0
     mirrored = 2 * towards + math.pi - before if approaches else before
     for _ in range(3):  # once turned away, it goes on straight
-        after = heading_of(policy.act(wall))
+        after = heading_of(policy.act(sensing((row.RANGE_WALLS + beam, [0.15]))))
         assert math.remainder(after - mirrored, math.tau) == pytest.approx(0.0, abs=1e-6)
-    assert heading_of(policy.act(rows)) == pytest.approx(after)
+    assert heading_of(policy.act(NOTHING)) == pytest.approx(after)
 
 
-def test_it_turns_away_from_a_near_robot_and_not_from_a_far_one() -> None:
-    plain = straight().act(nothing_near())
-    far = straight().act(with_neighbour(nothing_near(), 0.5, 0.1))
-    np.testing.assert_array_equal(far, plain)
-    near = straight().act(with_neighbour(nothing_near(), 0.3, 0.0))
+def test_it_turns_away_from_a_near_robot_and_from_items_while_it_carries() -> None:
+    plain = straight().act(NOTHING)
+    for ignored in (neighbour(0.5, 0.1), ITEM):
+        np.testing.assert_array_equal(straight().act(sensing(ignored)), plain)
+    near = straight().act(sensing(neighbour(0.3, 0.0)))
     # Pushed back by 2 (1 - 0.3 / 0.5) = 0.8 top speeds.
-    expected = plain[0, :2] + [-0.8, 0.0]
-    expected /= max(np.hypot(*expected), 1.0)
-    np.testing.assert_allclose(near[0, :2], expected, atol=1e-6)
-
-
-def test_it_avoids_items_only_while_it_carries() -> None:
-    plain = straight().act(nothing_near())
-    empty = straight().act(with_item(nothing_near(), 0.3, 0.0))
-    np.testing.assert_array_equal(empty, plain)
-    laden = straight(drop_rate=0.0).act(carrying(with_item(nothing_near(), 0.3, 0.0), False))
-    assert laden[0, 0] < plain[0, 0]
+    np.testing.assert_allclose(near[0, :2], plus(plain, -0.8, 0.0), atol=1e-6)
+    assert straight(drop_rate=0.0).act(sensing(ITEM, CARRYING))[0, 0] < plain[0, 0]
 
 
 def test_only_who_carries_the_requested_item_follows_the_lowest_timer() -> None:
-    rows = hearing(nothing_near(), 0.0, 2.0)
-    plain = straight().act(nothing_near())
-    for kind in (rows, carrying(rows, requested=False)):
-        np.testing.assert_array_equal(straight(drop_rate=0.0).act(kind)[0, :2], plain[0, :2])
-    requested = carrying(rows, requested=True)
+    plain = straight().act(NOTHING)
+    for things in ((HEARD,), (HEARD, CARRYING)):
+        commands = straight(drop_rate=0.0).act(sensing(*things))
+        np.testing.assert_array_equal(commands[0, :2], plain[0, :2])
+    requested = sensing(HEARD, CARRYING_REQUESTED)
     walk = load("random-walk", diffusion=0.0)  # without taxis
     walk.reset(1, 0)
     # To a float32's rounding: the interpreter multiplies its zero gain in that precision.
     np.testing.assert_allclose(walk.act(requested)[0, :2], plain[0, :2], rtol=1e-6)
     delivering = straight().act(requested)
-    expected = plain[0, :2] + [0.0, 0.75]
-    expected /= max(np.hypot(*expected), 1.0)
-    np.testing.assert_allclose(delivering[0, :2], expected, atol=1e-6)
+    np.testing.assert_allclose(delivering[0, :2], plus(plain, 0.0, 0.75), atol=1e-6)
 
 
 @pytest.mark.parametrize("follows", [False, True])
 def test_only_where_the_heading_follows_do_pushes_turn_it_for_good(follows: bool) -> None:
     policy = straight(heading_follows=follows)
-    before = heading_of(policy.act(nothing_near()))
-    pushed = heading_of(policy.act(with_neighbour(nothing_near(), 0.1, 0.05)))
-    after = heading_of(policy.act(nothing_near()))
+    before = heading_of(policy.act(NOTHING))
+    pushed = heading_of(policy.act(sensing(neighbour(0.1, 0.05))))
+    after = heading_of(policy.act(NOTHING))
     assert after == pytest.approx(pushed if follows else before)
     assert pushed != pytest.approx(before)
 
@@ -151,18 +130,12 @@ def test_other_items_are_dropped_at_the_drop_rate_and_the_requested_one_never(
     period: float,
 ) -> None:
     n = 3000
-    rows = nothing_near(n)
-    rows[:, row.CARRYING] = 1.0
-    policy = SwarmDT()
-    policy.configure(Scenario(control_period=period))
-    policy.reset(n, 0)
-    kept = np.ones(n, np.bool_)
+    policy, kept = swarm(n, period), np.ones(n, np.bool_)
     for _ in range(round(0.5 / period)):
-        kept &= policy.act(rows)[:, 3] > -0.5
+        kept &= policy.act(sensing(CARRYING, n_robots=n))[:, 3] > -0.5
     assert kept.mean() == pytest.approx(math.exp(-1.5 * 0.5), abs=0.04)
-    rows[:, row.CARRYING_REQUESTED] = 1.0
     for _ in range(20):
-        assert (policy.act(rows)[:, 3] == 1.0).all()
+        assert (policy.act(sensing(CARRYING_REQUESTED, n_robots=n))[:, 3] == 1.0).all()
 
 
 def test_every_constant_says_whether_it_has_a_source_or_was_fitted() -> None:

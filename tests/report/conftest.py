@@ -18,12 +18,6 @@ def few() -> StudyResults:
 
 
 @pytest.fixture(scope="session")
-def single() -> StudyResults:
-    """The paper's study over one seed that gave exactly the paper's tables."""
-    return paper(seeds=1)
-
-
-@pytest.fixture(scope="session")
 def compared() -> StudyResults:
     """Two policies: the second delivers half as much, and collapses under FM1."""
 

@@ -23,16 +23,13 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
 from verification.browser import Browser
 
-SCENARIO = {
-    "n_robots": 4, "n_items": 8, "warehouse_width": 4.0, "warehouse_height": 3.0, "duration": 30.0,
-}  # fmt: skip
 HOSTILE = "</script><script>alert(1)</script>"
 
 
 class Made(NamedTuple):
-    """A study that was played and reported: its directory, results, page and the page's data."""
+    """A study that was played and reported: its page's file, results, text and data."""
 
-    directory: Path
+    file: Path
     found: StudyResults
     page: str
     data: Any
@@ -42,17 +39,18 @@ class Made(NamedTuple):
 def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     """A study of two policies, one of a hostile name."""
     out = tmp_path_factory.mktemp("page")
+    area = {"warehouse_width": 4.0, "warehouse_height": 3.0}
     Study(
         out=out,
         policies=["swarm-dt", {"name": "random-walk", "label": HOSTILE}],
         seeds=3,
-        scenario=SCENARIO,
+        scenario={**area, "n_robots": 4, "n_items": 8, "duration": 30.0},
         faults=[{"modes": ["FM4"], "robots": [1, 2]}],
     ).run()
     assert app.run(["study", "report", str(out)]) == 0
     page = (out / "report.html").read_text()
     (text,) = re.findall(r' id="data">(.*?)</script>', page, re.DOTALL)
-    return Made(out, Study.stored(out).findings(), page, json.loads(text))
+    return Made(out / "report.html", Study.stored(out).findings(), page, json.loads(text))
 
 
 def test_text_of_a_study_cannot_end_the_script(made: Made) -> None:
@@ -65,18 +63,14 @@ def test_every_seed_stands_behind_its_interval(made: Made) -> None:
     data = made.data
     view = data["views"][0]
     means = {(cell.policy, cell.words): cell.mean for cell in made.found.cells}
-    assert {point["policy"] for point in view["points"]} == {"swarm-dt", HOSTILE}
     for point in view["points"]:
         condition = data["conditions"][point["condition"]]
-        assert len(condition["p"]) == 3
         words = condition["name"].removeprefix(f"{point['policy']}, ")
         limits = [point["value"], point["low"], point["high"]]
         assert limits == pytest.approx(means[point["policy"], words], abs=1e-3)
         assert point["value"] == pytest.approx(np.mean(condition["p"]), abs=1e-3)
     for condition in data["conditions"]:
-        for p, gaps in zip(condition["p"], condition["curves"]):
-            assert len(gaps) == p
-            assert 0 <= sum(gaps) <= 30
+        assert [len(gaps) for gaps in condition["curves"]] == condition["p"]
     (robustness,) = (view for view in data["views"] if view["name"].startswith("R: "))
     assert len(robustness["points"]) == 4
     for point in robustness["points"]:
@@ -108,10 +102,8 @@ def test_command_of_a_run_plays_the_stored_one(
     faulty = arms["swarm-dt", "FM4, m = 2"]
     command = str(watch_command(faulty))
     assert command in {condition["command"] for condition in made.data["conditions"]}
-    program, watch, *options = shlex.split(command)
-    assert (program, watch) == ("swarm-logistics", "watch")
     # `run` takes what `watch` takes, and ends.
-    assert app.run(["run", *options, "--seed", "1"]) == 0
+    assert app.run(["run", *shlex.split(command)[2:], "--seed", "1"]) == 0
     delivered = made.found.outcomes[faulty.case.key, 1].delivered
     assert f"P = {delivered} items" in capsys.readouterr().out
 
@@ -126,7 +118,6 @@ def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word()
         *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100+50")
     ]
     assert commands["FM1"] is None
-    assert {watch_command(null) for null in plan.nulls.values()} == {None}
     given = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
     own = Study(policies=[SwarmDT(), given], sizes=[{"values": [2, 3]}]).plan()
     assert {watch_command(arm) for _, _, arm in own.cells} == {None}
@@ -152,7 +143,7 @@ def test_answer_and_comparison_stand_on_the_first_screen_and_a_click_shows_the_q
     except FileNotFoundError as missing:
         pytest.skip(str(missing))
     try:
-        browser.open((made.directory / "report.html").resolve().as_uri())
+        browser.open(made.file.resolve().as_uri())
         browser.wait_for("document.querySelectorAll('#comparison svg').length")
         assert browser.value("document.documentElement.scrollWidth") <= size[0]
         bottom = "document.querySelector('#comparison').getBoundingClientRect().bottom"

@@ -7,27 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.special import ndtr, ndtri
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi import IndicatorError
 
 
 def test_holm_by_hand() -> None:
     # sorted .005 .01 .03 .04 times 4 3 2 1 = .02 .03 .06 .04, made monotone: .02 .03 .06 .06
     assert spi.holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert spi.holm([0.6, 0.5]) == pytest.approx([1.0, 1.0])
-    assert spi.holm([0.2]) == pytest.approx([0.2])
     assert spi.holm([]).size == 0
-
-
-@given(st.lists(st.floats(0, 1), min_size=1, max_size=20))
-def test_holm_never_helps_and_is_never_worse_than_bonferroni(p: list[float]) -> None:
-    adjusted = spi.holm(p)
-    assert (adjusted >= np.array(p)).all()
-    assert (adjusted <= np.minimum(1.0, np.array(p) * len(p) + 1e-15)).all()
 
 
 def estimate(p_value: float | None, probability: float | None = None, **more: Any) -> spi.Estimate:
@@ -35,23 +24,17 @@ def estimate(p_value: float | None, probability: float | None = None, **more: An
     return dataclasses.replace(blank, p_value=p_value, probability=probability, **more)
 
 
-def test_adjusted_verdicts_keep_their_direction() -> None:
-    family = [estimate(0.001, 0.9995), estimate(0.02, 0.01), estimate(0.03, 0.985)]
-    assert spi.adjust(family) == ("supported", "refuted", "supported")
-    assert spi.adjust([*family, estimate(0.9, 0.55)]) == ("supported", *["inconclusive"] * 3)
-    assert spi.adjust([]) == ()
-
-
-def test_an_untested_member_counts_in_the_family() -> None:
-    assert spi.adjust([estimate(0.04, 0.98)]) == ("supported",)
-    assert spi.adjust([estimate(0.04, 0.98), estimate(None)]) == ("inconclusive", "inconclusive")
-
-
 P_O = np.array([40.0, 38, 41, 39, 42])
 ROBUST = spi.robustness(P_O, [40.0, 39, 41, 38, 42], n=25, m=2)
 BROKEN = spi.robustness(P_O, [12.0, 15, 10, 11, 14], n=25, m=2)
 SAME = spi.robustness(P_O, P_O, n=25, m=1, identical=True)
 UNCLEAR = spi.robustness(P_O, [45.0, 20, 38, 50, 30], n=25, m=2)
+
+
+def test_adjusted_verdicts_keep_their_direction_and_what_is_untested_counts() -> None:
+    family = [estimate(0.001, 0.9995), estimate(0.02, 0.01), estimate(0.03, 0.985)]
+    assert spi.adjust(family) == ("supported", "refuted", "supported")
+    assert spi.adjust([*family, estimate(None)]) == ("supported", *["inconclusive"] * 3)
 
 
 def test_identical_runs_stand_outside_the_family() -> None:
@@ -62,12 +45,10 @@ def test_identical_runs_stand_outside_the_family() -> None:
 @pytest.mark.parametrize(
     ("by_m", "robots", "limit"),
     [
-        ({1: ROBUST, 2: ROBUST, 3: BROKEN}, 2, 3),
         ({1: ROBUST, 2: BROKEN, 3: ROBUST}, 1, 2),  # supported again at 3 does not count
         ({1: UNCLEAR, 2: ROBUST}, 0, 1),  # nor does a verdict that is only not refuted
         ({3: ROBUST, 1: ROBUST, 2: ROBUST}, 3, None),  # all supported: a lower bound
         ({1: ROBUST, 3: ROBUST}, 1, 2),  # untested in between
-        ({2: ROBUST}, 0, 1),
         ({1: SAME, 2: ROBUST, 3: BROKEN}, 2, 3),  # the same runs: exactly within it
     ],
 )
@@ -79,19 +60,15 @@ def test_the_first_unsupported_number_ends_the_fault_budget(
     assert spi.fault_budget(by_m) == (robots, limit)
 
 
-@pytest.mark.parametrize(
-    ("looks", "boundaries"),
-    [
-        ([20], [1.960]),
-        ([10, 20], [2.963, 1.969]),
-        ([5, 10, 15], [3.710, 2.511, 1.993]),
-        ([5, 10, 15, 20, 25], [4.877, 3.357, 2.680, 2.290, 2.031]),
-    ],
-)
-def test_published_boundaries(looks: list[int], boundaries: list[float]) -> None:
+def test_published_boundaries() -> None:
     """Lan and DeMets' O'Brien-Fleming type boundaries, two-sided .05 (Jennison, Turnbull 2000)."""
-    found = [-ndtri(p / 2) for p in spi.look_alphas(looks)]
-    assert found == pytest.approx(boundaries, abs=1e-3)
+    for looks, boundaries in (
+        ([10, 20], [2.963, 1.969]),
+        ([5, 10, 15, 20, 25], [4.877, 3.357, 2.680, 2.290, 2.031]),
+    ):
+        found = [-ndtri(p / 2) for p in spi.look_alphas(looks)]
+        assert found == pytest.approx(boundaries, abs=1e-3)
+    assert spi.look_alphas([20], alpha=0.1) == pytest.approx((0.1,))
 
 
 def test_looks_keep_the_error_that_peeking_inflates() -> None:
@@ -99,38 +76,29 @@ def test_looks_keep_the_error_that_peeking_inflates() -> None:
     steps = np.random.default_rng(7).normal(size=(100_000, 20)).cumsum(axis=1)
     p = 2 * ndtr(-np.abs(steps[:, [look - 1 for look in looks]] / np.sqrt(looks)))
     assert (p < 0.05).any(axis=1).mean() > 0.1
-    assert (p < np.array(spi.look_alphas(looks))).any(axis=1).mean() == pytest.approx(
-        0.05, abs=3e-3
-    )
+    stopped = (p < np.array(spi.look_alphas(looks))).any(axis=1).mean()
+    assert stopped == pytest.approx(0.05, abs=3e-3)
     alphas = spi.look_alphas(looks, spending="linear")
     crossed = np.logical_or.accumulate(p < np.array(alphas), axis=1).mean(axis=0)
     # Alpha is spent in proportion to the seeds.
     assert crossed == pytest.approx(0.05 * np.array(looks) / 20, abs=0.002)
-    assert alphas[0] == pytest.approx(0.05 * 5 / 20)
-    assert spi.look_alphas((20,), alpha=0.1) == pytest.approx((0.1,))
-    rising = spi.look_alphas((10, 20, 40), alpha=0.1)
-    assert [*rising] == sorted(rising)
-    assert 0.09 < rising[-1] < 0.1
     assert spi.look_alphas((1, 1_000))[0] < 1e-15
 
 
 @pytest.mark.parametrize(
     ("function", "asked", "words"),
     [
-        *((spi.holm, p, "p_values") for p in ([0.5, 1.1], [-0.1], [float("nan")], [[0.1]], ["x"])),
+        (spi.holm, [0.5, 1.1], "p_values"),
+        (spi.holm, [float("nan")], "p_values"),
         (spi.adjust, [estimate(0.01, 0.9), estimate(0.01, 0.9, confidence=0.9)], "confidence"),
         (spi.fault_budget, {}, "is empty"),
         (spi.fault_budget, {0: ROBUST}, "m = 0"),
         (spi.fault_budget, {1: spi.relative_change(P_O, P_O)}, "indicator at m = 1 is change"),
-        *((spi.look_alphas, looks, "look") for looks in ((), (0, 10), (10, 10), (20, 10))),
+        (spi.look_alphas, (20, 10), "looks"),
         (lambda alpha: spi.look_alphas((10,), alpha=alpha), 5, "alpha = 5"),
-        (
-            lambda name: spi.look_alphas([10, 20], spending=name),
-            "pocock",
-            "spending = 'pocock': should be one of obrien",
-        ),
+        (lambda name: spi.look_alphas([10], spending=name), "pocock", "spending = 'pocock'"),
     ],
 )
 def test_what_cannot_be_is_named(function: Any, asked: Any, words: str) -> None:
-    with pytest.raises(IndicatorError, match=words):
+    with pytest.raises(spi.IndicatorError, match=words):
         function(asked)

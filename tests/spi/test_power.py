@@ -1,3 +1,5 @@
+"""How many seeds a plan names, and what so many seeds then find."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -9,7 +11,6 @@ import pytest
 from scipy.stats import chi2, nct, t, ttest_1samp
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi import IndicatorError
 from verification.verdict_errors import planned_power
 
 rng = np.random.default_rng(11)
@@ -25,24 +26,22 @@ def planned_spread(pilot: Any) -> float:
     return float(pilot.difference_sd * math.sqrt(df / chi2.ppf(0.4, df)))
 
 
-def share_supported(pilot: spi.Estimate, effect: float, n: int) -> float:
+def share_supported(effect: float, n: int) -> float:
     """Share of simulated studies of n seeds, with the planned spread, that find the effect."""
-    draws = np.random.default_rng(1).normal(
-        (effect - pilot.threshold) * pilot.mean_denominator, planned_spread(pilot), (20_000, n)
-    )
+    loc = (effect - PILOT.threshold) * PILOT.mean_denominator
+    draws = np.random.default_rng(1).normal(loc, planned_spread(PILOT), (20_000, n))
     # The t test alone: of normal differences the bootstrap takes little.
     test = ttest_1samp(draws, 0.0, axis=1, alternative="greater")
     return float(np.mean(test.pvalue < 0.025))
 
 
-@pytest.mark.parametrize("effect", [0.08, 0.146, 0.2, 0.6])
+@pytest.mark.parametrize("effect", [0.08, 0.146, 0.6])
 def test_planned_seeds_reach_80_percent_and_one_fewer_does_not(effect: float) -> None:
     n = spi.seeds_for_power(PILOT, effect) or 0
-    assert share_supported(PILOT, effect, n) > 0.79
-    assert n == 10 or share_supported(PILOT, effect, n - 1) < 0.81
+    assert share_supported(effect, n) > 0.79
+    assert n == 10 or share_supported(effect, n - 1) < 0.81
     moved = dataclasses.replace(PILOT, threshold=1.0)  # effects are counted from the threshold
     assert spi.seeds_for_power(moved, 1.0 + effect) == n
-    assert spi.minimum_detectable_effect(moved) == spi.minimum_detectable_effect(PILOT)
 
 
 def test_equivalence_is_planned_for_both_of_its_tests() -> None:
@@ -55,31 +54,10 @@ def test_equivalence_is_planned_for_both_of_its_tests() -> None:
 
 def test_minimum_detectable_effect_is_found_in_80_percent() -> None:
     effect = spi.minimum_detectable_effect(PILOT) or 0.0
-    assert share_supported(PILOT, effect, 10) == pytest.approx(0.8, abs=0.01)
-    assert spi.seeds_for_power(PILOT, effect * 1.001) == 10
-    assert spi.seeds_for_power(PILOT, -effect * 1.001) == 10
-
-
-def test_early_looks_have_a_minimum_detectable_effect() -> None:
-    few: Any = spi.robustness(P_O[:5], P_O[:5] - [3, 5, 2, 8, 4], n=25, m=2, confidence=1 - 1e-12)
-    few = dataclasses.replace(few, **PLAIN)
-    effect = spi.minimum_detectable_effect(few) or 0.0
-    # By the noncentral t itself, of 4 degrees of freedom, at its critical value 1565.05.
-    noncentrality = effect * few.mean_denominator / few.difference_sd * math.sqrt(5)
-    assert noncentrality == pytest.approx(
-        1915.05 * planned_spread(few) / few.difference_sd, rel=1e-3
-    )
-    two = dataclasses.replace(few, n_seeds=2, degrees_of_freedom=1.0)
-    assert (spi.minimum_detectable_effect(two) or 0.0) > effect
-    # Two seeds say less of the spread, so the plan is more careful.
-    assert (spi.seeds_for_power(two, 0.5) or 0) > (spi.seeds_for_power(few, 0.5) or 0)
-
-
-def test_no_plan_names_fewer_seeds_than_a_verdict_needs() -> None:
-    assert spi.seeds_for_power(PILOT, 1_000.0) == 10
-    p_o = np.array([400.0, 410, 395, 402, 399])
-    p_f = p_o + np.array([0, 1, 0, -1, 0])
-    assert spi.seeds_for_equivalence(spi.equivalence(p_o, p_f, margin=0.9)) == 10
+    assert share_supported(effect, 10) == pytest.approx(0.8, abs=0.01)
+    for side in (-1.001, 1.001):
+        assert spi.seeds_for_power(PILOT, side * effect) == 10
+    assert spi.seeds_for_power(PILOT, 1_000.0) == 10  # no verdict needs fewer
 
 
 def test_textbook_sample_sizes() -> None:
@@ -88,19 +66,13 @@ def test_textbook_sample_sizes() -> None:
     pilot = dataclasses.replace(PILOT, difference_sd=1.0, mean_denominator=1.0)
     pilot = dataclasses.replace(pilot, difference_sd=1.0 / planned_spread(pilot))
     assert spi.seeds_for_power(pilot, 0.5) == 34
-    assert spi.no_plan_because(pilot, 0.01) is None
     assert spi.seeds_for_power(pilot, 0.01) == pytest.approx(78_489, rel=1e-3)
-    unpaired = spi.robustness(P_O, rng.poisson(36, 8), n=25, m=2, paired=False)
-    # The same of samples that share no seeds, a little more for Student's t.
-    normal = 7.849 * (planned_spread(unpaired) / (0.15 * unpaired.mean_denominator)) ** 2
-    assert normal < (spi.seeds_for_power(unpaired, 0.15) or 0) < normal + 4
 
 
 @pytest.mark.parametrize(
     ("pilot", "effect", "reason"),
     [
         (PILOT, 0.0, "lies at the threshold"),
-        (dataclasses.replace(PILOT, threshold=0.05), 0.05, "lies at the threshold"),
         (PILOT, 1e-6, "more than 1,000,000 seeds"),
         (spi.robustness([39], [38], n=25, m=1), 0.1, "one seed"),
         (spi.robustness([39, 39], [38, 38], n=25, m=1), 0.1, "no spread"),
@@ -110,21 +82,15 @@ def test_textbook_sample_sizes() -> None:
 def test_no_number_comes_with_a_reason(pilot: spi.Estimate, effect: float, reason: str) -> None:
     assert spi.seeds_for_power(pilot, effect) is None
     assert spi.lower_decile_of_power(pilot, effect, 20) is None
-    assert pilot.difference_sd != 0.0 or spi.minimum_detectable_effect(pilot) is None
     assert reason in (spi.no_plan_because(pilot, effect) or "")
 
 
 def test_what_cannot_be_is_named() -> None:
-    for power in (0.0, 1.0, 0.02):
-        for call in (
-            lambda power: spi.seeds_for_power(PILOT, 0.1, power=power),
-            lambda power: spi.minimum_detectable_effect(PILOT, power=power),
-        ):
-            with pytest.raises(IndicatorError, match="power"):
-                call(power)
-    with pytest.raises(IndicatorError, match="effect = nan"):
+    with pytest.raises(spi.IndicatorError, match=r"power = 0\.02"):
+        spi.minimum_detectable_effect(PILOT, power=0.02)
+    with pytest.raises(spi.IndicatorError, match="effect = nan"):
         spi.seeds_for_power(PILOT, float("nan"))
-    with pytest.raises(IndicatorError, match="n_seeds = 1"):
+    with pytest.raises(spi.IndicatorError, match="n_seeds = 1"):
         spi.lower_decile_of_power(PILOT, 0.1, 1)
 
 
@@ -150,14 +116,10 @@ def test_a_plan_counts_what_stalls_may_hide() -> None:
     assert (spi.seeds_for_power(pilot, 0.08) or 0) > 2 * (spi.seeds_for_power(sure, 0.08) or 0)
     effect = spi.minimum_detectable_effect(pilot) or 0.0
     assert effect > (spi.minimum_detectable_effect(sure) or 0.0)
-    assert spi.seeds_for_power(pilot, effect * 1.001) == 100
-    # A loss of half is found by few seeds all the same.
-    assert spi.seeds_for_power(pilot, -0.5) == 10
+    assert spi.seeds_for_power(pilot, -0.5) == 10  # a loss of half needs few all the same
 
 
-@pytest.mark.parametrize(
-    ("model", "distance"), [("geometric", -0.1), ("0% stall", 0.1), ("overdispersed", -0.1)]
-)
+@pytest.mark.parametrize(("model", "distance"), [("geometric", -0.1), ("0% stall", 0.1)])
 def test_plans_from_large_pilots_have_the_promised_power(model: str, distance: float) -> None:
     # `python -m verification.verdict_errors` prints what small pilots promise in vain.
     _, power = planned_power(model, distance, 1_000, pilots=8)

@@ -1,3 +1,5 @@
+"""Intervals and tests of a ratio of means: against SciPy's, by resamples, and what has neither."""
+
 from __future__ import annotations
 
 import math
@@ -10,13 +12,7 @@ from hypothesis import strategies as st
 from scipy.stats import ttest_1samp, ttest_ind, ttest_rel
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.ratio import (
-    RESAMPLES,
-    critical_value,
-    paired_ratio,
-    resampled_pivots,
-    upper_p,
-)
+from swarm_logistics_env.spi.ratio import critical_value, paired_ratio, resampled_pivots
 from verification.verdict_errors import wrong_verdicts
 
 P_O = np.array([35.0, 41, 38, 29, 44, 36, 40])
@@ -29,14 +25,19 @@ RESIDUAL = TWELVE_F - TWELVE_F.mean() / TWELVE.mean() * TWELVE
 
 
 @pytest.mark.parametrize("confidence", [0.8, 0.95, 0.99])
-def test_t_test_at_the_limits_has_one_minus_confidence_as_p(confidence: float) -> None:
+def test_tests_at_the_limits_have_one_minus_confidence_as_p(confidence: float) -> None:
     test = paired_ratio(P_F - P_O, P_O, offset=0.08, confidence=confidence)
     for limit in (float(test.low), float(test.high)):
         d = (P_F - P_O) - (limit - 0.08) * P_O
         assert ttest_1samp(d, 0.0).pvalue == pytest.approx(1 - confidence, rel=1e-9)
+    found: Any = spi.relative_change(P_O, FEWER_F, confidence=confidence, paired=False)
+    assert found.low < found.value < found.high
+    for limit in (found.low, found.high):
+        p = ttest_ind(FEWER_F, P_O * (1 + limit), equal_var=False).pvalue
+        assert p == pytest.approx(1 - confidence, rel=1e-6)
 
 
-@pytest.mark.parametrize("threshold", [-0.3, -0.2, 0.0, 0.2, 1.0])
+@pytest.mark.parametrize("threshold", [-0.3, -0.2, 0.0, 1.0])
 def test_verdict_is_the_paired_t_test_or_welchs(threshold: float) -> None:
     r = spi.robustness(P_O, P_F, n=25, m=2, threshold=threshold)
     scaled = P_O * (1 + threshold - 2 / 25)
@@ -75,42 +76,26 @@ def test_verdict_and_interval_agree(pairs: list[tuple[int, int]], threshold: flo
         assert r.verdict == expected.get(by_interval, "inconclusive")
 
 
-def test_many_studies_at_once_are_the_studies_one_by_one() -> None:
-    rng = np.random.default_rng(3)
-    num, den = rng.normal(0, 5, (4, 6, 8)), rng.normal(40, 5, (4, 6, 8))
-    together = paired_ratio(num, den, offset=0.1, threshold=0.05)
-    assert together.low.shape == (4, 6)
-    alone = paired_ratio(num[2, 3], den[2, 3], offset=0.1, threshold=0.05)
-    for field in ("value", "low", "high", "p_value", "probability", "difference_sd"):
-        assert getattr(together, field)[2, 3] == pytest.approx(float(getattr(alone, field)))
-
-
-@pytest.mark.parametrize("paired", [True, False])
-@pytest.mark.parametrize("p_f", [30.0, 20.0, 24.0])
-def test_no_spread_is_no_evidence(paired: bool, p_f: float) -> None:
-    r = spi.robustness([25.0] * 5, [p_f] * 5, n=25, m=1, paired=paired)
-    assert r.value == pytest.approx(p_f / 25 - 1 + 1 / 25)
-    assert (r.low, r.high, r.difference_sd) == (None, None, 0.0)
-    assert (r.verdict, r.probability, r.p_value) == ("inconclusive", 0.5, 1.0)
-    assert r.flags == ("degenerate",)
-
-
 @pytest.mark.parametrize(
-    ("p_o", "p_f", "flags"),
+    ("p_o", "p_f", "asked", "flags"),
     [
+        ([25] * 5, [30] * 5, {}, ("degenerate",)),
+        ([25] * 5, [20] * 5, {"paired": False}, ("degenerate",)),
         # The only verdict under Holm of a study of the paper with two seeds came from this.
-        ([40, 40], [39, 39], ("too_few_seeds", "degenerate")),
+        ([40, 40], [39, 39], {}, ("too_few_seeds", "degenerate")),
         # A spread that is next to nothing: -3 twice, beside P_o of 40 and 41.
-        ([40, 41], [37, 38], ("too_few_seeds",)),
+        ([40, 41], [37, 38], {}, ("too_few_seeds",)),
         # P_F = 18/25 P_o in every seed: R = 0 up to rounding, not a hair above it with certainty.
-        ([25, 50, 75, 150], [18, 36, 54, 108], ("degenerate",)),
+        ([25, 50, 75, 150], [18, 36, 54, 108], {}, ("degenerate",)),
     ],
 )
-def test_two_seeds_and_rounding_errors_give_no_verdict(
-    p_o: list[float], p_f: list[float], flags: tuple[str, ...]
+def test_no_spread_two_seeds_and_rounding_errors_are_no_evidence(
+    p_o: list[float], p_f: list[float], asked: dict[str, Any], flags: tuple[str, ...]
 ) -> None:
-    r = spi.robustness(p_o, p_f, n=25, m=7)
-    assert (r.verdict, r.p_value, r.flags) == ("inconclusive", 1.0, flags)
+    r = spi.robustness(p_o, p_f, n=25, m=7, **asked)
+    assert (r.verdict, r.probability, r.p_value) == ("inconclusive", 0.5, 1.0)
+    assert r.flags == flags
+    assert ((r.low, r.high) == (None, None)) == ("degenerate" in flags)
 
 
 def test_unclear_denominator_gives_no_interval_but_a_verdict() -> None:
@@ -126,24 +111,12 @@ def test_unclear_denominator_gives_no_interval_but_a_verdict() -> None:
 
 def test_pivots_are_students_statistic_of_resampled_seeds() -> None:
     pivots = resampled_pivots(RESIDUAL)
-    assert pivots.shape == (RESAMPLES,)
-    assert (np.diff(pivots) >= 0).all()
-    np.random.seed(1)  # noqa: NPY002 - the global state must not matter
-    assert (resampled_pivots(RESIDUAL) == pivots).all()
     again = RESIDUAL[np.random.default_rng(0).integers(12, size=(20_000, 12))]
     by_hand = np.sqrt(12) * again.mean(axis=1) / again.std(axis=1, ddof=1)
-    for share in (0.025, 0.25, 0.5, 0.75, 0.975):
-        assert np.quantile(pivots, share) == pytest.approx(np.quantile(by_hand, share), abs=0.12)
+    shares = (0.025, 0.5, 0.975)
+    assert np.quantile(pivots, shares) == pytest.approx(np.quantile(by_hand, shares), abs=0.12)
     # All but one seed alike: a third of the resamples are flat, beyond any finite quantile.
     assert 0.3 < np.isneginf(resampled_pivots(np.array([-1.0] * 11 + [11.0]))).mean() < 0.4
-
-
-@pytest.mark.parametrize("alpha", [0.05, 0.0005, 0.3])
-def test_the_critical_value_is_the_largest_statistic_that_is_kept(alpha: float) -> None:
-    pivots = resampled_pivots(RESIDUAL)
-    critical = critical_value(pivots, alpha)
-    assert upper_p(pivots, critical) >= alpha / 2
-    assert upper_p(pivots, np.nextafter(critical, np.inf)) < alpha / 2
     assert critical_value(pivots, 1e-6) == math.inf  # beyond its resamples nothing is rejected
 
 
@@ -164,29 +137,9 @@ def test_the_two_sides_mirror_each_other() -> None:
     assert [float(one.low), float(one.high)] == pytest.approx([-other.high, -other.low])
 
 
-@pytest.mark.parametrize("seeds", [slice(5), slice(None)])
-def test_welchs_test_at_the_limits_has_p_05(seeds: slice) -> None:
-    found: Any = spi.scalability(P_O, P_F[seeds], n=10, m=4, paired=False)
-    assert found.low < found.value < found.high
-    for limit in (found.low, found.high):
-        p = ttest_ind(P_F[seeds], P_O * (1 + limit / 2.5), equal_var=False).pvalue
-        assert p == pytest.approx(0.05, rel=1e-6)
-
-
 @pytest.mark.parametrize(("n", "most"), [(10, 0.06), (20, 0.05), (30, 0.045)])
 @pytest.mark.parametrize("model", ["poisson", "overdispersed", "geometric"])
 def test_wrong_verdicts_are_bounded_on_either_side(model: str, n: int, most: float) -> None:
     wrong = wrong_verdicts(model, [n], 1_500, only_seen=True)
     assert max(wrong.above, wrong.below) <= most
     assert wrong.share > 0.02
-
-
-def test_a_single_run_or_one_constant_sample_without_pairs() -> None:
-    r: Any = spi.robustness([39.0], FEWER_F, n=25, m=2, paired=False)
-    assert r.flags == ("single_seed",)
-    assert r.value == pytest.approx(FEWER_F.mean() / 39 - 1 + 0.08)
-    r = spi.robustness(P_O, [0.0] * 5, n=25, m=1, paired=False)
-    assert r.low == r.high == pytest.approx(-1 + 1 / 25)  # nothing delivered, whatever P_o
-    assert r.verdict == "refuted"
-    r = spi.robustness([40.0] * 5, FEWER_F, n=25, m=1, paired=False)
-    assert r.low < r.high

@@ -1,8 +1,9 @@
-"""Results of studies whose outcomes are made up, so that the answer is known."""
+"""Results of studies whose outcomes are made up, so that the answer is known; and exports."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,14 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT, Setting
 from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.verdict import Verdict
+from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.tasks.task import Outcome
 
-# The specification of the statistics prints these to three decimals.
-GOLDEN = {
-    "S": [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135],
-    "FT": [0.051, 0.077, -0.026, 0.026, 0.154, -0.026, 0.026, 0.154, 0.103, 0.0, -0.513, -0.615],
-    "R": [0.091, 0.054, 0.017, 0.066, 0.131, 0.017, 0.066, 0.131, 0.146, 0.040, -0.535, -0.572],
-    "A": [0.872, 0.723, 0.723, 0.610, 0.268, 0.187, -0.773],
-}
+
+def digest(directory: Path, to: Path) -> str:
+    """The digest of a study's exported rows."""
+    with Runs.existing(directory) as runs:
+        return export(runs, to / "rows.csv")[1]
 
 
 def delivered(count: float, **fields: Any) -> Outcome:
@@ -66,12 +65,3 @@ def paper(
         return delivered(max(0, count), all_delivered=setting == full and seed == 0, digest=digest)
 
     return judged(Study.preset("paper", seeds=seeds, **fields), play)
-
-
-def by_question(results: StudyResults) -> dict[tuple[str, str, float], Verdict]:
-    """The verdicts of a study's first policy by indicator, comparison and threshold."""
-    return {
-        (v.compared.indicator, v.compared.label, v.compared.threshold): v
-        for v in results.verdicts
-        if v.compared.policy == results.policies[0]
-    }

@@ -20,18 +20,12 @@ from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.studies.play import engine_named
-from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.tasks.task import Case
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, code_version
 from tests.conftest import SMALL
+from tests.studies.made_up import digest
 
 has_ray = importlib.util.find_spec("ray") is not None
-
-
-def digest(directory: Path, to: Path) -> str:
-    with Runs.existing(directory) as runs:
-        return export(runs, to / "rows.csv")[1]
 
 
 def test_two_processes(played: Path, tmp_path: Path) -> None:
@@ -69,25 +63,19 @@ def test_ray_with_two_local_nodes(played: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_ray_that_is_missing_or_a_cluster_that_is_not_there_is_named() -> None:
-    words = "no Ray cluster at auto" if has_ray else r"\.\[ray\]"
-    with pytest.raises(StudyError, match=words):
-        Study(**SMALL).run("ray", address="auto")
-
-
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("engine", "fields", "words"),
     [
-        (("proces",), "did you mean 'process'?"),
-        (("local", 2), "is one process, not 2"),
-        (("process", 2, "auto"), "only ray has an address"),
-        (("ray", 2, "auto"), "its own number of cores"),
+        ("proces", {}, r"did you mean 'process'\?"),
+        ("local", {"processes": 2}, "is one process, not 2"),
+        ("process", {"address": "auto"}, "only ray has an address"),
+        ("ray", {"address": "auto", "processes": 2}, "its own number of cores"),
+        ("ray", {"address": "auto"}, "no Ray cluster at auto" if has_ray else r"\.\[ray\]"),
     ],
 )
-def test_no_such_engine(arguments: Any, words: str) -> None:
-    with pytest.raises(StudyError) as caught:
-        engine_named(*arguments)
-    assert words in str(caught.value)
+def test_an_engine_that_cannot_be_is_refused(engine: str, fields: Any, words: str) -> None:
+    with pytest.raises(StudyError, match=words):
+        Study(**SMALL).run(engine, **fields)
 
 
 class Remembering(SwarmDT):
@@ -107,12 +95,11 @@ def test_other_behaviour_meets_the_same_worlds_and_nothing_is_remembered() -> No
     scenario = Scenario(n_robots=3, n_items=5, warehouse_width=3, warehouse_height=3, duration=10)
     same = Case(PolicySpec.of(Remembering()), "identity", scenario, task=WAREHOUSE)
     other = replace(same, behaviour=1)
-    Remembering.seeds.clear()
     played = [(seed, one) for seed in (0, 1) for one in (same, other, same)]
     outcomes = [one.run(code_version(), seed).play() for seed, one in played]
     assert {outcome.error for outcome in outcomes} == {None}
     assert outcomes[0].digest == outcomes[2].digest != outcomes[1].digest
-    first, other_first, again, second, other_second, _ = Remembering.seeds
+    first, other_first, again, second, other_second, _ = Remembering.seeds[-6:]
     assert (first, again, second) == (0, 0, 1)
     assert len({first, second, other_first, other_second}) == 4
     stale = same.run("0" * 16, 0).play()
@@ -128,12 +115,8 @@ def test_workers_end_with_a_parent_that_is_killed() -> None:
         "        print(len({pool.submit(os.getpid).result() for _ in range(20)}), flush=True)\n"
         "        os.kill(os.getpid(), signal.SIGKILL)\n"
     )
-    killed = subprocess.Popen(
-        [sys.executable, "-c", script],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    killed = subprocess.Popen([sys.executable, "-c", script], start_new_session=True, **pipes)
     try:
         # Its workers write there as well, so that it ends only once they have ended.
         said, _ = killed.communicate(timeout=30)

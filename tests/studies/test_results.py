@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -13,20 +12,16 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.declaration import Declaration
 from swarm_logistics_env.studies.measures import agreements
-from swarm_logistics_env.studies.results import (
-    CELL_COLUMNS,
-    VERDICT_COLUMNS,
-    StudyResults,
-    frame,
-    judge,
-)
-from swarm_logistics_env.studies.verdict import Cell
+from swarm_logistics_env.studies.results import CELL_COLUMNS, StudyResults, frame, judge
+from swarm_logistics_env.studies.verdict import Verdict
 from swarm_logistics_env.tasks.task import Outcome
-from tests.studies.made_up import by_question, judged, paper, published
+from tests.studies.made_up import judged, paper, published
 
 
-def words(cells: Iterable[Cell]) -> set[str]:
-    return {cell.words for cell in cells}
+def by_question(results: StudyResults) -> dict[tuple[str, str, float], Verdict]:
+    """The verdicts by indicator, comparison and threshold."""
+    compared = {verdict: verdict.compared for verdict in results.verdicts}
+    return {(c.indicator, c.label, c.threshold): verdict for verdict, c in compared.items()}
 
 
 @pytest.fixture(scope="module")
@@ -38,17 +33,13 @@ def test_misses_lie_outside_the_interval_of_one_run(found: StudyResults) -> None
     (own,) = agreements(found)
     assert len(own.cells) == 33
     # Three cells share the base run with 39 under other published values: 41 twice missing.
-    assert words(own.misses) <= {"warehouse_width = 10"}
+    assert {cell.words for cell in own.misses} <= {"warehouse_width = 10"}
     assert (own.mean_log_error or 1.0) < 0.03
     assert len(own.met) > 25
     (more,) = agreements(paper(lambda *where: published(*where) + 2.0))
-    assert len(more.cells) - len(more.misses) > 20
     assert len(more.met) < 5
     logs = [abs(math.log(c.by_seed.mean() / (c.published or 0.0))) for c in more.cells]
     assert more.mean_log_error == pytest.approx(np.mean(logs))
-    (none,) = agreements(paper(lambda _, at: -100.0 if at.kind == "size" else published(_, at)))
-    assert none.mean_log_error is None  # of a mean of 0
-    assert {"N = 20", "N = 30"} <= words(none.misses)
 
 
 @pytest.mark.parametrize(
@@ -58,8 +49,6 @@ def test_misses_lie_outside_the_interval_of_one_run(found: StudyResults) -> None
         # Claimed: not scalable. P falls by 7 %, less than stalls that ten seeds may hide.
         (("S", "N 100 -> 150", 0.0), "inconclusive"),
         (("S", "N 10 -> 20", 1.0), "supported"),  # claimed: not superlinear
-        (("S", "N 5 -> 10", 0.0), "supported"),
-        (("FT", "FM2, m = 2", 0.0), "supported"),
     ],
 )
 def test_claims_are_judged_in_their_own_direction(
@@ -86,19 +75,16 @@ def test_ablation_that_falls_is_supported() -> None:
     found = paper(lambda _, at: 30.0 if at.name == "random-walk" else published(_, at))
     changes = [test for test in found.verdicts if test.compared.indicator == "change"]
     # At N = 25: 39 -> 30; at N = 100: 74 -> 30, beyond a third.
-    assert [test.claim_verdict_holm for test in changes] == ["supported", "supported"]
-    assert [test.answer for test in changes] == ["supported", "supported"]
-    assert {test.plain for test in changes} == {"refuted"}
+    said = [(test.claim_verdict_holm, test.answer, test.plain) for test in changes]
+    assert said == [("supported", "supported", "refuted")] * 2
 
 
 def test_a_fault_without_harm_is_equivalent_where_its_threshold_is_open() -> None:
     tests = by_question(paper(seeds=100))
     # FM2, m = 1: P_F is 40 and P_S 39 of 39 items.
-    small = tests["FT", "FM2, m = 1", 0.0]
-    assert small.unchanged == "P_F within 10 % of P_o from P_S"
-    assert small.equivalence is not None
-    assert small.equivalence.verdict == small.equivalence_holm == "equivalent"
-    assert small.equivalence.change.value == small.value
+    small = tests["FT", "FM2, m = 1", 0.0].equivalence
+    assert small is not None
+    assert small.verdict == tests["FT", "FM2, m = 1", 0.0].equivalence_holm == "equivalent"
     assert tests["R", "FM4, m = 3", 0.0].equivalence_holm == "refuted"
     unchanged = 0
     for test in tests.values():
@@ -113,10 +99,8 @@ def test_a_fault_without_harm_is_equivalent_where_its_threshold_is_open() -> Non
 
 def test_a_margin_that_was_not_declared_is_exploratory(found: StudyResults) -> None:
     late = judge(found.plan, found.outcomes, Declaration(first_seed=0, seeds=10, margin=0.2))
-    assert (late.late_margin, late.exploratory) == (True, False)
-    for one in (late, found):
-        told = any("margin of equivalence are exploratory" in text for text in warnings(one))
-        assert told == one.late_margin
+    assert (late.late_margin, late.exploratory, found.late_margin) == (True, False, False)
+    assert any("margin of equivalence are exploratory" in text for text in warnings(late))
 
 
 def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
@@ -152,19 +136,14 @@ def test_two_seeds_and_a_cap_everywhere_give_no_verdict() -> None:
         return Outcome(delivery_times=np.arange(60.0), all_delivered=True, digest=digest)
 
     for found in (paper(seeds=2), judged(Study.preset("paper", seeds=10), capped)):
-        assert {test.plain for test in found.verdicts} == {"inconclusive"}
-        assert {test.holm for test in found.verdicts} == {"inconclusive"}
+        for test in found.verdicts:
+            assert (test.plain, test.holm) == ("inconclusive", "inconclusive")
 
 
 def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     found = judge(Study.preset("paper", seeds=2).plan(), {})
     assert {cell.problem for cell in found.cells} == {"2 of 2 runs missing"}
-    cells, tests = frame(found.cells, CELL_COLUMNS), frame(found.verdicts, VERDICT_COLUMNS)
-    for table, columns in ((cells, CELL_COLUMNS), (tests, VERDICT_COLUMNS)):
-        assert list(table) == list(columns)
-        numbers = {name for name in columns if table[name].dtype == np.dtype(float)}
-        assert numbers == {name for name, (kind, *_) in columns.items() if kind is float}
-    assert cells["mean"].isna().all()
-    assert tests["value"].isna().all()
-    assert tests["published"].notna().any()
-    assert set(tests["verdict"]) == {None}
+    means = frame(found.cells, CELL_COLUMNS)["mean"]
+    assert means.isna().all()
+    assert means.dtype == np.dtype(float)
+    assert {(test.value, test.plain) for test in found.verdicts} == {(None, None)}

@@ -1,4 +1,4 @@
-"""A tiny parallel environment for the tests: robots walk along a lane and deliver at its end."""
+"""A tiny parallel environment for the tests."""
 
 from __future__ import annotations
 
@@ -73,12 +73,5 @@ class Walker:
 
 
 FAILURES = {"silent": STAY, "frozen": None, "blind": None, "noisy": 0.5, "removed": "without"}
-LANE = ParallelTask(
-    Lane,
-    name="lane",
-    n_robots=4,
-    steps=40,
-    parameters={"length": 6},
-    failures=FAILURES,
-    policies={"walker": Walker},
-)
+OF_LANE: dict[str, Any] = {"name": "lane", "failures": FAILURES, "policies": {"walker": Walker}}
+LANE = ParallelTask(Lane, n_robots=4, steps=40, parameters={"length": 6}, **OF_LANE)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import runpy
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.spaces import Box, Discrete, Tuple
 
-from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.parallel_policies import observation_rows
 from swarm_logistics_env.tasks.task import task_of
@@ -46,40 +42,3 @@ def test_its_own_policy_beats_chance_and_robots_that_stay_start_where_they_would
         starts.append(observation_rows(env, list(env.possible_agents), observations)[:, place])
         env.close()
     assert np.array_equal(starts[0][[1, 3]], starts[1])
-
-
-class Pair(gymnasium.Env[Any, Any]):
-    """Two agents whose actions are observed and paid; it ends after two steps."""
-
-    observation_space = Tuple([Box(0, 9, (1,), np.float32)] * 2)
-    action_space = Tuple([Discrete(2)] * 2)
-    shared = False
-
-    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, Any]:
-        self.steps = 0
-        return self._seen((0, 0)), {"agent_0": {"own": 0}, "agent_1": {"own": 1}}
-
-    def step(self, actions: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        self.steps += 1
-        rewards: Any = 1.5 if self.shared else list(actions)
-        return self._seen(actions), rewards, False, self.steps == 2, {"all": self.steps}
-
-    def _seen(self, actions: Any) -> tuple[Any, ...]:
-        return tuple(np.array([action], dtype=np.float32) for action in actions)
-
-
-def test_an_environment_of_tuples_becomes_a_parallel_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    tuple_env = runpy.run_path(str(STUDIES / "tuple_env.py"))["TupleEnv"]
-    env = tuple_env(Pair())
-    observations, infos = env.reset(seed=0)
-    assert infos == {"agent_0": {"own": 0}, "agent_1": {"own": 1}}
-    observations, rewards, _, _, infos = env.step({"agent_1": 1, "agent_0": 0})
-    assert [value.tolist() for value in observations.values()] == [[0.0], [1.0]]
-    assert rewards == {"agent_0": 0.0, "agent_1": 1.0}
-    assert infos == {"agent_0": {"all": 1}, "agent_1": {"all": 1}}
-    monkeypatch.setattr(Pair, "shared", True)
-    _, rewards, _, truncated, _ = env.step(dict.fromkeys(env.agents, 0))
-    assert (set(rewards.values()), all(truncated.values()), env.agents) == ({1.5}, True, [])
-    monkeypatch.setattr(Pair, "action_space", Discrete(2))
-    with pytest.raises(SetupError, match=r"space Discrete\(2\) should be a Tuple"):
-        tuple_env(Pair())

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 import doctest
 import importlib
 import warnings
 from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,28 +102,13 @@ def test_structures_are_blinded_and_whole_numbers_bear_no_noise() -> None:
         noisy.reset(seed=0)
 
 
-def test_seeds_are_counted() -> None:
-    faults = [RobotFault(mode="silent", robots=2)]
-    one, two = (FailingRobots(Lane(3), faults, FAILURES) for _ in range(2))
-    one.reset(seed=0)
-    two.reset(seed=1)
-    one.reset()
-    assert one._failing == two._failing
-
-
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ({"mode": "removed"}, "should be one of blind, frozen, noisy, silent"),
-        ({"mode": "lost"}, "fault mode 'lost'"),
-        ({"mode": "blind", "robots": 4}, "4 robots fail of 3"),
-        ({"mode": "blind", "robots": 0}, "RobotFault.robots = 0"),
-        ({"mode": "blind", "onset": -1.0}, "RobotFault.onset = -1.0"),
-    ],
-)
-def test_faults_that_cannot_be(fault: dict[str, Any], words: str) -> None:
-    with pytest.raises(FaultError, match=words):
-        FailingRobots(Lane(3), [RobotFault(**{"robots": 1, **fault})], FAILURES)
+def test_faults_that_cannot_be() -> None:
+    with pytest.raises(FaultError, match=r"RobotFault\.onset = -1\.0"):
+        RobotFault(mode="blind", robots=1, onset=-1.0)
+    with pytest.raises(FaultError, match="should be one of blind, frozen, noisy, silent"):
+        FailingRobots(Lane(3), [RobotFault(mode="removed", robots=1)], FAILURES)
+    with pytest.raises(FaultError, match="4 robots fail of 3"):
+        FailingRobots(Lane(3), [RobotFault(mode="blind", robots=4)], FAILURES)
 
 
 # Environments that are not ours: continuous actions, numbers as actions, agents that die.
@@ -148,43 +131,14 @@ def make_theirs(request: pytest.FixtureRequest) -> Iterator[Any]:
         yield lambda n: module.parallel_env(**fields, **{size: n})
 
 
-@pytest.mark.parametrize("stacked", [False, True])
-def test_each_passes_pettingzoos_test_on_environments_that_are_not_ours(
-    make_theirs: Any, stacked: bool
-) -> None:
+def test_each_passes_pettingzoos_test_on_environments_that_are_not_ours(make_theirs: Any) -> None:
     test = importlib.import_module("pettingzoo.test").parallel_api_test
     idle = make_theirs(3).action_space(make_theirs(3).possible_agents[0]).sample()
     faults = [RobotFault(mode=mode, robots=1, onset=3.0) for mode in ("silent", "blind")]
     failures = {"silent": idle, "blind": None}
-    if stacked:
-        changing = ChangingAgents(make_theirs, [2, 3])
+    for changing in (make_theirs(3), ChangingAgents(make_theirs, [2, 3])):
         test(PaddedAgents(FailingRobots(changing, faults, failures)), num_cycles=100)
-        return
-    test(PaddedAgents(make_theirs(3)), num_cycles=100)
-    test(ChangingAgents(make_theirs, [2, 3]), num_cycles=100)
     test(FailingRobots(make_theirs(3), faults, failures), num_cycles=100)
-
-
-def test_their_failing_agents_act_and_observe_as_their_failures_say(make_theirs: Any) -> None:
-    env, given = make_theirs(3), list[Any]()
-    step = env.step
-
-    def watched(actions: dict[str, Any]) -> Any:
-        given.append(actions)
-        return step(actions)
-
-    env.step = watched
-    space = env.action_space(env.possible_agents[0])
-    idle, wanted = space.sample(), space.sample()
-    faults = [RobotFault(mode=mode, robots=1) for mode in ("silent", "blind")]
-    broken = FailingRobots(env, faults, {"silent": idle, "blind": None})
-    seen, _ = broken.reset(seed=0)
-    agents = list(broken.agents)
-    broken.step(dict.fromkeys(agents, wanted))
-    (row,) = failing_rows(0, len(agents), 1)
-    for place, agent in enumerate(agents):
-        assert given[0][agent] is (idle if place == row else wanted)
-    assert not seen[agents[row]].any()
 
 
 class Leaving(Lane):
@@ -208,11 +162,10 @@ class Leaving(Lane):
 def test_agents_are_padded_and_masked_until_all_end_together() -> None:
     env = PaddedAgents(Leaving(3))
     agents = env.possible_agents
-    seen, infos = env.reset(seed=0)
+    _, infos = env.reset(seed=0)
     assert [infos[agent]["active"] for agent in agents] == [1, 1, 1]
     masks, paid, ends = [], [], []
     while env.agents:
-        assert env.agents == agents
         seen, rewards, *over, infos = env.step(dict.fromkeys(agents, WALK))
         masks.append([infos[agent].pop("active") for agent in agents])
         assert [bool(seen[agent].any()) for agent in agents] == [bool(m) for m in masks[-1]]
@@ -232,30 +185,16 @@ def test_the_number_of_agents_is_drawn_for_each_episode() -> None:
     assert set(sizes) == {2, 5}
     assert 30 < sizes.count(2) < 50
     again.reset(seed=59)
-    following = [[each.reset()[0] for _ in range(5)] for each in (env, again)]
-    for one, other in zip(*following):
+    for one, other in [[each.reset()[0] for each in (env, again)] for _ in range(5)]:
         assert {a: v.tolist() for a, v in one.items()} == {a: v.tolist() for a, v in other.items()}
-    for seed in range(3):
-        observations, infos = PaddedAgents(env).reset(seed=seed)
-        assert (len(observations), sum(i["active"] for i in infos.values())) == (5, sizes[seed])
-
-
-def test_sizes_that_cannot_be() -> None:
     with pytest.raises(SetupError, match="should be one number of agents or more"):
         ChangingAgents(Lane, [])
     with pytest.raises(SetupError, match=r"make_env\(1\) has robot_0: should be"):
         ChangingAgents(lambda n: Nested(n) if n == 1 else Lane(n), [1, 2])
 
 
-def test_examples_run_and_nothing_of_the_world_is_imported() -> None:
+def test_examples_run() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # theirs
         pytest.importorskip("pettingzoo.sisl.pursuit_v5")
         assert doctest.testmod(parallel_wrappers).failed == 0
-    tree = ast.parse(Path(parallel_wrappers.__file__).read_text(encoding="utf-8"))
-    froms = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
-    assert not any(node.level for node in froms)
-    ours = {node.module for node in froms if str(node.module).startswith("swarm_logistics_env")}
-    assert ours == {
-        "swarm_logistics_env", "swarm_logistics_env.errors", "swarm_logistics_env.records"
-    }  # fmt: skip

@@ -1,4 +1,4 @@
-"""A study plays whatever keeps the protocol of a task, the warehouse being one."""
+"""A study plays whatever keeps the protocol of a task, by policies with parameters of their own."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ import math
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import swarm_logistics_env
-from swarm_logistics_env import Scenario
+from swarm_logistics_env import Scenario, policies
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import ScenarioError, StudyError
-from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.policies.policy import modules_used, without_prose
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Case
@@ -23,12 +22,6 @@ from swarm_logistics_env.warehouse import Warehouse
 from tests.tasks.lane import LANE
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
-
-
-def test_cases_of_other_tasks_are_other_cases() -> None:
-    policy = PolicySpec(name="x")
-    own, other = (Case(policy, "x", Scenario(), task=t) for t in (WAREHOUSE, LANE))
-    assert own.key != other.key
 
 
 def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_path: Path) -> None:
@@ -46,9 +39,9 @@ def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_p
     assert Study.stored(out, task=LANE).finished() == (4, 4)
 
 
-def test_the_warehouse_is_varied_by_its_numbers_and_presets() -> None:
-    assert {"n_robots", "restock", "delivery_width"} & {*WAREHOUSE.fields} == {"delivery_width"}
-    assert WAREHOUSE.removed in WAREHOUSE.failure_modes
+def test_the_warehouse_is_varied_by_presets_and_its_cases_are_its_own() -> None:
+    own, other = (Case(PolicySpec(name="x"), "x", Scenario(), task=t) for t in (WAREHOUSE, LANE))
+    assert own.key != other.key
     assert WAREHOUSE.vary(Scenario(), {"preset": "dots"}) == Scenario.preset("dots")
     with pytest.raises(ScenarioError, match="no scenario preset"):
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
@@ -56,10 +49,8 @@ def test_the_warehouse_is_varied_by_its_numbers_and_presets() -> None:
 
 def test_prose_does_not_count() -> None:
     bare = "def f(x: int) -> int:\n    return x  # kept\nclass A:\n    b = '''text\n# inside'''\n"
-    told = (
-        '"""Module."""\n\n# why\ndef f(x: int) -> int:\n    """Tell.\n\n    More.\n    """\n\n'
-        "    return x  # kept\nclass A:\n    # note\n    b = '''text\n# inside'''\n"
-    )
+    told = bare.replace("int:\n", 'int:\n    """Tell.\n\n    More.\n    """\n\n')
+    told = '"""Module."""\n\n# why\n' + told.replace("A:\n", "A:\n    # note\n")
     assert without_prose(told) == without_prose(bare)
     assert without_prose(bare.replace("x  #", "x + 1  #")) != without_prose(bare)
 
@@ -85,24 +76,69 @@ def test_covers_all_that_an_episode_loads() -> None:
     assert {"warehouse/physics.py", "policies/policy.py", "kernels.py"} <= covered <= loaded
 
 
-def test_clearing_is_a_rate_that_no_number_of_items_caps(tmp_path: Path) -> None:
+def test_clearing_is_a_rate_that_no_number_of_items_caps() -> None:
     small = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0, "n_items": 6}
     size = {"sizes": [{"values": [2, 4]}], "policies": ["homing"], "seeds": 3}
-    study = Study(out=tmp_path, task="clearing", scenario={**small, "n_robots": 4}, **size)
-    assert study.run(processes=1).failed == 0
+    study = Study(out=None, task="clearing", scenario={**small, "n_robots": 4}, **size)
+    assert study.run().failed == 0
     for cell in study.findings().cells:
         assert not cell.saturated
         for p, outcome in zip(cell.by_seed, cell.outcomes):
-            assert (outcome.all_delivered, len(outcome.delivery_times)) == (True, 6)
-            assert outcome.time_to_clear == outcome.ended_at
-            assert outcome.ended_at == pytest.approx(outcome.delivery_times[-1])
+            assert len(outcome.delivery_times) == 6
+            assert outcome.time_to_clear == pytest.approx(outcome.delivery_times[-1])
             assert p == pytest.approx(60.0 * 6 / outcome.ended_at)
     # A run that is not done in time has the rate until then, and no time.
     short = Study(out=None, task="clearing", scenario={**small, "duration": 1.0}, **size)
-    case = short.plan().cases[0]
-    outcome = case.task.play(case, 0, 0)
+    outcome = short.plan().runs[0].play()
     assert (outcome.time_to_clear, outcome.delivered) == (math.inf, 0.0)
     with pytest.raises(StudyError, match="restock = True: should be False"):
         Study(task="clearing", scenario={"restock": True})
-    preset: Any = Study(task="clearing", scenario={"preset": "paper"}).specification.scenario
-    assert preset.duration > 500
+
+
+FILE = """
+seeds = 1
+scenario = { n_robots = 3, n_items = 4, warehouse_width = 3, warehouse_height = 3, duration = 2 }
+sizes = [{ values = [2, 3] }]
+policies = [
+    "swarm-dt",
+    { name = "swarm-dt", parameters = { taxis_gain = 0.5, diffusion = 0.7 } },
+    { name = "swarm-dt", parameters = { taxis_gain = 0.25 }, label = "half-hearted" },
+]
+"""
+
+
+def test_parameters_of_a_policy_are_part_of_what_a_run_is_and_are_kept(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(FILE)
+    study = Study.from_file(tmp_path / "mine.toml", out=tmp_path / "out")
+    plan = study.plan()
+    played = {case.policy.title: case.identity for case in plan.cases}
+    parameters = "swarm-dt (taxis_gain = 0.5, diffusion = 0.7)"
+    assert list(played) == ["swarm-dt", parameters, "half-hearted"]
+    assert len({*played.values()}) == 3
+    assert study.run().failed == 0
+    again = Study.stored(tmp_path / "out")
+    assert again.specification == study.specification
+    assert again.plan().cases == plan.cases
+
+
+class Silent(SwarmDT):
+    """A policy that tells nobody its parameters."""
+
+    def __init__(self, speed: float = 0.0) -> None:
+        super().__init__()
+        self.speed = speed
+
+
+def test_parameters_reach_the_policy_and_count_where_it_does_not_tell_them(tmp_path: Path) -> None:
+    chosen = PolicySpec(name="swarm-dt", parameters={"taxis_gain": 0.0})
+    # Swarm D-T without its taxis is the random walk.
+    assert policies.identity(chosen.load()) == PolicySpec.of("random-walk").identity()
+    tables = [{"name": f"{__name__}:Silent", "parameters": {"speed": s}} for s in (0.1, 0.2)]
+    one, other = map(PolicySpec.of, tables)
+    assert one.identity() != other.identity()
+    # A file may not name code by way of parameters.
+    table = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
+    (tmp_path / "mine.toml").write_text(FILE.replace('"swarm-dt",', f"{table},", 1))
+    with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
+        Study.from_file(tmp_path / "mine.toml")
+    assert Study.from_file(tmp_path / "mine.toml", trust_code=True).plan().cases

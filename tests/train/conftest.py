@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -35,28 +34,3 @@ def small() -> Any:
         return Training(**{**given, **fields})
 
     return made
-
-
-@pytest.fixture
-def stopped_after(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, Callable[[], Any]], None]:
-    """Return what stops a training as Ctrl-C does, right after so many of its checkpoints."""
-    # Where torch is not installed the tests of a training are skipped before this is asked for.
-    from swarm_logistics_env.train import trainer
-    from swarm_logistics_env.train.learner import save_checkpoint
-
-    def stop(checkpoints: int, begin: Callable[[], Any]) -> None:
-        saved: list[Any] = []
-
-        def save_and_stop(*given: Any) -> None:
-            save_checkpoint(*given)
-            saved.append(given)
-            if len(saved) == checkpoints:
-                raise KeyboardInterrupt
-
-        with monkeypatch.context() as changed:
-            changed.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
-            changed.setattr(trainer, "save_checkpoint", save_and_stop)
-            with pytest.raises(KeyboardInterrupt):
-                begin()
-
-    return stop

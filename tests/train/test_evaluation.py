@@ -60,7 +60,7 @@ def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPat
 def test_the_best_evaluation_is_the_highest_and_the_curve_is_written(tmp_path: Path) -> None:
     rows = [(0, 1.0), (500, 40.0), (1000, 90.0), (1500, 80.0)]
     log = TrainingLog(
-        [{"agent_steps": steps, "seconds": 2.0 * steps, "P": p} for steps, p in rows],
+        [{"agent_steps": steps, "P": p} for steps, p in rows],
         {"swarm-dt": {"P": 37.0}, "homing": {"P": 146.0}},
     )
     told = log.sentence({"P": 49.5, "R_FM4": 0.25})

@@ -149,15 +149,15 @@ def play(case: Case, last: int) -> list[int]:
 
 def check_able(world: Warehouse, faults: Faults, before: WarehouseState) -> list[dict[str, Any]]:
     expected, state = faults.expected(world, before), world.state
-    for robot, able in enumerate(expected):
-        for name, value in able.items():
-            if name == "modes":
-                assert state.failure_modes[robot] == value
-            elif name == "present":
-                assert state.robot_present[robot] == value
-            else:
-                assert getattr(state.able, name)[robot] == pytest.approx(value), (robot, name)
-    assert state.failed.tolist() == [bool(able["modes"]) for able in expected]
+    for name in expected[0]:
+        wanted = [able[name] for able in expected]
+        if name == "modes":
+            assert list(state.failure_modes) == wanted
+            assert state.failed.tolist() == list(map(bool, wanted))
+        elif name == "present":
+            assert state.robot_present.tolist() == wanted
+        else:
+            assert getattr(state.able, name).tolist() == pytest.approx(wanted), name
     assert world.n_removed == sum(not able["present"] for able in expected)
     return expected
 

@@ -6,13 +6,7 @@ import ast
 
 import pytest
 
-from verification.mutants.mutation import (
-    PACKAGE,
-    ROOT,
-    Mutant,
-    mutated,
-    read_mutants,
-)
+from verification.mutants.mutation import PACKAGE, ROOT, Mutant, mutated, read_mutants
 
 
 @pytest.mark.parametrize("mutant", read_mutants(), ids=lambda mutant: mutant.name)

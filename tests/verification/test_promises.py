@@ -1,4 +1,4 @@
-"""The page of promises names tests that exist, run, and can fail."""
+"""The page of promises names tests that exist and are not left out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 import verification
 
 ROOT = Path(verification.__file__).parents[1]
-PAGE = ROOT / "docs" / "promises.md"
+PAGE = ROOT / "tests" / "README.md"
 NAMED = sorted(set(re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", PAGE.read_text(encoding="utf-8"))))
 
 
@@ -22,25 +22,6 @@ def test_the_test_that_holds_a_promise_exists(file: str, name: str) -> None:
     assert name in functions
     marks = [ast.unparse(mark) for mark in functions[name].decorator_list]
     assert not [mark for mark in marks if re.match(r"pytest\.mark\.(skip\b|xfail)", mark)]
-    assert can_fail(functions[name], functions), f"{file}::{name} checks nothing"
-
-
-# Functions of other modules that raise where a promise is broken.
-CHECKS = re.compile(r"raises|assert|warns|check|complain|_test$|^play$")
-
-
-def can_fail(test: ast.AST, others: dict[str, ast.FunctionDef], depth: int = 3) -> bool:
-    """Return whether a function, or one of its module that it calls, asserts something."""
-    for node in ast.walk(test):
-        if isinstance(node, ast.Assert):
-            return True
-        if isinstance(node, ast.Call):
-            name = ast.unparse(node.func).split(".")[-1]
-            if CHECKS.search(name):
-                return True
-            if depth and name in others and can_fail(others[name], others, depth - 1):
-                return True
-    return False
 
 
 def test_every_promise_names_a_test() -> None:

@@ -1,32 +1,20 @@
-"""The browser that tests drive, and a server in a thread."""
+"""A server in a thread."""
 
 from __future__ import annotations
 
 import asyncio
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.server import LOOPBACK, WatchServer
-from verification.browser import Browser
 
 SMALL = Scenario(
     n_robots=6, n_items=8, n_obstacles=1, duration=60.0, warehouse_width=5, warehouse_height=5
 )
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    try:
-        one = Browser(tmp_path / "profile", (1280, 860))
-    except FileNotFoundError as error:
-        pytest.skip(str(error))
-    yield one
-    one.close()
 
 
 class Served:
@@ -55,14 +43,6 @@ class Served:
 
 @pytest.fixture
 def served() -> Iterator[Served]:
-    one = Served()
-    yield one
-    one.stop()
-
-
-@pytest.fixture(scope="module")
-def asked() -> Iterator[Served]:
-    """One server for all tests that change nothing of its session."""
     one = Served()
     yield one
     one.stop()

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pytest
 
 from swarm_logistics_env import Fault
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.messages import recorded_page
 from tests.watch.conftest import SMALL, Served
+from verification.browser import Browser
 
-if TYPE_CHECKING:
-    from verification.browser import Browser
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    try:
+        one = Browser(tmp_path / "profile", (1280, 860))
+    except FileNotFoundError as error:
+        pytest.skip(str(error))
+    yield one
+    one.close()
+
 
 AT = """(() => {{
 const canvas = element('arena0'), box = canvas.getBoundingClientRect();
@@ -57,7 +68,7 @@ def test_page_finds_the_server_again(browser: Browser) -> None:
 
 
 def test_recording_plays_from_a_file(browser: Browser, tmp_path: Path) -> None:
-    session = Session(SMALL, faults=[Fault("FM4", [1], onset=5.0)], speed=8.0)
+    session = Session(SMALL, faults=[Fault("FM4", [1], onset=5.0)])
     file = tmp_path / "run.html"
     file.write_text(recorded_page(session, 20.0), encoding="utf-8")
     browser.open(file.as_uri())

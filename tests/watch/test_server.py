@@ -11,8 +11,8 @@ import random
 import signal
 import socket
 import stat
-import struct
 import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -26,7 +26,17 @@ from swarm_logistics_env.watch.server import WatchServer, kept_token, serve
 from tests.watch.conftest import SMALL, Served
 
 
-def ask(served: Served, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
+@pytest.fixture(scope="module")
+def asked() -> Iterator[Served]:
+    """One server for all tests that change nothing of its session."""
+    one = Served()
+    yield one
+    one.stop()
+
+
+def ask(served: Served, name: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
+    """Ask for a file below the token, or for a path that begins with /."""
+    path = name if name.startswith("/") else f"/{served.server.token}/{name}"
     host = urlsplit(served.server.address).hostname or ""
     connection = http.client.HTTPConnection(host, served.server.port, timeout=30)
     connection.request("GET", path, headers=headers)
@@ -41,16 +51,12 @@ def messages(served: Served, orders: list[str], enough: int) -> list[dict[str, A
 
     async def talk() -> list[dict[str, Any]]:
         got: list[dict[str, Any]] = []
-        async with (
-            aiohttp.ClientSession() as client,
-            client.ws_connect(f"{served.server.address}live") as page,
-        ):
+        live = f"{served.server.address}live"
+        async with aiohttp.ClientSession() as client, client.ws_connect(live) as page:
             for order in orders:
                 await page.send_str(order)
-            while len(got) < enough:
+            while len(got) < enough and not (got and "problem" in got[-1]):
                 got.append(json.loads((await page.receive(30)).data))
-                if "problem" in got[-1]:
-                    break
         return got
 
     return asyncio.run(talk())
@@ -58,7 +64,7 @@ def messages(served: Served, orders: list[str], enough: int) -> list[dict[str, A
 
 def test_page_and_scripts_come_with_a_content_policy(asked: Served) -> None:
     for name in ("", "page.css", "draw.js", "panel.js", "page.js"):
-        status, body, headers = ask(asked, f"/{asked.server.token}/{name}")
+        status, body, headers = ask(asked, name)
         assert status == 200
         assert body
         policy = headers["Content-Security-Policy"]
@@ -78,7 +84,6 @@ def test_page_and_scripts_come_with_a_content_policy(asked: Served) -> None:
         {"Host": "swarm.example"},
         {"Host": "127.0.0.1.swarm.example:8765"},
         {"Host": "127.0.0.1:8765.swarm.example"},
-        {"Host": "192.168.0.7:8765"},
         {"Host": ""},
         {"Origin": "http://swarm.example"},
         {"Origin": "null"},
@@ -87,7 +92,7 @@ def test_page_and_scripts_come_with_a_content_policy(asked: Served) -> None:
 )
 def test_other_hosts_and_origins_are_refused(asked: Served, headers: dict[str, str]) -> None:
     for name in ("", "live", "recording.html"):
-        assert ask(asked, f"/{asked.server.token}/{name}", **headers)[0] == 403
+        assert ask(asked, name, **headers)[0] == 403
 
 
 def test_without_the_token_nothing_is_served(asked: Served) -> None:
@@ -113,49 +118,28 @@ def test_listens_on_loopback_only(asked: Served) -> None:
 
 
 @pytest.mark.parametrize(
-    ("host", "given", "is_own"),
-    [
-        ("0.0.0.0", "192.168.0.7:8765", True),
-        ("0.0.0.0", "[fe80::7]:8765", True),
-        ("0.0.0.0", "swarm.example:8765", False),
-        ("Lab.example", "lab.example:8765", True),
-        ("192.168.0.7", "swarm.example", False),
-        ("192.168.0.7", "7.example", False),
-        ("127.0.0.2", "192.168.0.7", False),
-        ("127.0.0.1", "[::1]:8765", True),
-    ],
+    ("host", "shown", "statuses"),
+    [("0.0.0.0", "127.0.0.1", [200, 200, 403]), ("::1", "[::1]", [200, 403, 403])],
 )
-def test_names_that_nobody_gave_are_refused_on_any_host(
-    host: str, given: str, is_own: bool
-) -> None:
-    assert WatchServer(Session(SMALL), 0, host=host)._is_own(given) is is_own
-
-
-@pytest.mark.parametrize(
-    ("host", "shown"), [("0.0.0.0", "127.0.0.1"), ("127.0.0.2", "127.0.0.2"), ("::1", "[::1]")]
-)
-def test_serves_on_the_host_that_was_asked_for(host: str, shown: str) -> None:
+def test_serves_on_the_host_that_was_asked_for(host: str, shown: str, statuses: list[int]) -> None:
     served = Served(host=host)
-    try:
-        assert served.server.address.startswith(f"http://{shown}:")
-        with urllib.request.urlopen(served.server.address, timeout=30) as answer:
-            assert answer.status == 200
-        assert ask(served, f"/{served.server.token}/", Host="swarm.example")[0] == 403
-        origin = {"Host": f"{shown}:1", "Origin": "http://swarm.example"}
-        assert ask(served, f"/{served.server.token}/live", **origin)[0] == 403
-    finally:
-        served.stop()
+    # Where others may reach this machine any address is its own, and no foreign name.
+    hosts = (f"{shown}:1", "192.168.0.7:8765", "swarm.example:8765")
+    found = [ask(served, "", Host=given)[0] for given in hosts]
+    served.stop()
+    assert served.server.address.startswith(f"http://{shown}:")
+    assert found == statuses
 
 
 def test_the_page_is_shown_once_it_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("swarm_logistics_env.watch.server.kept_token", lambda: None)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    told: list[str] = []
+    pages = []
 
     def show(address: str) -> None:
         try:
             with urllib.request.urlopen(address, timeout=30) as answer:
-                told.append(answer.read().decode())
+                pages.append(answer.read())
         finally:
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -163,26 +147,19 @@ def test_the_page_is_shown_once_it_is_served(monkeypatch: pytest.MonkeyPatch) ->
         serve(Session(SMALL), 0, lambda sentence: None, show=show)
     finally:
         signal.signal(signal.SIGINT, before)
-    (page,) = told
-    title = page.partition('id="indicators" title="')[2].partition('"')[0]
-    assert "R, robustness: " in title
+    assert b"R, robustness: " in pages[0]
 
 
-def test_frames_hold_what_changed(served: Served) -> None:
+def test_frames_hold_what_changed_and_orders_are_obeyed(served: Served) -> None:
     assert served.server.session.run.world.state.step == 0  # no page was open
     fixed, first, second = messages(served, [], 3)
-    assert served.server.session.run.world.state.step > 0
     assert "swarm-dt" in fixed["choices"]
     assert len(first["poses0"]) == len(first["poses1"]) == 18
     assert second["time"] > first["time"]
     assert "scenario" not in second
-
-
-def test_orders_are_obeyed(served: Served) -> None:
     orders = [
         {"do": "choose", "mode": "FM1"},
         {"do": "toggle", "robot": 3},
-        {"do": "widen", "width": 2},
         {"do": "pause"},
         {"do": "no such order"},  # its refusal tells that the others are done
     ]
@@ -197,10 +174,7 @@ def test_orders_are_obeyed(served: Served) -> None:
     ("order", "words"),
     [
         ('{"do":"toggle","robot":99}', "robot = 99"),
-        ('{"do":"choose","mode":"FM9"}', "FM9"),
-        ('{"do":"fly"}', "order"),
         ('{"do":"select","robot":"3"}', "valid integer"),
-        ('{"do":"select","robot":3,"also":4}', "Unexpected keyword"),
         ('{"do":"compare","policy":"os:abort"}', "no policy 'os:abort'"),
         ('{"do":"widen","width":NaN}', "order"),
         ("[]", "order"),
@@ -214,38 +188,31 @@ def test_order_that_cannot_be_is_refused_in_a_sentence(
 
 
 def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
-    async def talk() -> tuple[int | None, Any]:
-        address = f"{served.server.address}live"
-        async with (
-            aiohttp.ClientSession() as client,
-            client.ws_connect(address) as page,
-            client.ws_connect(address) as other,
-        ):
+    async def talk() -> int | None:
+        live = f"{served.server.address}live"
+        async with aiohttp.ClientSession() as client, client.ws_connect(live) as page:
             await page.send_str('{"do":"select","robot":' + " " * 5000 + "3}")
             for _ in range(60):  # frames that are under way
                 if (await page.receive(30)).type is not aiohttp.WSMsgType.TEXT:
                     break
-            return page.close_code, (await other.receive(30)).type
+            return page.close_code
 
-    assert asyncio.run(talk()) == (aiohttp.WSCloseCode.MESSAGE_TOO_BIG, aiohttp.WSMsgType.TEXT)
+    assert asyncio.run(talk()) == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
     assert served.server.session.selected is None
+    assert messages(served, [], 1)
 
 
 def test_more_pages_than_there_may_be_are_refused(served: Served) -> None:
-    async def talk() -> list[int]:
-        statuses = []
+    async def open_pages() -> int:
+        live = f"{served.server.address}live"
         async with aiohttp.ClientSession() as client, contextlib.AsyncExitStack() as pages:
-            for _ in range(20):
-                try:
-                    await pages.enter_async_context(
-                        client.ws_connect(f"{served.server.address}live")
-                    )
-                    statuses.append(101)
-                except aiohttp.WSServerHandshakeError as error:
-                    statuses.append(error.status)
-        return statuses
+            for _ in range(16):
+                await pages.enter_async_context(client.ws_connect(live))
+            with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+                await client.ws_connect(live)
+        return refused.value.status
 
-    assert asyncio.run(talk()) == [101] * 16 + [503] * 4
+    assert asyncio.run(open_pages()) == 503
 
 
 def test_malformed_requests_neither_stop_it_nor_leak_a_path(
@@ -269,25 +236,8 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
         answered += bool(answer)
         assert not any(secret in answer for secret in (b"/usr/", b".py", b"Traceback"))
     assert answered > 50
-    assert ask(served, f"/{served.server.token}/")[0] == 200
+    assert ask(served, "")[0] == 200
     assert "Traceback" not in capfd.readouterr().err
-
-
-def test_a_page_that_closes_in_mid_send_is_no_error(
-    served: Served, caplog: pytest.LogCaptureFixture
-) -> None:
-    request = (
-        f"GET /{served.server.token}/live HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
-        "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    )
-    for _ in range(50):
-        with socket.create_connection(("127.0.0.1", served.server.port)) as page:
-            # Closed at once, without waiting for what is on its way.
-            page.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-            page.sendall(request.encode())
-    assert messages(served, [], 1)
-    assert [record.getMessage() for record in caplog.records if record.exc_info] == []
 
 
 def test_where_it_cannot_listen_is_told_in_a_sentence(asked: Served) -> None:

@@ -10,13 +10,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
-from swarm_logistics_env.errors import (
-    FaultError,
-    PolicyError,
-    ScenarioError,
-    SetupError,
-    SwarmLogisticsError,
-)
+from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.messages import Recording, frame, observation_parts
 
@@ -24,8 +18,7 @@ SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, wareh
 
 
 def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
-    scenario = SMALL.replace(duration=60.0)
-    faults = [Fault("FM4", 3, onset=5.0)]
+    scenario, faults = SMALL.replace(duration=60.0), [Fault("FM4", 3, onset=5.0)]
     session = Session(scenario, seed=2, faults=faults)
     session.play(1e6)
     assert session.is_over
@@ -45,17 +38,14 @@ def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -
     assert session.play(0.1) == 0
     session.set_speed(64.0)
     # What the budget does not allow is not caught up with.
-    assert session.play(1.0, budget=0.0) == 1
-    assert session.play(0.0, budget=0.0) <= 1
-    assert session.play(0.0, budget=0.0) == 0
+    assert sum(session.play(elapsed, budget=0.0) for elapsed in (1.0, 0.0, 0.0)) <= 2
     session.pause()
     before = session.run.world.state.step
     session.play(5.0)
     assert session.run.world.state.step == before
-    session.step()
-    assert session.run.world.state.step == session.beside.world.state.step == before + 1
     session.pause()
     session.step()
+    assert session.run.world.state.step == session.beside.world.state.step == before + 1
     assert session.paused
 
 
@@ -63,17 +53,12 @@ def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -
 def test_robot_breaks_and_is_repaired(mode: str) -> None:
     session = Session(SMALL)
     session.play(2.0)
-    run, twin = session.run.world.state, session.beside.world.state
-    assert np.array_equal(run.robot_position, twin.robot_position)
     session.choose_mode(mode)
     session.toggle_robot(3)
-    world = session.run.world
-    assert world.state.failure_modes[3] == (mode,)
+    state, shown = session.run.world.state, frame(session)
+    assert state.failure_modes[3] == (mode,)
     assert not session.beside.world.state.failed.any()
-    assert mode in session.note
-    assert [(event.robot, event.mode) for event in session.events] == [(3, mode)]
-    assert session.events[0].time == world.state.time
-    shown = frame(session)
+    assert [(one.time, one.robot, one.mode) for one in session.events] == [(state.time, 3, mode)]
     assert shown["robots1"][3][2] == ""
     if mode == "removed":
         assert session.selected is None
@@ -83,16 +68,16 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
             session.repair_robot(3)
         return
     assert shown["robots0"][3][2] == FAILURE_MODES[mode].mark
-    assert shown["poses0"][9:11] == np.rint(1000 * world.state.robot_position[3]).tolist()
+    assert shown["poses0"][9:11] == np.rint(1000 * state.robot_position[3]).tolist()
     session.play(1.0)
     session.toggle_robot(3)
-    assert not world.state.failed.any()
-    assert world.state.max_speed[3] == SMALL.max_speed
+    assert not session.run.world.state.failed.any()
+    assert session.run.world.state.max_speed[3] == SMALL.max_speed
     assert session.events[-1].mode is None
 
 
 def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
-    session = Session(SMALL, seed=0, faults=[Fault("dead", 3), Fault("FM1", 2, onset=15.0)])
+    session = Session(SMALL, faults=[Fault("dead", 3), Fault("FM1", 2, onset=15.0)])
     first, *others = np.flatnonzero(session.run.world.state.failed).tolist()
     session.repair_robot(first)
     assert np.flatnonzero(session.run.world.state.failed).tolist() == others
@@ -103,89 +88,65 @@ def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
 
 def test_breaking_twice_in_a_mode_is_once() -> None:
     session = Session(SMALL)
-    with pytest.raises(SetupError, match="none is selected"):
-        session.break_robot()
-    acts: list[tuple[Callable[[], object], tuple[str, ...], str]] = [
-        (lambda: session.break_robot(1), ("FM4",), "fails"),
-        (lambda: session.break_robot(1), ("FM4",), "already"),
-        (lambda: session.choose_mode("FM1"), ("FM4",), ""),
-        (lambda: session.break_robot(1), ("FM4", "FM1"), "FM1"),
-        (lambda: session.repair_robot(1), (), "repaired"),
-        (lambda: session.repair_robot(1), (), "sound"),
-    ]
-    for act, modes, said in acts:
-        act()
+    for mode, modes, said in (
+        ("FM4", ("FM4",), "fails"),
+        ("FM4", ("FM4",), "already"),
+        ("FM1", ("FM4", "FM1"), "fails"),
+    ):
+        session.choose_mode(mode)
+        session.break_robot(1)
         assert session.run.world.state.failure_modes[1] == modes
         assert said in session.note
-    session.play(1e6)
-    with pytest.raises(SetupError, match="the run is over"):
-        session.break_robot(1)
+    for said in ("repaired", "sound"):
+        session.repair_robot(1)
+        assert session.run.world.state.failure_modes[1] == ()
+        assert said in session.note
 
 
-def test_swarm_size_begins_again_and_says_so() -> None:
-    session = Session(SMALL, seed=3, faults=[Fault("FM2", 5), Fault("FM1", 1)])
+def test_swarm_size_next_seed_and_again_begin_anew_and_the_delivery_area_does_not() -> None:
+    session = Session(SMALL, seed=3, faults=[Fault("FM2", 5)])
+    start = session.run.world.state.robot_position.copy()
     session.play(2.0)
     session.select(7)
+    session.break_robot(7)
     for n_robots, complaint in ((0, "n_robots = 0"), (4, "Fault.robots = 5: should be at most")):
         with pytest.raises(SwarmLogisticsError, match=complaint):
             session.resize(n_robots)
-        assert session.scenario.n_robots == 8
-    session.resize(5)
-    for play in (session.run, session.beside):
-        assert (play.world.state.time, play.world.state.n_robots) == (0.0, 5)
-    assert session.seed == 3
-    assert session.selected is None
+    assert (session.scenario.n_robots, session.selected) == (8, 7)
+    session.resize(6)
+    assert (session.run.world.state.n_robots, session.selected) == (6, None)
     assert "began again" in session.note
-    assert session.run.world.state.failed.sum() == 5
-
-
-def test_delivery_width_changes_at_once_in_both() -> None:
-    session = Session(SMALL)
-    session.play(2.0)
-    session.set_delivery_width(3.0)
-    with pytest.raises(ScenarioError, match="leaves no storage"):
-        session.set_delivery_width(5.0)
-    for play in (session.run, session.beside):
-        assert play.world.scenario.delivery_width == 3.0
-        assert play.world.state.time == pytest.approx(2.0)
-
-
-def test_next_seed_and_again() -> None:
-    session = Session(SMALL)
-    start = session.run.world.state.robot_position.copy()
-    session.play(1.0)
-    session.break_robot(0)
+    session.resize(8)
+    assert np.array_equal(session.run.world.state.robot_position, start)
     session.next_seed()
-    assert session.seed == 1
-    assert session.events == []
     assert not np.array_equal(session.run.world.state.robot_position, start)
     session.play(1.0)
     session.restart()
-    assert session.seed == 1
-    assert session.run.world.state.time == 0.0
-
-
-class Wrong:
-    def reset(self, n_robots: int, seed: int) -> None:
-        pass
-
-    def act(self, observations: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        return np.zeros((1, 1))
+    session.set_delivery_width(3.0)  # at once
+    for play in (session.run, session.beside):
+        assert (play.world.state.time, play.world.state.n_robots) == (0.0, 8)
+        assert play.world.scenario.delivery_width == 3.0
+    assert (session.seed, len(session.events)) == (4, 5)
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(SetupError, match=r"speed = 3: should be one of 0.25, 0.5, 1"):
-        Session(SMALL, speed=3.0)
-    with pytest.raises(FaultError, match="at most n_robots = 8"):
-        Session(SMALL, seed=0, faults=[Fault("FM1", 9)])
-    with pytest.raises(PolicyError, match="Wrong at 0 s"):
-        Session(SMALL, load=lambda _: Wrong()).step()
     session = Session(SMALL)
-    with pytest.raises(FaultError, match="did you mean 'FM4'"):
-        session.choose_mode("FM44")
-    for robot in (-1, 8):
-        with pytest.raises(SetupError, match=f"robot = {robot}"):
-            session.select(robot)
+    acts: list[tuple[type[Exception], str, Callable[[], object]]] = [
+        (SetupError, "speed = 3: should be one of 0.25, 0.5", lambda: session.set_speed(3.0)),
+        (FaultError, "at most n_robots = 8", lambda: Session(SMALL, faults=[Fault("FM1", 9)])),
+        (ScenarioError, "leaves no storage", lambda: session.set_delivery_width(5.0)),
+        (FaultError, "did you mean 'FM4'", lambda: session.choose_mode("FM44")),
+        (SetupError, "robot = -1", lambda: session.select(-1)),
+        (SetupError, "robot = 8", lambda: session.select(8)),
+        (SetupError, "none is selected", session.break_robot),
+        (SetupError, "did you mean 'homing'", lambda: session.compare("homin")),
+    ]
+    for error, words, act in acts:
+        with pytest.raises(error, match=words):
+            act()
+    session.play(1e6)
+    with pytest.raises(SetupError, match="the run is over"):
+        session.break_robot(1)
 
 
 def test_policies_are_compared_with_the_same_faults() -> None:
@@ -196,9 +157,6 @@ def test_policies_are_compared_with_the_same_faults() -> None:
     session.compare("homing")
     assert session.names == ("homing", "homing without faults")
     assert session.run.world.state.time == 0.0
-    with pytest.raises(SetupError, match="did you mean 'homing'"):
-        session.compare("homin")
-    assert session.policy == "homing"
 
 
 def test_observation_has_all_parts_and_only_what_is_present() -> None:
@@ -212,7 +170,6 @@ def test_observation_has_all_parts_and_only_what_is_present() -> None:
         assert list(found) == list(parts)
         assert found["range_walls"] == pytest.approx(parts["range_walls"].tolist(), abs=0.0051)
         assert len(found["item_x"]) == int(parts["item_present"].sum())
-        assert found["carrying"] == parts["carrying"].tolist()
         session.select(robot)
         beams = [parts[f"range_{what}"] for what in ("robots", "walls", "items")]
         nearest = np.min(beams, axis=0).tolist()
@@ -231,5 +188,4 @@ def test_a_recording_begins_anew_with_each_episode() -> None:
     recording.note()
     (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())
     first, *others = json.loads(zlib.decompress(base64.b64decode(packed)))["frames"]
-    assert (first["seed"], first["time"]) == (2, 0.0)
-    assert others == []
+    assert (first["seed"], first["time"], others) == (2, 0.0, [])

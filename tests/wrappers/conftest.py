@@ -1,31 +1,27 @@
-"""Small worlds, what drives their robots, and stacks of wrappers around them."""
+"""Small worlds, what wraps them, and what drives their robots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.wrappers import (
-    DiscreteActions,
-    FaultInjection,
-    FixedAgents,
-    IndicatorReward,
-    MotionFrame,
-    ParameterChange,
-    RunningMeans,
-    SwarmSize,
-    Wrapper,
-)
+from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 
-Env = SwarmLogisticsEnv | Wrapper
+if TYPE_CHECKING:
+    from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
+
+BRIEF: dict[str, Any] = {"warehouse_width": 6.0, "n_items": 10, "duration": 2.0}  # of 20 steps
 
 
 def small(**fields: Any) -> SwarmLogisticsEnv:
     return SwarmLogisticsEnv(**{"n_robots": 6, "n_items": 8, "duration": 6.0, **fields})
+
+
+def brief(**fields: Any) -> SwarmLogisticsEnv:
+    return SwarmLogisticsEnv(**{**BRIEF, **fields})
 
 
 def eastward(env: Any) -> NDArray[np.float64]:
@@ -34,43 +30,24 @@ def eastward(env: Any) -> NDArray[np.float64]:
     return np.stack([np.cos(heading), -np.sin(heading), 0 * heading, 1 + 0 * heading], axis=1)
 
 
-def onsets(rng: np.random.Generator) -> Any:
-    return rng.uniform(0.5, 3.0, size=rng.integers(3))
+def worlds(n_worlds: int, n_robots: Any = 3, **arguments: Any) -> SwarmVecEnv:
+    from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
+
+    return SwarmVecEnv(n_worlds=n_worlds, n_robots=n_robots, **{"seed": 0, **BRIEF, **arguments})
 
 
-def with_faults(env: Env) -> Env:
-    return FaultInjection(FaultInjection(env, "FM3", onset=onsets), "motor_slow", onset=[0.0, 1.0])
+def wrapped(world: int) -> Any:
+    """Return one of several worlds, each with faults and another swarm size."""
+    env: Any = FaultInjection(brief(n_robots=4), "FM1", onset=[0.0, 0.5])
+    env = SwarmSize(env, [3, 6], leave=[(1, 0.7)])
+    return ParameterChange(env, "max_speed", [1.0, 2.0], at=0.3) if world % 2 else env
 
 
-def with_sizes(env: Env) -> Env:
-    n = env.unwrapped.scenario.n_robots
-    return SwarmSize(env, [n, 2 * n], leave=[(1, 1.5)] if n > 1 else ())
-
-
-def with_changes(env: Env) -> Env:
-    env = ParameterChange(env, "n_items", [10, 20])
-    env = ParameterChange(env, "radio_range", [1.0, 6.0], at=1.0)
-    return ParameterChange(env, "max_speed", [1.0, 3.0], at=[0.5, 2.0])
-
-
-def with_all(env: Env) -> Env:
-    return with_faults(with_sizes(with_changes(env)))
-
-
-WRAPPED: dict[str, Callable[[Env], Env]] = {
-    "plain": lambda env: env,
-    "changes(sizes(faults))": lambda env: with_changes(with_sizes(with_faults(env))),
-    "faults(sizes(changes))": with_all,
-    "fixed(faults(sizes(changes)))": lambda env: FixedAgents(with_all(env)),
-    "indicators(faults(sizes(changes)))": lambda env: IndicatorReward(
-        with_all(env), {"R": 1.0, "P": 0.1}, references=RunningMeans()
-    ),
-    "numbers(sizes(faults))": lambda env: DiscreteActions(with_sizes(with_faults(env))),
-    "motion(sizes(faults))": lambda env: MotionFrame(with_sizes(with_faults(env))),
-}
-
-
-def stacked(stack: str, n_robots: int = 4, **arguments: Any) -> Any:
-    """Return a small, short environment in one of the stacks of `WRAPPED`."""
-    fields = {"warehouse_width": 6.0, "warehouse_height": 5.0, "n_items": 10, "duration": 4.0}
-    return WRAPPED[stack](SwarmLogisticsEnv(n_robots=n_robots, **{**fields, **arguments}))
+def played(env: SwarmVecEnv, steps: int) -> list[Any]:
+    """Play random steps after a reset, and return all that they returned."""
+    rng = np.random.default_rng(0)
+    trace: list[Any] = [env.reset()]
+    for _ in range(steps):
+        *arrays, infos = env.step(rng.uniform(-1, 1, (env.num_envs, 4)))
+        trace += [*arrays, [info.get("terminal_observation") for info in infos]]
+    return trace

@@ -9,13 +9,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault
-from swarm_logistics_env.errors import CommandError, FaultError, ScenarioError, SetupError
-from swarm_logistics_env.wrappers import (
-    FaultInjection,
-    FixedAgents,
-    IndicatorReward,
-    SwarmSize,
-)
+from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError
+from swarm_logistics_env.wrappers import FaultInjection, FixedAgents, SwarmSize
 from tests.wrappers.conftest import eastward, small
 
 
@@ -33,7 +28,7 @@ def test_sizes_are_drawn_by_the_seed() -> None:
     assert set(sizes_of(drawn, 40)) == {3, 4, 5, 6, 7}
     assert len(drawn.possible_agents) == 7
     beyond = SwarmSize(small(), lambda rng: 8, within=(3, 7))
-    with pytest.raises(SetupError, match="n_robots = 8: the distribution should give numbers"):
+    with pytest.raises(SetupError, match="n_robots = 8"):
         beyond.reset(seed=0)
 
 
@@ -44,19 +39,12 @@ def test_a_smaller_swarm_is_that_swarm() -> None:
     assert smaller.state_space.contains(smaller.state())
 
 
-def test_the_environments_max_robots_stay_possible() -> None:
-    env = SwarmSize(small(n_robots=2, max_robots=5), [2, 3])
-    assert len(env.possible_agents) == 5
-    assert len(env.reset(seed=0, options={"scenario": {"n_robots": 5}})[0]) == 5
-    with pytest.raises(SetupError, match="n_robots = 6: should be at most 5"):
-        env.reset(seed=0, options={"scenario": {"n_robots": 6}})
-
-
 def test_a_size_among_the_options_and_an_outer_wrapper_come_first() -> None:
-    env = SwarmSize(SwarmSize(small(), 2), 4)
+    env = SwarmSize(SwarmSize(small(n_robots=2, max_robots=5), 2), 4)
+    assert len(env.possible_agents) == 5
     assert sizes_of(env, 1) == [4]
-    observations, _ = env.reset(options={"scenario": {"n_robots": 3, "n_items": 5}})
-    assert len(observations) == 3
+    observations, _ = env.reset(options={"scenario": {"n_robots": 5, "n_items": 5}})
+    assert len(observations) == 5
     assert env.warehouse.scenario.n_items == 5
 
 
@@ -75,23 +63,18 @@ def test_who_leaves_terminates_and_is_gone_for_the_rest_of_the_episode() -> None
         if len(gone) == 1:
             assert gone == {f"robot_{row}" for row in first.warehouse.struck_robots}
     assert sizes == [5] * 9 + [4] * 10 + [2] * 40
-    env.reset(seed=1)
-    assert len(env.agents) == 5
 
 
 @pytest.mark.parametrize(
     ("arguments", "error", "complaint"),
     [
-        ({"sizes": [5, 0]}, ScenarioError, "Scenario.n_robots = 0: should be greater than 0"),
         ({"sizes": [5, 4000]}, ScenarioError, "n_robots = 4000 of radius"),
-        ({"sizes": []}, SetupError, r"n_robots = \[\]: should list at least one"),
-        ({"sizes": lambda rng: 4}, SetupError, "within = None: should be"),
-        ({"sizes": 4, "within": (3, 5)}, SetupError, "should be None but for a distribution"),
-        ({"sizes": [3, 9], "leave": [(4, 1.0)]}, SetupError, "4 robots in all, should be at most"),
-        ({"sizes": [3, 9], "leave": [(2, 0.0), (1, 0.0)]}, SetupError, "3 robots at 0 s, should"),
+        ({"sizes": lambda rng: 4}, SetupError, "within = None"),
+        ({"sizes": 4, "within": (3, 5)}, SetupError, r"within = \(3, 5\)"),
+        ({"sizes": [3, 9], "leave": [(4, 1.0)]}, SetupError, "leave: 4 robots in all"),
+        ({"sizes": [3, 9], "leave": [(2, 0.0), (1, 0.0)]}, SetupError, "leave: 3 robots at 0 s"),
         ({"sizes": 9, "leave": [(4, -1.0)]}, FaultError, "Fault.onset = -1.0"),
-        ({"sizes": 9, "leave": [(0, 1.0)]}, SetupError, "at least one robot"),
-        ({"sizes": 9, "leave": [4]}, SetupError, r"should be pairs \(robots, time"),
+        ({"sizes": 9, "leave": [4]}, SetupError, r"leave = \[4\]"),
     ],
 )
 def test_wrong_arguments_are_refused_at_once(
@@ -119,8 +102,6 @@ def test_rows_are_those_of_the_wrapped_environment_and_zeros() -> None:
             np.testing.assert_array_equal(seen[:n], rows)
             assert not seen[n:].any()
             assert [i["active"] for i in infos.values()] == [*map(int, present), *[0] * (6 - n)]
-            with pytest.raises(CommandError, match=r"of shape \(1, 4\) .*: should be \(6, 4\)"):
-                env.step_arrays(np.zeros((1, 4)))
             commands = rng.uniform(-1, 1, (6, 4))
             observations, paid, ended, cut, infos = env.step(dict(zip(env.agents, commands)))
             rows, rewards, _, _ = inner.step_arrays(commands[:n])
@@ -146,24 +127,9 @@ def test_nobody_left_and_everything_delivered_terminate_all(fields: dict[str, An
         _, _, ended, cut, _ = env.step(dict(zip(env.agents, commands)))
     assert ended == dict.fromkeys(env.possible_agents, True)
     assert cut == dict.fromkeys(env.possible_agents, False)
-    if "faults" in fields:
-        assert env.warehouse.state.time == pytest.approx(0.3)
-    else:
-        assert env.warehouse.all_delivered
+    assert env.warehouse.all_delivered == ("faults" not in fields)
 
 
 def test_it_is_the_outermost_wrapper() -> None:
-    env = FixedAgents(small())
-    with pytest.raises(SetupError, match=r"FaultInjection around FixedAgents: should be inside"):
-        FaultInjection(env, "FM1")
-    with pytest.raises(SetupError, match="FixedAgents around FixedAgents"):
-        FixedAgents(env)
-
-
-def test_what_the_other_wrappers_say_is_said_of_every_agent() -> None:
-    env = FixedAgents(IndicatorReward(SwarmSize(small(), [6, 8]), "S", references=20.0))
-    for seed in range(4):
-        _, infos = env.reset(seed=seed)
-        n_robots = env.warehouse.state.n_robots
-        assert {info["n_robots"] for info in infos.values()} == {n_robots}
-        assert {info["S_tested"] for info in infos.values()} == {int(n_robots == 8)}
+    with pytest.raises(SetupError, match="FaultInjection around FixedAgents: should be inside"):
+        FaultInjection(FixedAgents(small()), "FM1")
