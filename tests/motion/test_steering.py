@@ -10,7 +10,7 @@ from swarm_logistics_env.motion import memory as known
 from swarm_logistics_env.motion.memory import steer
 
 
-@pytest.mark.parametrize("direction", [0.0, 0.3, 1.5, -0.6, 3.0, -2.0])
+@pytest.mark.parametrize("direction", [0.3, 1.5, -0.6, 3.0, -2.0])
 def test_it_gets_to_drive_where_it_wants_to_and_remembers_that_it_turned(direction: float) -> None:
     memory = np.zeros((1, known.N_COLUMNS))
     memory[0, known.HOME_X], memory[0, known.WIDEST_TURN] = 2.0, 0.6
@@ -19,8 +19,7 @@ def test_it_gets_to_drive_where_it_wants_to_and_remembers_that_it_turned(directi
         commands = np.array([[math.cos(wanted), math.sin(wanted), 0.0, 1.0]])
         steer(memory, commands)
         assert abs(commands[0, 2]) <= 1.0
-        assert commands[0, 1] == 0.0
-        assert commands[0, 3] == 1.0
+        assert commands[0, [1, 3]].tolist() == [0.0, 1.0]
         heading += 0.6 * commands[0, 2]
         wanted = direction - heading
     assert abs(commands[0, 0]) == pytest.approx(1.0)

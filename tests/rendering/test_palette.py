@@ -6,12 +6,10 @@ import pytest
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
 from swarm_logistics_env.rendering.palette import followed
 from swarm_logistics_env.warehouse.state import NOBODY
-from tests.rendering.conftest import situation
 
 
-@pytest.mark.parametrize("relay", ["none", "gossip"])
-def test_follows_whom_the_robot_itself_hears(relay: str) -> None:
-    scenario = Scenario(n_robots=30, radio_range=2.0).replace(relay=relay)
+def test_follows_whom_the_robot_itself_hears() -> None:
+    scenario = Scenario(n_robots=30, radio_range=2.0, relay="gossip")
     world = Warehouse(scenario)
     faults = [Fault("FM1", [0, 1]), Fault("FM3_send", [2, 3]), Fault("FM3_hear", [4, 5])]
     world.reset(1, [*faults, Fault("removed", [6], onset=1.0)])
@@ -30,11 +28,3 @@ def test_follows_whom_the_robot_itself_hears(relay: str) -> None:
             seen = [rows["lowest_timer_x"][robot, 0], rows["lowest_timer_y"][robot, 0]]
             assert np.hypot(*offset) == pytest.approx(np.hypot(*seen), abs=1e-5)
     assert compared > 100
-
-
-def test_nearest_of_those_that_tell_the_same() -> None:
-    state, scenario = situation([[2, 2], [5, 2], [4, 2]])
-    state.robot_told[:] = [0.0, 1.0, 1.0]
-    assert followed(state, scenario, 0) == 2
-    state.robot_told[2] = 1.1
-    assert followed(state, scenario, 0) == 1

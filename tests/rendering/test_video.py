@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering import renderer as video
-from swarm_logistics_env.rendering.palette import film_colours
 
 Frame = NDArray[np.uint8]
 
@@ -72,24 +71,10 @@ def test_film_that_breaks_off_leaves_what_was_there(suffix: str, tmp_path: Path)
 def test_what_cannot_be_written_is_refused_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "folder.mp4").mkdir()
-    for name, words in {
-        "film.avi": r"should end in \.mp4 or \.gif",
-        "film": "should end in",
-        "nowhere/film.mp4": "a folder that can be written to",
-        "folder.mp4": "should be a file",
-    }.items():
-        with pytest.raises(SetupError, match=words):
-            video.check_film(tmp_path / name)
+    with pytest.raises(SetupError, match=r"film\.avi: should end in \.mp4 or \.gif"):
+        video.check_film(tmp_path / "film.avi")
+    with pytest.raises(SetupError, match=r"nowhere.film\.mp4: should be a file in a folder"):
+        video.check_film(tmp_path / "nowhere" / "film.mp4")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(SetupError, match=r"pip install -c constraints.txt '\.\[render\]'"):
+    with pytest.raises(SetupError, match=r"pip install .*\[render\]"):
         video.check_film(tmp_path / "film.mp4")
-
-
-def test_gif_keeps_the_colours_of_pictures_exactly(tmp_path: Path) -> None:
-    colours = film_colours()
-    assert len(set(colours)) == len(colours) < 128
-    frame = np.full((48, 64, 3), 30, np.uint8)
-    frame.reshape(-1, 3)[: 24 * len(colours)] = np.repeat(colours, 24, axis=0)
-    video.write_film(tmp_path / "film.gif", [frame, frame[::-1]], 10.0)
-    assert np.abs(read(tmp_path / "film.gif")[0] - frame).max() <= 2

@@ -43,26 +43,18 @@ def follow(world: Warehouse, script: Iterable[Sequence[Command]]) -> Warehouse:
 def build(monkeypatch: pytest.MonkeyPatch) -> Build:
     """Return a maker of worlds that were just reset, with everything placed by hand.
 
-    Items are requested in the order of their numbers. All robots look along +x and do not drift,
-    so that forward and left, in commands and observations, are x and y until one turns.
+    Items are requested in the order of their numbers; all robots look along +x and do not drift.
     """
 
     def make(
-        robots: ArrayLike,
-        items: ArrayLike,
-        faults: Sequence[Fault] = (),
-        obstacles: ArrayLike = (),
-        **fields: Any,
+        robots: ArrayLike, items: ArrayLike, faults: Sequence[Fault] = (), **fields: Any
     ) -> Warehouse:
-        places, item_places, solids = (
-            np.array(rows, dtype=np.float64).reshape(-1, 2) for rows in (robots, items, obstacles)
-        )
-        n, n_items = len(places), len(item_places)
+        places, item_places = (np.array(rows, float).reshape(-1, 2) for rows in (robots, items))
+        n = len(places)
         monkeypatch.setattr(layout, "place_robots", lambda *_: (places.copy(), np.zeros(n)))
         monkeypatch.setattr(layout, "place_items", lambda *_: item_places.copy())
-        monkeypatch.setattr(layout, "place_obstacles", lambda *_: solids.copy())
-        monkeypatch.setattr(layout, "draw_order", lambda *_: None)  # in the order of their numbers
-        counts = {"n_robots": n, "n_items": n_items, "n_obstacles": len(solids)}
+        monkeypatch.setattr(layout, "draw_order", lambda *_: None)
+        counts = {"n_robots": n, "n_items": len(item_places)}
         world = Warehouse(Scenario(**{"heading_drift": 0.0, **counts, **fields}))
         world.reset(0, faults)
         return world

@@ -10,14 +10,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.warehouse import structs
 from swarm_logistics_env.warehouse.logistics import drive
 from swarm_logistics_env.warehouse.packing import blank
-from swarm_logistics_env.warehouse.structs import (
-    Capabilities,
-    blank_robots,
-    lengths_of,
-    parameters_of,
-)
 
 
 @given(
@@ -31,11 +26,12 @@ def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
     commands: list[float], heading: float, period: float, is_holonomic: bool
 ) -> None:
     scenario = Scenario(n_robots=2)
-    robots = blank_robots(lengths_of(scenario))
-    able, wanted = blank(Capabilities, lengths_of(scenario)), np.full((2, 2), 9.0)
+    lengths, wanted = structs.lengths_of(scenario), np.full((2, 2), 9.0)
+    robots, able = structs.blank_robots(lengths), blank(structs.Capabilities, lengths)
     robots.heading[:], able.obeys[:] = heading, [True, False]
     able.max_speed[:], able.max_turn_rate[:] = 2.0, 6.0
-    parameters = parameters_of(scenario)._replace(control_period=period, is_holonomic=is_holonomic)
+    parameters = structs.parameters_of(scenario)
+    parameters = parameters._replace(control_period=period, is_holonomic=is_holonomic)
     drive(np.array([commands, commands]), robots, able, parameters, wanted)
     forward, left, turn = np.clip(commands[:3], -1.0, 1.0)
     way = complex(forward, left if is_holonomic else 0.0)
@@ -47,7 +43,7 @@ def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
     assert (wanted[1].tolist(), robots.heading[1]) == ([0.0, 0.0], heading)
 
 
-def test_every_robot_turns_at_a_rate_of_its_own_that_depends_on_no_other() -> None:
+def test_every_robot_drifts_at_a_rate_of_its_own_that_depends_on_no_other() -> None:
     few, many = Warehouse(Scenario(n_robots=5)), Warehouse(Scenario(n_robots=200))
     few.reset(3)
     many.reset(3)
@@ -60,18 +56,13 @@ def test_every_robot_turns_at_a_rate_of_its_own_that_depends_on_no_other() -> No
 
 
 @pytest.mark.parametrize("drive_kind", ["holonomic", "differential"])
-@pytest.mark.parametrize("drift", [0.1, 0.0])
-def test_headings_drift_at_constant_rates_of_robots_that_can_move(
-    drive_kind: Any, drift: float
-) -> None:
-    world = Warehouse(Scenario(n_robots=6, heading_drift=drift, drive=drive_kind))
+def test_headings_drift_at_constant_rates_of_robots_that_can_move(drive_kind: Any) -> None:
+    world = Warehouse(Scenario(n_robots=6, heading_drift=0.1, drive=drive_kind))
     world.reset(0, [Fault("dead", (0,)), Fault("motor_dead", (1,)), Fault("removed", (2,))])
     before = world.state.robot_heading.copy()
-    commands = np.zeros((6, 4))
-    commands[:4, 0] = 1.0
     for _ in range(50):
-        world.step(commands)
+        world.step(np.tile([1.0, 0.0, 0.0, 0.0], (6, 1)))
     turned = np.remainder(world.state.robot_heading - before + np.pi, math.tau) - np.pi
     wanted = 5.0 * world.state.robot_heading_drift * [0, 0, 0, 1, 1, 1]
     np.testing.assert_allclose(turned, wanted, atol=1e-9)
-    assert bool(turned.any()) == (drift > 0.0)
+    assert turned.any()

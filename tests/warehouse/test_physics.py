@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Warehouse
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.warehouse import physics
+from swarm_logistics_env.warehouse.packing import blank, hints, packed
+from swarm_logistics_env.warehouse.structs import Claims, Functions
 from tests.warehouse.conftest import EAST, FAR, HOLD, OPEN, STAY, WEST, Build, steps
 
 DIAMETER = 0.25
@@ -21,7 +26,7 @@ def deepest_overlap(world: Warehouse) -> float:
     return float(DIAMETER - gaps[~np.eye(len(position), dtype=bool)].min())
 
 
-@pytest.mark.parametrize("gap", np.linspace(0.3, 0.45, 7))
+@pytest.mark.parametrize("gap", [0.3, 0.35, 0.425])
 def test_two_robots_that_meet_head_on_never_pass_through_each_other(
     build: Build, gap: float
 ) -> None:
@@ -45,13 +50,12 @@ def test_a_robot_speeds_up_to_its_top_speed_and_stops_again(
 ) -> None:
     world = build([(1.0, 5.0)], [FAR], max_speed=top, max_acceleration=acceleration)
     needed = math.ceil(top / acceleration / 0.1 + 1e-9)
-    before = 0.0
+    speeds = [0.0]
     for _ in range(needed):
         steps(world, EAST)
-        now = world.state.robot_velocity[0, 0]
-        assert now - before <= acceleration * 0.1 * 1.01
-        before = now
-    assert before == pytest.approx(top, rel=0.01)
+        speeds.append(world.state.robot_velocity[0, 0])
+    assert max(np.diff(speeds)) <= acceleration * 0.1 * 1.01
+    assert speeds[-1] == pytest.approx(top, rel=0.01)
     start = world.state.robot_position[0, 0]
     steps(world, EAST)
     assert world.state.robot_position[0, 0] - start == pytest.approx(top * 0.1, rel=0.01)
@@ -84,27 +88,14 @@ def test_a_robot_that_lifts_above_other_items_is_not_pushed_off_them(build: Buil
     assert world.state.robot_velocity[0, 0] == pytest.approx(2.0)
 
 
-def test_an_item_that_a_robot_lifted_above_is_in_its_way_once_it_has_left(build: Build) -> None:
-    world = build([(2.0, 5.0)], [FAR, (2.0, 5.1), (2.1, 5.0)], memory_size=0, pickup_range=0.1)
-    steps(world, HOLD)
-    assert world.state.item_covered.tolist() == [0, 0, 1]
-    steps(world, WEST, times=5)
-    assert world.state.item_covered.tolist() == [0, 0, 0]
-    for _ in range(20):
-        steps(world, EAST)
-        assert world.state.robot_position[0, 0] <= 2.1 - DIAMETER + CLOSING / 2
-    assert world.state.robot_contact[0]
-
-
 def test_an_item_put_down_beneath_a_laden_robot_does_not_push_it(build: Build) -> None:
     # Items are wider than robots here: what robot 0 puts down reaches below robot 1.
     items = [FAR, (2.0, 5.0), (2.3, 5.0)]
     world = build([(2.0, 5.0), (2.26, 5.0)], items, item_radius=0.2, pickup_range=0.1)
     steps(world, HOLD, HOLD)
     steps(world, OPEN, STAY)
-    before = world.state.robot_position.copy()
     steps(world, STAY, STAY, times=5)
-    np.testing.assert_allclose(world.state.robot_position, before, atol=1e-3)
+    np.testing.assert_allclose(world.state.robot_position, [[2.0, 5.0], [2.26, 5.0]], atol=1e-3)
     assert world.state.item_covered[1] == 1
     steps(world, STAY, EAST, times=10)
     assert world.state.item_covered[1] == 0
@@ -124,11 +115,16 @@ def test_an_item_is_in_the_way_where_it_was_put_down_and_nowhere_else(build: Bui
     assert world.state.robot_position[1, 0] == pytest.approx(left_at - DIAMETER, abs=SUSTAINED)
 
 
-def test_a_removed_robot_is_in_nobodys_way(build: Build) -> None:
-    robots = [(2.0, 5.0), (3.0, 5.0)]
-    world = build(robots, [FAR], [Fault("removed", (1,))])
-    free = build(robots[:1], [FAR])
-    for _ in range(10):
-        steps(world, EAST, STAY)
-        free.step([EAST])
-    np.testing.assert_array_equal(world.state.robot_position[0], free.state.robot_position[0])
+def test_an_array_that_is_not_as_declared_is_refused_before_a_kernel_reads_it() -> None:
+    claims = blank(Claims, {"I": 4, "4 N": 8, "N": 2})
+    others: list[Any] = [claims.events.astype(np.int32), claims.events[0], claims.events[::2].T]
+    for events in others:
+        with pytest.raises(TypeError, match=r"Claims\.events: should be"):
+            packed(claims._replace(events=events))
+
+
+def test_a_pymunk_without_the_functions_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    renamed = {**hints(Functions), "step": Annotated[int, "cpSpaceLeap"]}
+    monkeypatch.setattr(physics, "hints", lambda _: renamed)
+    with pytest.raises(SetupError, match=r"pymunk 7.* lacks a function: .*cpSpaceLeap"):
+        physics._function_addresses()
